@@ -1,4 +1,4 @@
-//! Stroke artwork: the outlines of a character and of its neighbours on the block, as a woodcutter draws them.
+//! Outlines of a character and of its neighbours on the block, with the irregular edges of carved strokes.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -74,8 +74,8 @@ impl Artwork {
         }
     }
 
-    /// Draws the neighbouring characters and the column rules and returns their signed distance in mm. Each neighbour
-    /// and each rule is present with a fixed probability.
+    /// Draws the neighbouring characters and the column rules. Returns the signed distance to their outlines in mm.
+    /// Each neighbour and each rule is present with a fixed probability.
     pub(super) fn draw_neighbours(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> ScalarField {
         let frame = self.strokes.frame;
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
@@ -111,14 +111,14 @@ impl Artwork {
     }
 }
 
-/// Draws the outward offset of the outline in mm. Strokes widen by 2.6-4.4 % of the character's size, which is twice
-/// the offset.
+/// Draws the outward offset of the outline in mm. A stroke widens by twice the offset, which is 2.6-4.4 % of the
+/// character's size.
 fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }
 
-/// Returns the signed distance to the outline as a knife would cut it: moved outwards by about `weight_mm`, with
-/// rounded corners and a slightly irregular edge.
+/// Returns the signed distance to the outline as a knife would cut it. The outline is moved outwards by about
+/// `weight_mm`, and has rounded corners and a slightly irregular edge.
 fn knife_outline(distance: &ScalarField, weight_mm: f64, rng: &mut ChaCha8Rng) -> ScalarField {
     let (coarse, fine) = (Noise::draw(rng), Noise::draw(rng));
     let (coarse_mm, fine_mm) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));
@@ -153,7 +153,7 @@ fn remove_disc(strokes: &mut ScalarField, [u, v]: [f64; 2], radius_mm: f64) {
     }
 }
 
-/// Returns a random point within 0.05 mm of the outline, or `None` after 4000 draws.
+/// Returns a random point within 0.05 mm of the outline, or `None` if 4000 draws find none.
 fn random_boundary_point(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Option<[f64; 2]> {
     let side = strokes.frame.side;
     (0..4000).find_map(|_| {

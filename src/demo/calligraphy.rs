@@ -1,9 +1,9 @@
 //! The `real` tier: the prints are photographs of characters, and the reliefs are carved from clean masks of them.
 //!
-//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). A crop and
-//! its clean mask show the same cell; the crop has one extra row at the top. Over all twenty images, the best alignment
-//! of mask and crop is a shift of [0, 1] px, within half a pixel, and a scale of 1, within 1 %. The ground truth of
-//! this tier is therefore accurate to about one pixel; the other tiers are exact.
+//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). The
+//! photograph and the clean mask of a cell differ in size: the photograph has one extra row at the top. Over all twenty
+//! cells, they align best with a shift of [0, 1] px, within half a pixel, and a scale of 1, within 1 %. The ground
+//! truth of this tier is therefore accurate to about one pixel. In the other tiers it is exact.
 
 use image::{GrayImage, ImageError};
 use rand::RngExt;
@@ -18,7 +18,7 @@ use super::tier::{REAL_PAIRS, Tier};
 use crate::domain::Affine2;
 use crate::raster::Mask;
 
-/// Maps pixels of the clean mask to pixels of the crop.
+/// Maps pixels of the clean mask to pixels of the photograph.
 const CROP_FROM_CLEAN: Affine2 = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
 
 /// A photographed character.
@@ -43,7 +43,7 @@ static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = cells! {
     "10" '尺', "11" '不', "12" '善', "13" '迴', "14" '用', "15" '造', "16" '王', "17" '庫', "18" '普', "19" '同'
 };
 
-/// Makes a pair from the unchanged photograph and a relief of its clean mask in a random pose.
+/// Makes a pair. The print is the unchanged photograph. The relief is carved from the clean mask, in a random pose.
 ///
 /// # Errors
 /// Returns an error if an embedded image cannot be decoded.
@@ -76,7 +76,7 @@ pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoP
     Ok(finish_pair(&scene, printed, vertices, &mut rng))
 }
 
-/// Returns the map from mm to mask pixels that centres the ink and scales its longest side to `size_mm`.
+/// Returns a map from mm to mask pixels: zero maps to the ink's centre, and the ink's longest side is `size_mm`.
 fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
     let ink = Mask::from_fn(clean.width() as usize, clean.height() as usize, |x, y| {
         clean.get_pixel(x as u32, y as u32).0[0] < 128

@@ -11,8 +11,8 @@ use super::noise::{Noise, smoothstep};
 use super::scalar_field::{SampleFrame, ScalarField};
 use super::scene::Scene;
 
-/// Computes the surface of a carved, worn and bent block. `strokes` is the signed distance in mm to the strokes left on
-/// the block. Height zero is the least-squares plane of the stroke tops.
+/// Computes the surface of a carved, worn and bent block. `strokes` is the signed distance in mm to the remaining
+/// strokes. Height zero is the least-squares plane of the stroke tops.
 pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
     let frame = strokes.frame;
     let knife = Knife::draw(frame, rng);
@@ -55,8 +55,8 @@ impl Knife {
         }
     }
 
-    /// Returns the depth in mm below the stroke tops at a distance of `outside` mm from the nearest stroke. The profile
-    /// is a sloping wall down to a rough floor. Two walls that meet above the floor form a V.
+    /// Returns the depth below the stroke tops, in mm. `outside` is the distance to the nearest stroke, in mm. The
+    /// walls slope down to a rough floor. Two walls that meet above the floor form a V.
     fn depth_mm(&self, [u, v]: [f64; 2], outside: f64, x: usize, y: usize) -> f64 {
         let wall = outside * self.slope * (1.0 + 0.3 * self.lean.at(u / 1.6, v / 1.6));
         let floor = self.depth_mm
@@ -118,7 +118,7 @@ impl Wear {
         }
     }
 
-    /// Returns the height lost to wear, in mm, at `inside` mm from the stroke edge. Wear consists of patches, open
+    /// Returns the height in mm that wear removes, `inside` mm from the stroke edge. Wear consists of patches, open
     /// grain, small pits and rounded edges.
     fn at(&self, [u, v]: [f64; 2], inside: f64) -> f64 {
         let [along, across] = self.grain_axis.along_across([u, v]);

@@ -14,7 +14,7 @@ const LOST_SHARE: [f64; 2] = [0.05, 0.20];
 /// Damage to one block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Damage {
-    /// Signed distance in mm to the lost regions, positive inside. `None` if nothing is lost.
+    /// Signed distance in mm to the edge of the lost regions, positive inside. `None` if nothing is lost.
     pub lost: Option<ScalarField>,
     /// Cracks through the wood.
     pub cracks: Vec<Crack>,
@@ -80,7 +80,7 @@ impl Crack {
     }
 }
 
-/// Draws ragged blobs over the strokes until the target share of the stroke area is lost.
+/// Draws ragged blobs over the strokes until a random share of the stroke area is lost.
 fn draw_lost_regions(artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;

@@ -39,7 +39,7 @@ pub struct DatasetFiles {
     pub truth: PathBuf,
     /// Number of pairs.
     pub pairs: u64,
-    /// Whether a complete dataset with the same options existed, so that nothing was written.
+    /// Whether nothing was written because a complete dataset with the same options existed.
     pub already_existed: bool,
 }
 
@@ -90,10 +90,10 @@ struct ManifestLine {
     tier: Tier,
 }
 
-/// Writes the dataset below `dir`, unless a complete one with the same options is already there.
+/// Writes the dataset below `dir`, unless a complete dataset with the same options is already there.
 ///
-/// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`. `dataset.json` is written last. Without it,
-/// the next run replaces the files that a killed run left. Calls `is_stopped` before each pair.
+/// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`, then `dataset.json`. If a run is killed
+/// before that, the next run replaces all files. Calls `is_stopped` before each pair.
 ///
 /// # Errors
 /// Returns an error if an image cannot be encoded, a file cannot be written or `is_stopped` returns true.

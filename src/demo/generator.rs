@@ -7,7 +7,7 @@ use super::glyph::Glyphs;
 use super::pair::{DemoPair, drawn_pair};
 use super::tier::Tier;
 
-/// Generates the pairs of a tier from a seed. A pair depends only on tier, seed and index, not on the number of pairs.
+/// Generates the pairs of a tier from a seed. A pair does not depend on the number of generated pairs.
 pub struct PairGenerator {
     glyphs: Glyphs,
     tier: Tier,
@@ -26,7 +26,7 @@ impl PairGenerator {
         }
     }
 
-    /// Sets the approximate number of vertices per scan. With `None`, the number is drawn at random.
+    /// Sets the approximate number of vertices per scan. If it is `None`, each scan has a random number.
     #[must_use]
     pub fn with_vertices(self, vertices: Option<u32>) -> Self {
         Self { vertices, ..self }
@@ -37,7 +37,7 @@ impl PairGenerator {
         self.tier
     }
 
-    /// Makes a pair. In the `real` tier, the indices after the last pair start again at the first pair.
+    /// Makes a pair. In the `real` tier, the photographs repeat after 20 pairs.
     ///
     /// # Errors
     /// Returns an error if an image cannot be encoded, or an embedded image cannot be decoded.

@@ -74,7 +74,7 @@ impl Inking {
         }
     }
 
-    /// Returns the ink density, 0..=1, averaged over a pixel with sides of `px_mm` around a point.
+    /// Returns the ink density, 0..=1, at a point, averaged over a square pixel with sides of `px_mm`.
     pub(super) fn at(&self, point: [f64; 2], px_mm: f64) -> f64 {
         let [u, v] = point;
         let spread = self.spread_mm
@@ -106,7 +106,7 @@ impl Inking {
     }
 }
 
-/// Draws the amount of ink; only the `hard` tier has too much or too little.
+/// Draws the amount of ink. Only the `hard` tier has too much or too little.
 fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
     let share: f64 = rng.random();
     match share {
@@ -116,14 +116,14 @@ fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
     }
 }
 
-/// Averages the signed distance with an estimate of it from a blurred mask. The blur fills notches and rounds corners.
+/// Averages the signed distance with a second estimate from a blurred mask. The blur fills notches and rounds corners.
 fn fill_corners(printed: &ScalarField) -> ScalarField {
     const SIGMA_MM: f64 = 0.12;
     let ink = ScalarField::from_fn(printed.frame, |_, x, y| f64::from(printed.at(x, y) > 0.0));
     let blurred = ink.blurred(SIGMA_MM);
     ScalarField::from_fn(printed.frame, |_, x, y| {
-        // At the edge the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. The inverse converts coverage to
-        // mm.
+        // At the edge, the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. Dividing by this slope converts
+        // it to mm.
         let blurred_mm = (blurred.at(x, y) - 0.45) * SIGMA_MM * (std::f64::consts::TAU).sqrt();
         0.5 * printed.at(x, y) + 0.5 * blurred_mm
     })

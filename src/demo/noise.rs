@@ -51,13 +51,13 @@ pub(super) fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// Returns 0 if `x` is below `low`, 1 if it is above `high`, and a smooth transition between the two.
+/// Returns 0 if `x` is below `low`, 1 if `x` is above `high`, and a smooth transition in between.
 pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     smoothstep_unit(((x - low) / (high - low)).clamp(0.0, 1.0))
 }
 
-/// Returns the largest integer that is not above `x`. This function runs a million times per pair, and on the baseline
-/// x86-64 target `f64::floor` would be a library call.
+/// Returns the largest integer that is not above `x`. This function runs a million times per pair. On the baseline
+/// x86-64 target, `f64::floor` would be a library call.
 fn floor(x: f64) -> i64 {
     let toward_zero = x as i64;
     toward_zero - i64::from((toward_zero as f64) > x)

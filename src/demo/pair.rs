@@ -56,7 +56,7 @@ pub(super) struct Printed {
     pub extension: &'static str,
 }
 
-/// Makes a pair of one of the tiers whose characters come from the font.
+/// Makes a pair of a tier other than `real`: the character comes from the font.
 ///
 /// # Errors
 /// Returns an error if the print cannot be encoded.
@@ -154,8 +154,8 @@ mod tests {
             .expect("images encode")
     }
 
-    /// Maps a mesh point to the print by the ground truth. Returns the mask value there and the point's height over the
-    /// plane, as a share of the character's height. Returns `None` outside the mask.
+    /// Maps a mesh point to the print by the ground truth. Returns the mask's value there, and the height of the point
+    /// over the plane as a share of the character's height. Returns `None` outside the mask.
     fn height_at(pair: &DemoPair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
         let map = pair.truth.print_from_mesh;
         let [x, y, height] = map.apply(point);
@@ -183,8 +183,8 @@ mod tests {
         }
     }
 
-    /// Returns the mask with all pixels next to a different value set to `IGNORED`, because a wall starts half a pixel
-    /// outside the stroke edge.
+    /// Returns the mask, with `IGNORED` in each pixel that has a neighbour with a different value. A mesh point near an
+    /// edge may be rounded to a pixel across the edge.
     fn without_edges(tops: &Grid<u8>) -> Grid<u8> {
         Grid::from_fn(tops.width(), tops.height(), |x, y| {
             let value = tops.at(x, y);

@@ -20,8 +20,8 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// Draws an irregular polygon around a box. Its sides lie at least `margin_mm` outside the box, and at most
-    /// `max_excess_mm` further out.
+    /// Draws an irregular polygon around a box. Its sides lie between `margin_mm` and `margin_mm + max_excess_mm`
+    /// outside the box.
     pub(super) fn around(
         inner: BoundsMm,
         margin_mm: f64,

@@ -24,7 +24,7 @@ struct Stain {
 }
 
 impl PrintSheet {
-    /// Draws a yellowish, bluish or greyish sheet with `stains` stains within `half_mm` of the centre.
+    /// Draws a yellowish, bluish or greyish sheet. Its stains lie within `half_mm` of the centre.
     pub(super) fn draw(stains: u32, half_mm: f64, rng: &mut ChaCha8Rng) -> Self {
         let base = match rng.random_range(0..10_u32) {
             0..=5 => [228.0, 210.0, 172.0],

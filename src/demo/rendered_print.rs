@@ -36,8 +36,8 @@ impl PrintFrame {
         }
     }
 
-    /// Draws a frame that contains a polygon. The frame's longest side is 100-400 px, and the polygon is rotated by up
-    /// to 4 degrees.
+    /// Draws a frame that contains a polygon after rotating it by up to 4 degrees. The frame's longest side is 100-400
+    /// px.
     pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);
@@ -50,7 +50,7 @@ impl PrintFrame {
         };
         let bounds = rotated.bounds();
         let size_mm = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // Most published crops come from 300 dpi scans and are about 135 px long; some are larger.
+        // Most published prints are crops of 300 dpi scans, about 135 px on the longest side. Some are larger.
         let longest_px: f64 = if rng.random_bool(0.5) {
             rng.random_range(112.0..170.0)
         } else {
@@ -80,7 +80,7 @@ impl PrintFrame {
 pub(super) struct RenderedPrint {
     /// Red, green and blue, 0..=255.
     pub rgb: Grid<[f64; 3]>,
-    /// Whether each pixel lies inside the cut outline; the other pixels are white.
+    /// Whether each pixel lies inside the cut outline. Pixels outside are white.
     pub inside_cut: Grid<bool>,
 }
 

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::raster::{Grid, Mask};
 
-/// A square grid of samples around the character's centre. u points right and v down **as the print reads**, in mm.
+/// A square grid of samples around the character's centre. On the print, u points right and v down. Both are in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampleFrame {
     /// Number of samples per side.
@@ -37,8 +37,8 @@ impl SampleFrame {
         ]
     }
 
-    /// Returns the column and row of each sample in the square that extends `half_size_mm` from `centre` in each
-    /// direction.
+    /// Returns the column and row of each sample in a square. The square extends `half_size_mm` from `centre` to each
+    /// side.
     pub(super) fn box_around(
         self,
         centre: [f64; 2],
@@ -76,7 +76,7 @@ pub(super) struct ScalarField {
 }
 
 impl ScalarField {
-    /// Computes each value of a field from the sample's position in mm, its column and its row.
+    /// Computes a field. `value` is called with the position of a sample in mm, its column and its row.
     pub(super) fn from_fn(
         frame: SampleFrame,
         mut value: impl FnMut([f64; 2], usize, usize) -> f64,
@@ -176,7 +176,7 @@ fn transpose(grid: &Grid<f32>) -> Grid<f32> {
 /// Computes the squared distance from each pixel to the nearest set pixel, in square pixels (Felzenszwalb and
 /// Huttenlocher 2012, doi:10.4086/toc.2012.v008a019).
 fn distance_squared(mask: &Mask) -> Grid<f32> {
-    // Larger than any squared distance in the frame, yet small enough for exact f32 arithmetic on the parabolas.
+    // Larger than any squared distance in the mask, but small enough for exact f32 arithmetic.
     let far = (mask.width() + mask.height()).pow(2) as f32;
     let start = mask.map(|set| if *set { 0.0 } else { far });
     let down = transpose(&lower_envelopes(&transpose(&start)));

@@ -1,8 +1,8 @@
 //! The pose of a scan: the map from the block frame to the mesh frame, in mesh units.
 //!
-//! The block frame is right-handed and in mm, with z out of the block and the origin at the character's centre. The
-//! block is carved in mirror writing, so a point (u, v) of the print lies at x = -u, y = -v. Seen from outside with x
-//! to the right and y up, the right side of the print is on the left.
+//! The block frame is right-handed and in mm. Its z axis points out of the block, and its origin is the character's
+//! centre. The block is carved in mirror writing, so the print's x axis is reversed. The print's y axis points down.
+//! Therefore a point (u, v) of the print lies at x = -u, y = -v on the block.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ pub(super) struct ScanPose {
     pub unit: Option<LengthUnit>,
 }
 
-/// The plane of the stroke tops in mesh coordinates: `n . x + d = 0`, where n points out of the block.
+/// The plane of the stroke tops in mesh coordinates: `n . x + d = 0`.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct TopsPlane {
     /// Unit normal, out of the block.
@@ -136,8 +136,8 @@ fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Draws an in-plane rotation of up to 11 degrees followed by a tilt of up to 10 degrees. The print is rotated by up to
-/// 4 degrees as well.
+/// Draws an in-plane rotation of up to 11 degrees, followed by a tilt of up to 10 degrees. The print is rotated by up
+/// to 4 degrees, so mesh and print differ by at most 15 degrees in the plane.
 fn upright_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     let in_plane = rotation_about(
         [0.0, 0.0, 1.0],

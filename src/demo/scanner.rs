@@ -33,8 +33,8 @@ pub(super) struct ScanStyle {
 }
 
 impl ScanStyle {
-    /// Draws the properties of a scan of about `vertices` vertices. If `vertices` is `None`, draws 22,000 to 132,000,
-    /// with small scans more likely.
+    /// Draws the properties of a scan with about `vertices` vertices. If `vertices` is `None`, their number is drawn as
+    /// well: 22,000 to 132,000, with small numbers more likely.
     pub(super) fn draw(is_damaged_scan: bool, vertices: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
         let is_closed = rng.random_bool(0.125);
         let share: f64 = rng.random_range(0.0..1.0);
@@ -86,7 +86,7 @@ impl SampledSurface {
     ) -> Self {
         let bounds = outline.bounds();
         let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // The polygon fills about 84 % of its bounding box. The base of a closed scan has as many vertices as its face.
+        // The polygon fills about 84 % of its bounding box. In a closed scan, half of the vertices belong to the base.
         let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();
         let columns = (width / spacing) as usize + 9;
@@ -136,7 +136,8 @@ impl SampledSurface {
     }
 }
 
-/// Returns the mesh of these triangles. Its vertices are the points that the triangles use, in the order of first use.
+/// Returns a mesh of the triangles. Points that no triangle uses are left out, and the others are in the order of first
+/// use.
 fn mesh_of(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Mesh {
     let mut index = vec![u32::MAX; points.len()];
     let mut mesh = Mesh::default();
@@ -219,7 +220,7 @@ fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Returns the edges that belong to only one triangle, directed as in that triangle, in the order of the triangles.
+/// Returns the edges that belong to only one triangle. They have the direction and order that they have in `triangles`.
 fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     let edges = || {
         triangles
@@ -232,7 +233,7 @@ fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Adds the wall vertices below a boundary vertex. Returns the column of vertices from the face down to the base.
+/// Adds the wall vertices below a boundary vertex. Returns the column of vertices from the boundary down to the base.
 fn wall_column(
     boundary: u32,
     base_start: u32,

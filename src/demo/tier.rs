@@ -17,10 +17,10 @@ pub enum Tier {
     Upright,
     /// Any orientation, unit and position; slight bend.
     Pose,
-    /// Like `Pose`, but with a bend of 0.2-0.8 mm, lost strokes, cracks, uneven ink, stains, and different neighbours
-    /// on mesh and print.
+    /// Like `Pose`, but with a bend of 0.2-0.8 mm, lost strokes, cracks, uneven ink and stains. Mesh and print have
+    /// different neighbours.
     Hard,
-    /// Twenty photographs of characters as prints. The reliefs are carved from clean masks of them and have any pose.
+    /// The prints are twenty photographs of characters. The reliefs are carved from clean masks and have any pose.
     Real,
 }
 

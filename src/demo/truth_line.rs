@@ -17,7 +17,8 @@ pub(super) const STROKE_TOP: u8 = 255;
 /// cracks in strokes.
 pub(super) const IGNORED: u8 = 128;
 
-/// Width of the excluded band around neighbouring characters, in mm. Their walls are neither stroke top nor background.
+/// Width of the excluded band around neighbouring characters, in mm. It hides walls, which are neither top nor
+/// background.
 const NEIGHBOUR_MARGIN_MM: f64 = 0.2;
 
 /// One line of `truth.jsonl`.
@@ -95,8 +96,8 @@ impl TruthSource<'_> {
             .map_or(0.0, |found| found.height() as f64)
     }
 
-    /// Draws 16 to 36 well-separated points on the remaining stroke tops, in mesh coordinates. Returns fewer if no more
-    /// are found.
+    /// Draws 16 to 36 well-separated points on the remaining stroke tops, in mesh coordinates. Returns fewer points if
+    /// the search finds no more.
     fn landmarks(&self, pose: &ScanPose, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
         let wanted = rng.random_range(16..=36_usize);
         let mut chosen: Vec<[f64; 2]> = Vec::new();

@@ -1,4 +1,4 @@
-//! References to artifacts, the files that stages produce. They are named by content, so equal files are stored once.
+//! References to artifacts, the files that stages produce. A file is named by its hash, so equal files are stored once.
 
 use std::collections::BTreeMap;
 

@@ -2,14 +2,14 @@
 
 use super::ThresholdMetric;
 
-/// Depth map with 16 bits per pixel; from depth.
+/// Depth map with 16 bits per pixel, written by the depth stage.
 pub const DEPTH: &str = "depth.png";
-/// Ink mask on the canvas: 255 ink; from register.
+/// Ink mask on the canvas, written by register: 255 is ink.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
 /// Returns the role of the ink mask for interpretation `ink` of the print, counted from 0. Normalize writes the mask in
-/// the frame of the print: 255 is ink, 0 background and 128 unknown. `RegisterOutcome::ink` is the selected
-/// interpretation.
+/// the frame of the print: 255 is ink, 0 is background and 128 is unknown. Register stores the interpretation that it
+/// selects in `RegisterOutcome::ink`.
 pub fn print_mask(ink: usize) -> String {
     match ink {
         0 => "print_mask.png".to_owned(),

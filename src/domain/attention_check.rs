@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A planted fault, or a result shown a second time. Answers to attention checks are not verdicts.
+/// A deliberate fault, or a result shown a second time. The reviewer's answer to a check is not counted as a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum AttentionCheck {
@@ -33,7 +33,7 @@ impl AttentionCheck {
         }
     }
 
-    /// Returns whether it is a fault, which an attentive reviewer fails.
+    /// Returns whether the check is a fault. An attentive reviewer fails it.
     pub const fn is_fault(&self) -> bool {
         match self {
             Self::Turned { .. } | Self::Mirrored | Self::Threshold { .. } => true,

@@ -2,8 +2,8 @@
 
 /// Defines `ALL`, `name`, `Display` and `FromStr` of an enum from a table of its variants and their names.
 ///
-/// The noun, such as `a stage`, is used in the error of `FromStr`:
-/// `"fitt" is not a stage (fit, depth, normalize, register)`.
+/// The literal after the type, such as `"a stage"`, appears in the error of `FromStr`: `"fitt" is not a stage (fit,
+/// depth, normalize, register)`.
 macro_rules! enum_names {
     ($vis:vis $type:ident, $noun:literal: $($variant:ident = $name:literal),+ $(,)?) => {
         impl $type {

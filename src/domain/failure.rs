@@ -10,12 +10,13 @@ use super::enum_names;
 pub enum FailureClass {
     /// The input file is invalid, for example empty or truncated. The pair is quarantined.
     BadInput,
-    /// The input is valid, but the method finds no solution, as for a plate without relief. The pair is quarantined.
+    /// The input is valid, but the method finds no solution, for example because nothing is carved. The pair is
+    /// quarantined.
     NoSolution,
-    /// Reading or writing failed. The stage is retried with back-off a few times if the failure may pass by itself.
-    /// Otherwise, for example if a file is missing, the pair is quarantined.
+    /// Reading or writing failed. If the failure may be temporary, the stage is retried a few times with back-off.
+    /// Otherwise, or after the last attempt, the pair is quarantined.
     Io,
-    /// The stage needs too much memory or time. It is retried with no other pair running, then the pair is quarantined.
+    /// The stage needs too much memory or time. It is retried once without other pairs, then the pair is quarantined.
     Resource,
     /// A defect of this program, such as a caught panic. Quarantined.
     Bug,
@@ -25,7 +26,7 @@ enum_names! { pub FailureClass, "a failure class":
     BadInput = "bad_input", NoSolution = "no_solution", Io = "io", Resource = "resource", Bug = "bug",
 }
 
-/// A failure: its class, and a message that names the file and the reason.
+/// A failure of a stage. The message names the file and the reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{message}")]
 pub struct Failure {

@@ -41,7 +41,7 @@ impl ContentHash {
         blake3::Hash::from_bytes(self.0).to_hex().to_string()
     }
 
-    /// Returns the first 12 digits, which suffice to distinguish results in messages.
+    /// Returns the first 12 digits, for messages.
     pub fn short(self) -> String {
         self.to_hex()[..12].to_owned()
     }

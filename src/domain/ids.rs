@@ -45,7 +45,7 @@ impl PairName {
     /// Validates an id.
     ///
     /// # Errors
-    /// Returns an error if it is empty, too long, or contains a character that is not allowed.
+    /// Returns an error if the id is empty, too long, or contains a character that is not allowed.
     pub fn new(text: &str) -> Result<Self, PairNameError> {
         if text.is_empty() {
             return Err(PairNameError::Empty);

@@ -36,15 +36,15 @@ impl JobStatus {
     }
 }
 
-/// Number of workers that may die over a pair before it is quarantined.
+/// Number of workers that may die over a pair before it is quarantined, if no other workers die.
 pub const CRASH_LIMIT: u32 = 3;
 
-/// Returns whether a pair is the likely cause of worker deaths, so that it must be quarantined.
+/// Returns whether a pair must be quarantined because it probably kills its workers.
 ///
-/// `crashes` is the number of workers that died since the pair's last finished stage while they leased only this pair.
-/// `deaths` is the number of all recent deaths of workers. If a pair kills workers, `deaths` exceeds `crashes` by at
-/// most one: a worker may have died while it also leased other pairs. Each further death suggests an external cause,
-/// such as killed processes, and raises the limit by one.
+/// `crashes` is the number of workers that died while they leased only this pair. A finished stage resets it. `deaths`
+/// is the number of all recent worker deaths. If the pair is the cause, `deaths` exceeds `crashes` by at most one: the
+/// worker that also leased other pairs. Each further death suggests an external cause, such as killed processes, and
+/// raises the limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

@@ -7,33 +7,34 @@ use super::enum_names;
 /// How the threshold between strokes and background of a depth map is selected (paper III-C).
 ///
 /// `P` is the ink mask of the print. `D(t)` is the depth mask: the heights at and above threshold `t`. The default
-/// method compares the masks after alignment, where both images have data, at 40 evenly spaced depths below the stroke
-/// tops, from `register.threshold_min` to `register.threshold_max` (shares of the relief). The paper's method compares
-/// the masks before alignment, each scaled by its bounding box and centred on its centroid (the paper's wrap W), over
-/// the authors' ranges of grey.
+/// method compares the masks after alignment, where both images have data. It tries 40 evenly spaced depths below the
+/// stroke tops, from `register.threshold_min` to `register.threshold_max` (shares of the carving's depth). The paper's
+/// method compares the masks before alignment, over fixed ranges of grey levels. It scales each mask by its bounding
+/// box and centres it on its centroid.
 ///
-/// The paper's three metrics are fitted to the print, so the print's ink spread can affect them. [`Self::Relief`]
-/// depends on the scanned relief alone.
+/// The paper's three metrics depend on the print, so its ink spread can affect them. [`Self::Relief`] depends on the
+/// scanned relief alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdMetric {
-    /// `argmax_t mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))` with the local variances and the covariance of `P` and
-    /// `D(t)`: SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is that
-    /// mean.
+    /// Maximizes `mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))`, from the local variances and the covariance of `P` and
+    /// `D(t)`. This is SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is
+    /// the maximum.
     NlSsim,
-    /// `argmin_t |a(D(t)) / a(P) * s - 1|` with areas `a` and the ink spread `s` (`register.ink_spread`). The score is
-    /// minus that value. Under the paper's method `argmin_t |d(D(t)) - d(P)|` with densities `d`, the shares of the
-    /// canvas.
+    /// Minimizes `|a(D(t)) / a(P) * s - 1|`, where `a` is the area of a mask and `s` is `register.ink_spread`. The
+    /// paper's method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share of the canvas. The score is minus the
+    /// minimum.
     Density,
-    /// `argmax_t` of the same mean as [`Self::NlSsim`] among the thresholds with `|ln(a(D(t)) / A)| <= ln 1.12`, where
-    /// `A` is the area of [`Self::Relief`]'s mask clamped to `a(P) / 2.2 ..= 1.15 a(P)`; where none is that close, the
-    /// threshold nearest to [`Self::Relief`]'s. The score is that mean. Under the paper's method the better of
-    /// [`Self::NlSsim`] and [`Self::Density`] by the IoU of the registered masks.
+    /// Maximizes the same mean as [`Self::NlSsim`], but only over masks with about the area `A`: `|ln(a(D(t)) / A)| <=
+    /// ln 1.12`. `A` is the area of [`Self::Relief`]'s mask, clamped to `a(P) / 2.2 ..= 1.15 a(P)`. If no mask
+    /// qualifies, the threshold nearest to [`Self::Relief`]'s is used. The score is the mean. The paper's method
+    /// instead uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
     Ensemble,
-    /// The threshold at which the stroke tops end and the walls begin, from the histogram of heights alone: the
-    /// geometric mean of 0.075 of the relief (the usual depth) and the depth below the peak at which heights are no
-    /// more frequent than `min(2.5 w, (w + peak) / 2)`, where `w` is the median frequency on the walls; that depth is
-    /// clamped to 0.02..=0.25. It does not depend on the print and has no score (0). Not part of the paper's method.
+    /// The depth at which the stroke tops end and the walls begin, from the histogram of heights alone. It is the
+    /// geometric mean of the usual depth (0.075 of the relief) and a measured depth (clamped to 0.02..=0.25 of the
+    /// relief). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w + peak) /
+    /// 2)`; `w` is the median frequency on the walls. There is no score (0). The paper's method does not have this
+    /// metric.
     Relief,
 }
 
@@ -42,10 +43,10 @@ enum_names! { pub ThresholdMetric, "a metric":
 }
 
 impl ThresholdMetric {
-    /// The paper's three, which both methods give.
+    /// The paper's three metrics, which both methods compute.
     pub const PAPER: [Self; 3] = [Self::NlSsim, Self::Density, Self::Ensemble];
 
-    /// Returns the name in the printed table; the paper's metrics as the paper names them.
+    /// Returns the name in the printed table. The paper's metrics have the names that the paper uses.
     pub const fn title(self) -> &'static str {
         match self {
             Self::NlSsim => "Non-luminous SSIM",

@@ -1,4 +1,4 @@
-//! Domain types: small values without files, SQL, async code or image buffers.
+//! Domain types: small values that do not use files, SQL, async code or image buffers.
 
 mod artifact;
 pub mod artifact_role;

@@ -1,14 +1,14 @@
 //! The numeric results of the stages. Images are stored separately, as artifacts.
 //!
-//! Outcomes are stored as JSON that keeps every bit of a number, so that a resumed run computes the same results.
+//! Outcomes are stored as JSON with exact numbers, so that a resumed run computes the same results.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Affine2, LengthUnit, Rigid3, ThresholdMetric};
 
-/// The curved surface of the stroke tops: a quadratic height over the plane, all in mesh units.
+/// The curved surface of the stroke tops. All lengths are in mesh units.
 ///
-/// `z = c[0] + c[1] x + c[2] y + c[3] x^2 + c[4] x y + c[5] y^2`
+/// The height over the plane is `z = c[0] + c[1] x + c[2] y + c[3] x^2 + c[4] x y + c[5] y^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bow(pub [f64; 6]);
 
@@ -31,11 +31,12 @@ impl Bow {
 /// Evidence for the side of the plane that was chosen as the carved one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SideEvidence {
-    /// Share of the faces' projected area whose winding points out of the chosen side, 0..=1. `None` without faces and
-    /// under the paper's method.
+    /// Share of the faces that are wound outward on the chosen side, weighted by projected area, 0..=1. `None` if there
+    /// are no faces, and under the paper's method.
     pub winding: Option<f64>,
-    /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's
-    /// method takes each side's mean distance of points to their centroid, and stores the difference over the sum.
+    /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
+    /// stores `|a - b| / (a + b)` instead. `a` and `b` are the mean distances of either side's points to their
+    /// centroid.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,
@@ -44,12 +45,12 @@ pub struct SideEvidence {
 /// Numeric result of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitOutcome {
-    /// Maps mesh coordinates to the right-handed plane frame, in mesh units; z is the height, positive out of the
+    /// Maps mesh coordinates to the plane frame, which is right-handed and in mesh units. Its z axis points out of the
     /// block.
     pub plane_from_mesh: Rigid3,
-    /// Curved surface of the tops, if the residuals of the plane show that the block is bent.
+    /// Curved surface of the stroke tops. `None` if the block is flat.
     pub bow: Option<Bow>,
-    /// Range of heights of the curved surface over the character, in mesh units; 0 for a flat block.
+    /// Largest minus smallest height of the curved surface over the character, in mesh units; 0 for a flat block.
     pub bow_height: f64,
     /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
@@ -146,8 +147,7 @@ impl ReliefHeights {
         self.top - self.ground
     }
 
-    /// Returns the depth-map level, 1..=65535, at a depth below `top`. `share` is that depth as a share of
-    /// [`Self::depth`].
+    /// Returns the depth-map level, 1..=65535, of the height `top - share * depth`.
     ///
     /// # Examples
     /// ```
@@ -181,12 +181,12 @@ pub struct NormalizeOutcome {
     pub inks: Vec<InkHypothesis>,
     /// Heights from which the soft stroke mask is computed; `None` under the paper's method.
     pub relief: Option<ReliefHeights>,
-    /// Thresholds selected before registration. Only the paper's method selects them here, for each of its metrics
-    /// except the ensemble. Empty under the default method.
+    /// Thresholds selected before registration. The paper's method selects one for each of its metrics except the
+    /// ensemble. The default method selects none.
     pub thresholds: Vec<ThresholdChoice>,
 }
 
-/// Similarity of the two canvas masks of a metric. See `stages::score` for the formulas.
+/// Similarity of the print mask and the depth mask of a metric on the canvas. See `stages::score` for the formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// Structural similarity (Wang et al. 2004), by default with Gaussian windows.
@@ -214,17 +214,18 @@ pub struct PoseFeatures {
     pub tops_covered: f64,
     /// Share of the ink that is covered by stroke tops, 0..=1.
     pub ink_covered: f64,
-    /// Score of the best pose at another angle, divided by the score of the best pose.
+    /// Score of the best pose at a different angle, divided by the score of the best pose.
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, divided by the score of the best pose.
     pub mirrored: f64,
-    /// Sensitivity of the pose to its start: the pose is refined from three slightly different sizes, and this is the
-    /// largest distance between the best result and another one, as a share of the longest side of the depth map.
+    /// Sensitivity of the pose to its start. The pose is refined from three slightly different sizes. This is the
+    /// largest distance between the best of the three results and another one, as a share of the depth map's longest
+    /// side.
     #[serde(default)]
     pub spread: f64,
 }
 
-/// The aligned result of a metric. It is one row of the catalog and of the export.
+/// Alignment and scores of one metric: one row of the catalog and of the export.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricOutcome {
     /// The metric.
@@ -243,10 +244,10 @@ pub struct MetricOutcome {
     pub shift_px: [f64; 2],
     /// Similarity of the masks on the canvas.
     pub scores: Scores,
-    /// Score of the best pose minus the score of the best competing pose (at another angle, or mirrored).
+    /// Score of the best pose minus the score of the best competing pose.
     pub margin: f64,
-    /// Calibrated probability, 0..=1, that this alignment is correct: its angle error is within 5 degrees, and its
-    /// landmarks are within 5 % of the character's height. `None` under the paper's method.
+    /// Calibrated probability, 0..=1, that the alignment is correct: the angle error is at most 5 degrees, and the
+    /// landmark error is at most 5 % of the character's height. `None` under the paper's method.
     pub confidence: Option<f64>,
     /// Whether the search for the scale or for the threshold ended at a limit of its range.
     pub at_bound: bool,
@@ -256,7 +257,7 @@ impl MetricOutcome {
     /// Results with a lower confidence should be checked before they are used.
     pub const LOW_CONFIDENCE: f64 = 0.5;
 
-    /// Returns whether there is a confidence and it is below [`Self::LOW_CONFIDENCE`].
+    /// Returns whether the confidence is known and below [`Self::LOW_CONFIDENCE`].
     pub fn is_low_confidence(&self) -> bool {
         self.confidence
             .is_some_and(|confidence| confidence < Self::LOW_CONFIDENCE)
@@ -270,7 +271,7 @@ pub struct RegisterOutcome {
     pub ink: usize,
     /// One result per metric of the method, in the order of [`ThresholdMetric::ALL`].
     pub metrics: Vec<MetricOutcome>,
-    /// Features of the pose that all metrics share; `None` under the paper's method.
+    /// Features of the pose, which is the same for all metrics. `None` under the paper's method.
     #[serde(default)]
     pub features: Option<PoseFeatures>,
 }

@@ -10,7 +10,7 @@ use super::enum_names;
 pub enum ReviewOrder {
     /// Seeded shuffle; the results reviewed so far are a random sample.
     Random,
-    /// Least confident results first, to find failures sooner. The results reviewed so far are not a random sample.
+    /// Least confident results first, to find failures sooner. The reviewed results are then not a random sample.
     LeastConfident,
     /// Only results on which other reviewers disagree.
     Adjudicate,

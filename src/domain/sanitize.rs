@@ -1,8 +1,7 @@
 //! Sanitizing of text from files before it is printed.
 
-/// Returns a text on one line that is safe for terminals. Line breaks and tabs become blanks, other control and
-/// invisible characters become escapes. If the result is longer than `most` characters, it is cut and ends in three
-/// dots.
+/// Returns a text as one line that is safe for terminals. Line breaks and tabs become blanks. Other control and
+/// invisible characters become escapes. If more than `most` characters result, the rest is replaced by three dots.
 ///
 /// ```
 /// use mocban::domain::sanitize;

@@ -2,7 +2,7 @@
 
 use super::ContentHash;
 
-/// A source of random numbers. A number depends only on seed, name, subject and purpose, not on the order of the draws.
+/// A source of random numbers. A number depends only on seed, name, subject and purpose, not on earlier draws.
 ///
 /// ```
 /// use mocban::domain::{ContentHash, SeededRandom};

@@ -31,8 +31,8 @@ enum_names! { pub Stage, "a stage":
 }
 
 impl Stage {
-    /// Returns the position of the stage in the processing order, 0 to 3. A job whose next stage is this one has this
-    /// number as its cursor.
+    /// Returns the position of the stage in the processing order, 0 to 3. The cursor of a job is the index of its next
+    /// stage.
     pub const fn index(self) -> usize {
         self as usize
     }

@@ -2,7 +2,7 @@
 
 use super::{Affine2, MetricOutcome, Scores, ThresholdMetric};
 
-/// Returns an outcome with an `IoU` and the matching Dice, without a confidence.
+/// Returns an outcome with the given `IoU`, the matching Dice and no confidence.
 pub(crate) fn metric_outcome(metric: ThresholdMetric, iou: f64) -> MetricOutcome {
     MetricOutcome {
         metric,

@@ -1,4 +1,4 @@
-//! Maps between frames, named `to_from_from`: mesh, plane, depth map, print image, canvas.
+//! Maps between the frames of mesh, plane, depth map, print image and canvas. `a_from_b` maps from frame b to frame a.
 //!
 //! Matrices are row-major and act on column vectors. Pixel frames have x to the right, y down, and (0, 0) at the
 //! centre of the top-left pixel, so a positive angle is a clockwise rotation on the screen.
@@ -118,7 +118,7 @@ impl Affine2 {
 pub struct Rigid3(pub [[f64; 4]; 4]);
 
 impl Rigid3 {
-    /// Returns the transform that maps `origin` to zero and `axes`, right-handed unit vectors, to x, y, z.
+    /// Returns the transform that maps `origin` to zero and the right-handed unit vectors `axes` to x, y and z.
     pub fn to_frame(axes: [[f64; 3]; 3], origin: [f64; 3]) -> Self {
         let row = |axis: [f64; 3]| {
             let shift = -(axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2]);
@@ -161,8 +161,8 @@ impl Rigid3 {
     }
 }
 
-/// The result of the pipeline, a 3x4 matrix that is applied to a mesh point `[X Y Z 1]`. Rows 1 and 2 give the point's
-/// print pixel x and y. Row 3 gives its height over the character plane in mesh units.
+/// The result of the pipeline: a 3x4 matrix that is applied to a mesh point `[X Y Z 1]`. The rows give the x and y of
+/// the point's print pixel, and the point's height over the character plane in mesh units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PrintFromMesh(pub [[f64; 4]; 3]);
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::enum_names;
 
-/// Unit of a mesh's coordinates. Without a unit, no lengths in mm are reported.
+/// Unit of a mesh's coordinates. If the unit is unknown, no lengths in mm are reported.
 ///
 /// ```
 /// use mocban::domain::LengthUnit;

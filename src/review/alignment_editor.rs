@@ -1,4 +1,4 @@
-//! Manual alignment: the page places the relief on the print, and the server scores and stores the resulting map.
+//! Manual alignment: the page places the relief on the print, and the server scores and stores the resulting transform.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 pub(super) struct EditorStart {
     /// Depth-map pixels to image pixels, as the item shows the result.
     view_from_depth: Affine2,
-    /// The same map as the reviewer saved it before, if so.
+    /// The map that the reviewer saved before, if any.
     previous: Option<Affine2>,
     /// Image pixels to pixels of the canvas on which the masks are compared.
     canvas_from_view: Option<Affine2>,
@@ -28,7 +28,7 @@ pub(super) struct EditorStart {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AlignmentBody {
-    /// Id of the event, made by the page. An event that is sent twice is stored once.
+    /// Id that the page generates for this event. If the page sends the event twice, it is stored once.
     pub(super) event: String,
     /// Id of the item on which the alignment was started.
     pub(super) item: String,
@@ -37,7 +37,7 @@ pub(super) struct AlignmentBody {
     note: Option<String>,
 }
 
-/// Returns the initial state of the editor: the alignment of the result, and the one that the reviewer saved before.
+/// Returns the initial state of the editor: the alignment of the result, and the reviewer's saved alignment if any.
 pub(super) fn start(
     item: &ReviewItem,
     images: &ItemImages,
@@ -53,7 +53,7 @@ pub(super) fn start(
     }
 }
 
-/// Computes the overlap of an item's masks under `print_from_depth`, in the same way as for the scores of results.
+/// Computes the overlap of an item's masks under `print_from_depth`, with the method used to score results.
 pub(super) fn mask_overlap(images: &ItemImages, print_from_depth: &Affine2) -> MaskOverlap {
     let ItemInputs {
         canvas, strokes, ..
@@ -75,7 +75,7 @@ pub(super) struct AlignmentSummary {
 }
 
 impl AlignmentSummary {
-    /// Compares a manual alignment with what the item shows. Returns `None` if either of the two maps is singular.
+    /// Compares a manual alignment with the alignment that the item shows. Returns `None` if either map is singular.
     pub(super) fn of(item: &ReviewItem, made: &ManualAlignment) -> Option<Self> {
         let found = &item.view.print_from_depth;
         let correction =

@@ -14,7 +14,7 @@ const NOTE_CHARS: usize = 2000;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnswerBody {
-    /// Id of the event, made by the page. An event that is sent twice is stored once.
+    /// Id that the page generates for this event. If the page sends the event twice, it is stored once.
     pub(super) event: String,
     /// Id of the item.
     pub(super) item: String,

@@ -1,4 +1,4 @@
-//! Scripts and styles of the page, compiled in. The page loads nothing from other hosts.
+//! Scripts and styles of the page, embedded in the program. The page loads nothing from other hosts.
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";

@@ -13,17 +13,17 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
-/// Range of planted rotations in degrees. These exceed the tolerance of 5 degrees, but are not obvious at first sight.
+/// Range of planted rotations in degrees. They exceed the tolerance of 5 degrees, but are not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
-/// Largest `IoU` of a relief with its mirror image at which mirroring the relief is a visible fault.
+/// A relief is mirrored as a fault only if its `IoU` with its mirror image is at most this value.
 const MAX_SYMMETRY_IOU: f64 = 0.6;
-/// Target stroke area of a fault that loses strokes, as a share of the stroke area of the result.
+/// Target stroke area of a fault that loses strokes, as a multiple of the result's stroke area.
 const REDUCED_STROKES: f64 = 0.45;
-/// Target stroke area of a fault that includes background, as a multiple of the stroke area of the result.
+/// Target stroke area of a fault that includes background, as a multiple of the result's stroke area.
 const ENLARGED_STROKES: f64 = 1.9;
 /// Minimum number of items between a result and its duplicate.
 const DUPLICATE_GAP: f64 = 10.0;
-/// Range of the random distance that is added to the minimum.
+/// Largest random distance that is added to the minimum.
 const DUPLICATE_SPREAD: f64 = 30.0;
 
 /// Selects the items from which a fault is made.
@@ -38,8 +38,8 @@ pub(super) fn select_for_faults<'a>(
         .collect()
 }
 
-/// Makes a fault from a good result: mirrors the relief, changes the threshold, or rotates the relief. Rotates the
-/// relief if the other change would not be a visible fault, such as mirroring a symmetric relief.
+/// Makes a fault from a good result: mirrors the relief, changes the threshold, or rotates the relief. If mirroring or
+/// another threshold would not be a visible fault, rotates the relief instead.
 pub(super) fn plant_fault(
     item: &ReviewItem,
     depth: &DepthMap,
@@ -76,7 +76,7 @@ fn rotated(item: &ReviewItem, number: f64) -> (AttentionCheck, ItemView) {
     (AttentionCheck::Turned { angle_deg }, view)
 }
 
-/// Returns whether the strokes largely coincide with their mirror image, flipped left to right in their bounding box.
+/// Returns whether the strokes largely coincide with their left-right mirror image in the same bounding box.
 fn is_symmetric(strokes: &Mask) -> bool {
     let Some(found) = strokes.bounding_box() else {
         return true;
@@ -88,7 +88,7 @@ fn is_symmetric(strokes: &Mask) -> bool {
     strokes.overlap(&flipped).iou > MAX_SYMMETRY_IOU
 }
 
-/// Returns a threshold that loses many strokes or includes much background, or `None` if the relief has no such level.
+/// Returns a threshold that loses many strokes or includes much background. Returns `None` if there is no such level.
 fn faulty_threshold(depth: &DepthMap, level: u16, loses_strokes: bool) -> Option<u16> {
     let mut levels = depth.valid_levels();
     levels.sort_unstable_by(|a, b| b.cmp(a));

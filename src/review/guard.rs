@@ -1,5 +1,5 @@
-//! Checks every request before it reaches a handler: `Host` and the session cookie, and for writes also `Origin`, the
-//! content type and the CSRF token. Adds the security headers to every response.
+//! Checks every request before it reaches a handler. All requests need a valid `Host`, and all but the start address
+//! need the session cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ const HEADERS: [(HeaderName, &str); 7] = [
 /// Why a request is rejected: the status and the body of the response.
 type Rejection = (StatusCode, &'static str);
 
-/// `Host` is not ours, as after DNS rebinding.
+/// `Host` is not an address of this server, for example after DNS rebinding.
 const WRONG_HOST: Rejection = (
     StatusCode::MISDIRECTED_REQUEST,
     "this host name is not served; open the address that the command printed",

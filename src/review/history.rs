@@ -17,7 +17,7 @@ pub(super) struct ReviewerHistory {
 }
 
 impl ReviewerHistory {
-    /// Reads the answers and alignments that have not been undone.
+    /// Reads the reviewer's current answers and alignments, without undone ones.
     ///
     /// # Errors
     /// Returns an error if the catalog cannot be read.
@@ -54,8 +54,8 @@ impl ReviewerHistory {
             .max_by_key(|answer| answer.at)
     }
 
-    /// Returns the reviewer's manual alignment of what an item shows. A duplicate shows the same as an earlier item, so
-    /// if there are attention checks, alignments are returned only for answered items.
+    /// Returns the reviewer's manual alignment of an item's image. If there are attention checks, returns `None` for an
+    /// unanswered item: an alignment would reveal that the item is a duplicate.
     pub(super) fn alignment(&self, item: &ReviewItem) -> Option<&ManualAlignment> {
         let found = self.alignments.get(&item.view.hash());
         found.filter(|_| self.is_open || self.answer(item).is_some())

@@ -30,7 +30,8 @@ impl Language {
         }
     }
 
-    /// Returns the message for a key, or the key itself if it has no message. A test checks that every key has one.
+    /// Returns the message for a key, or the key itself if there is no message. A test checks that no message is
+    /// missing.
     pub(super) fn translate(self, key: &'static str) -> &'static str {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }

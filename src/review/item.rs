@@ -1,4 +1,4 @@
-//! An item of the queue: one image that a reviewer judges, and data about the image that stay on the server.
+//! An item of the queue: an image that a reviewer judges, and data about it that the page does not receive.
 
 use crate::catalog::Shown;
 use crate::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
@@ -60,7 +60,7 @@ pub(super) struct ReviewItem {
     pub(super) id: String,
     /// The pair.
     pub(super) pair: PairName,
-    /// The results that look like this, of one or several metrics.
+    /// The results that look like this item, of one or several metrics.
     pub(super) results: Vec<(ThresholdMetric, ContentHash)>,
     /// Set if the item is an attention check.
     pub(super) check: Option<AttentionCheck>,
@@ -73,7 +73,7 @@ pub(super) struct ReviewItem {
 }
 
 impl ReviewItem {
-    /// Returns what an answer to this item is about: the results or the attention check.
+    /// Returns the subject of an answer to this item: the results or the attention check.
     pub(super) fn shown(&self) -> Shown {
         match (self.check, self.results.first()) {
             (Some(check), Some((metric, result_hash))) => Shown::Check {

@@ -129,7 +129,7 @@ impl ItemImages {
         }
     }
 
-    /// Returns an image as PNG. Layers for manual alignment are rendered on demand, because few items need them.
+    /// Returns an image as PNG. Layers for manual alignment are rendered on demand, because they are rarely needed.
     pub(super) fn layer(&self, layer: ImageLayer) -> Vec<u8> {
         match layer {
             ImageLayer::Print => self.print.clone(),

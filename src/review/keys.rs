@@ -1,9 +1,9 @@
-//! Key bindings by physical key (`KeyboardEvent.code`), because Vietnamese input methods use letters and digits as tone
-//! marks.
+//! Key bindings. They refer to physical keys (`KeyboardEvent.code`), because Vietnamese input methods use letters and
+//! digits as tone marks.
 
 use std::collections::BTreeMap;
 
-/// Groups of actions, in the order of the help: verdicts, display, navigation and dialogs, and manual alignment.
+/// Groups of actions: verdicts, display, navigation and dialogs, and manual alignment. The help has the same order.
 pub(super) const ACTIONS: [(&str, &str); 4] = [
     (
         "verdicts",

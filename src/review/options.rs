@@ -13,8 +13,8 @@ use crate::raster::ImageLimits;
 pub struct QueueOptions {
     /// Name of the reviewer.
     pub reviewer: String,
-    /// Metrics whose results are reviewed, or all metrics if the list is empty. Results of other metrics get no verdict
-    /// even if they look the same, because judging only results selected in this way would bias the accuracy.
+    /// Metrics whose results are reviewed. If empty, all metrics are. Results of other metrics get no verdict, even if
+    /// they look the same. They are not a random sample, so such verdicts would bias the accuracy.
     pub metrics: Vec<ThresholdMetric>,
     /// Order of the results.
     pub order: ReviewOrder,
@@ -27,8 +27,8 @@ pub struct QueueOptions {
 }
 
 impl QueueOptions {
-    /// Returns whether some items are attention checks. If so, an item does not reveal its pair before it is answered,
-    /// because the reviewer would recognise a pair that appears twice.
+    /// Returns whether the queue has attention checks. If it has, the page shows the pair of an item only after the
+    /// answer, because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
         let CheckRates { faults, duplicates } = self.rates;
         self.order != ReviewOrder::Adjudicate && (faults > 0.0 || duplicates > 0.0)
@@ -44,10 +44,10 @@ pub struct ReviewOptions {
     pub language: Language,
     /// Map of physical keys to actions, from [`key_map`](super::key_map).
     pub keys: BTreeMap<String, String>,
-    /// Minimum time in milliseconds for which an image is shown before a verdict is accepted.
+    /// Minimum time in milliseconds that an image must be shown before the page accepts a verdict.
     pub min_view_ms: u64,
-    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer, or any free port if the fixed
-    /// port is taken.
+    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer. If the fixed port is taken, any
+    /// free port is used.
     pub listen: SocketAddr,
     /// Limits on the print images.
     pub limits: ImageLimits,

@@ -1,4 +1,4 @@
-//! Order of the items: a seeded shuffle per reviewer, or the least confident first.
+//! Order of the items: a seeded shuffle per reviewer, or the least confident items first.
 
 use std::cmp::Reverse;
 
@@ -18,8 +18,7 @@ pub(super) fn sort(items: &mut [ReviewItem], order: ReviewOrder, random: &Seeded
     });
 }
 
-/// Keeps a sample of `count` items. The sample does not depend on the reviewer, so that several reviewers judge the
-/// same items.
+/// Keeps the first `count` items of an order that is the same for all reviewers, so that all judge the same items.
 pub(super) fn sample(items: &mut Vec<ReviewItem>, order: ReviewOrder, seed: u64, count: usize) {
     sort(items, order, &SeededRandom::new(seed, "sample"));
     items.truncate(count);

@@ -1,4 +1,4 @@
-//! HTML of the review page. The page is the same for every item, and the script fills in what changes.
+//! HTML of the review page. The page is the same for every item, and a script fills in the current item.
 
 use maud::{DOCTYPE, Markup, html};
 
@@ -29,7 +29,7 @@ fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Ma
     }
 }
 
-/// Returns the response to the start address: a page that navigates on to the review page with the new cookie.
+/// Returns the response to the start address: a page that leads on to the review page.
 pub(super) fn forward(language: Language) -> Markup {
     let title = language.translate("forward");
     let head = html! { meta http-equiv="refresh" content="0;url=/"; };
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    /// Returns the HTML with one element per line, so that a snapshot reads like the page.
+    /// Returns the HTML with one element per line, for readable snapshots.
     fn lines(html: &str) -> String {
         html.replace("><", ">\n<")
     }

@@ -1,4 +1,4 @@
-//! The review queue: everything that a reviewer is to judge, in order. Results that look the same form one item.
+//! The review queue: the items that a reviewer judges, in order. Results that look the same form one item.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::store::Project;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
-/// Smallest confidence at which a result is reliable enough to plant a fault in it.
+/// Minimum confidence of a result in which a fault may be planted.
 const RELIABLE_CONFIDENCE: f64 = 0.8;
 
 /// Items in order, and what the reviewer has done so far.
@@ -90,8 +90,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     let wanted = &options.metrics;
     let is_of_metric =
         |record: &&MetricRecord| wanted.is_empty() || wanted.contains(&record.outcome.metric);
-    // Adjudication covers disputed results only. An undisputed result gets no verdict even if it looks the same,
-    // because judging only results selected in this way would bias the accuracy.
+    // Adjudication covers disputed results only. Undisputed results that look the same get no verdict. They are not a
+    // random sample, so such verdicts would bias the accuracy.
     let is_wanted = |record: &&MetricRecord| {
         options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };
@@ -120,8 +120,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     groups.into_iter().map(item).collect()
 }
 
-/// Returns a number that is higher for less certain results. Low confidence, low similarity and a search that ended at
-/// a bound each add to the number.
+/// Returns a number that is higher for less certain results. Low confidence, low similarity, and a search that ended at
+/// a bound increase it.
 fn uncertainty(record: &MetricRecord) -> f64 {
     let outcome = &record.outcome;
     let doubt = 1.0 - outcome.confidence.unwrap_or(0.5);
@@ -129,8 +129,8 @@ fn uncertainty(record: &MetricRecord) -> f64 {
     doubt + 0.5 * dissimilarity + if outcome.at_bound { 0.25 } else { 0.0 }
 }
 
-/// Returns whether a fault can be planted in a result: its confidence is not low, its search did not end at a bound,
-/// and it has no verdict other than a pass.
+/// Returns whether a fault may be planted in a result. The confidence must be high or unknown, the search must not have
+/// ended at a bound, and all verdicts must be passes.
 fn is_reliable(record: &MetricRecord) -> bool {
     let outcome = &record.outcome;
     let mut verdicts = record.verdicts.iter().map(|read| read.verdict);
@@ -141,8 +141,8 @@ fn is_reliable(record: &MetricRecord) -> bool {
         && verdicts.all(|verdict| verdict == Verdict::Pass)
 }
 
-/// Returns whether a result is disputed and this reviewer can adjudicate it. A reviewer who is party to the dispute
-/// cannot, and neither can anybody after another reviewer has settled the dispute.
+/// Returns whether a result is disputed and this reviewer may adjudicate it. The reviewer must not be a party to the
+/// dispute, and the dispute must not have been settled by another reviewer.
 fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
     let (rulings, verdicts) = partition_verdicts(record);
     let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);

@@ -95,8 +95,8 @@ impl IntoResponse for ApiError {
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
-/// Accepts the one-time token and sets the session cookie. Responds not with a redirect but with a page that navigates
-/// on, because a browser sends a `SameSite=Strict` cookie only if the navigation starts on this site.
+/// Accepts the one-time token and sets the session cookie. The response is a page that leads on to the review page.
+/// After a redirect, the browser would not send the `SameSite=Strict` cookie, because the navigation started elsewhere.
 async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
     let query = query.unwrap_or_default();
     let token = query.strip_prefix("token=").unwrap_or_default();
@@ -108,7 +108,7 @@ async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery)
         )
             .into_response();
     }
-    // A browser that already has the cookie may reopen the address from its history.
+    // Without a token, the review page opens if the browser already has the cookie.
     if token.is_empty() {
         return Redirect::to("/").into_response();
     }
@@ -166,7 +166,7 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
     ))
 }
 
-/// Returns the first item of a pair. Never returns a later item, because that would reveal duplicates.
+/// Returns the first item of a pair. A later item would reveal that the first has a duplicate.
 async fn find(State(state): State<Arc<ServerState>>, Path(pair): Path<String>) -> ApiResult {
     let queue = state.load_queue().await?;
     let mut items = queue.items.iter();
@@ -186,7 +186,7 @@ async fn image(
     Ok((kind, images.layer(layer)).into_response())
 }
 
-/// Returns the pair, metrics and scores of an answered item. Attention checks are treated like results.
+/// Returns the pair, metrics and scores of an answered item. Attention checks look like results.
 async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
     let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
@@ -198,8 +198,8 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
-        // A planted fault has no verdicts by other reviewers. Showing such verdicts for results would reveal which
-        // items are faults.
+        // The verdicts of other reviewers are hidden. Planted faults have no such verdicts, so a reviewer could tell
+        // faults from results.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({

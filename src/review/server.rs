@@ -84,7 +84,7 @@ pub async fn bind(
         options,
         served_items: std::sync::Mutex::default(),
     };
-    // The items must be known now, because after a restart a page may resend an answer before it requests the queue.
+    // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
     let queue = state.load_queue().await;
     let queue = queue.map_err(|error| ReviewError::Queue(error.to_string()))?;
     let count =

@@ -1,4 +1,4 @@
-//! Session secrets: a one-time token that opens the page, a session cookie, and a CSRF token that writes also need.
+//! Session secrets: a one-time token that opens the page, a session cookie, and a CSRF token for writes.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

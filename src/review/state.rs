@@ -1,4 +1,4 @@
-//! Server state shared by the request handlers: the catalog, the reviewer's options, the items served so far.
+//! Server state shared by the request handlers: the catalog, the reviewer's options, and the items served so far.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,8 +21,8 @@ pub(super) struct ServerState {
     /// Accepted values of the `Host` header, with port.
     pub(super) hosts: Vec<String>,
     pub(super) images: ImageCache,
-    /// Every item served since the start, by id. Answers to these items are accepted even if the results have changed
-    /// meanwhile.
+    /// Every item served since the start, by id. Answers to these items are accepted even if new results were stored
+    /// since.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
 }
 
@@ -45,8 +45,7 @@ impl ServerState {
         self.lock_served().get(id).cloned()
     }
 
-    /// Locks the served items. Ignores a poisoned lock: each insertion is complete, so the map is consistent even after
-    /// a panic.
+    /// Locks the served items. A poisoned lock is ignored, because the map is consistent even after a panic.
     fn lock_served(&self) -> MutexGuard<'_, BTreeMap<String, Arc<ReviewItem>>> {
         let locked = self.served_items.lock();
         locked.unwrap_or_else(PoisonError::into_inner)
