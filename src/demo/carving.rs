@@ -118,8 +118,8 @@ impl Wear {
         }
     }
 
-    /// Returns the height in mm that wear removes, `inside` mm from the stroke edge. Wear consists of patches, open
-    /// grain, small pits and rounded edges.
+    /// Returns the height in mm that wear removes. `inside` is the distance to the stroke edge in mm. Wear consists of
+    /// patches, open grain, small pits and rounded edges.
     fn at(&self, [u, v]: [f64; 2], inside: f64) -> f64 {
         let [along, across] = self.grain_axis.along_across([u, v]);
         let patches = self.patch_mm * (1.0 + self.patches.two_octaves(u / 2.2, v / 2.2));

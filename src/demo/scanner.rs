@@ -1,4 +1,4 @@
-//! Simulated scanner: samples the part of a surface inside a polygon as an irregular triangle mesh.
+//! Simulated scanner: turns the part of a surface inside a polygon into an irregular triangle mesh.
 
 use std::collections::{BTreeMap, HashSet};
 

@@ -1,7 +1,7 @@
-//! Artifacts: files that are named by the hash of their content, and either complete or absent.
+//! Artifacts: files that are named by the hash of their content. A file with such a name is complete.
 //!
-//! A file is written under a temporary name, synced, and renamed, and its folder is synced; only then may a row of the
-//! catalog name it.
+//! A file is written under a temporary name, synced, and renamed. Then its folder is synced. Only then may a row of the
+//! catalog name the file.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ pub struct NewArtifact {
 }
 
 impl NewArtifact {
-    /// Creates an artifact from its role in the stage, such as `depth.png`, its file extension without the dot, and its
-    /// content.
+    /// Creates an artifact. `role` is its purpose in the stage, such as `depth.png`. `ext` is the file extension
+    /// without the dot.
     pub fn new(role: &str, ext: &str, bytes: Vec<u8>) -> Self {
         let reference = ArtifactRef {
             hash: ContentHash::of(&bytes),
@@ -83,7 +83,7 @@ impl Project {
         self.artifacts_dir().join(&hex[..2]).join(name)
     }
 
-    /// Reads an artifact and checks it against its hash.
+    /// Reads an artifact and checks its hash.
     ///
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
@@ -99,7 +99,8 @@ impl Project {
         }
     }
 
-    /// Checks an artifact's length and hash without loading the file into memory. With `quick`, checks only the length.
+    /// Checks an artifact's length and hash without loading the file into memory. If `quick` is set, checks only the
+    /// length.
     ///
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
@@ -121,12 +122,12 @@ impl Project {
         }
     }
 
-    /// Writes artifacts durably, except artifacts that are already complete on disk. Calls `on_written` after each file
-    /// is written under its temporary name and before it is renamed.
+    /// Writes artifacts durably. Skips artifacts that are already complete on disk. Calls `on_written` for each new
+    /// file, after it is written under its temporary name and before it is renamed.
     ///
     /// # Errors
-    /// Returns an error if an artifact cannot be written. Files written before the error stay on disk, and no row names
-    /// them; `check --repair` removes them.
+    /// Returns an error if an artifact cannot be written. Files written before the error stay on disk. No row names
+    /// these files, and `check --repair` removes them.
     pub fn write_artifacts(
         &self,
         files: &[NewArtifact],
@@ -147,14 +148,15 @@ impl Project {
         }
         if !folders.is_empty() {
             // Sync the parents too. Another process may have created these folders and died before it synced their
-            // names. This costs nothing when nothing is new.
+            // names. Syncing an unchanged folder costs nothing.
             sync(&self.artifacts_dir())?;
             sync(self.dir())?;
         }
         Ok(())
     }
 
-    /// Removes the folder of partial files, which dead processes leave. Call it only while no process writes artifacts.
+    /// Removes the folder of temporary files, which killed processes leave. Call this only while no process writes
+    /// artifacts.
     ///
     /// # Errors
     /// Returns an error if the folder exists and cannot be removed.

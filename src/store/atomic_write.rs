@@ -1,11 +1,11 @@
-//! Atomic and durable writes: a file is written beside its place, synced, and renamed.
+//! Atomic and durable writes: a file is written under a temporary name, synced, and renamed.
 
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes a file atomically: an earlier file of this name stays until the new one is complete and on the disk. Anything
-/// that is not a regular file, such as a pipe or a terminal, is written to directly.
+/// Writes a file atomically: an existing file is replaced only after the new content is on the disk. If `path` is not a
+/// regular file, such as a pipe or a terminal, writes to it directly.
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
@@ -26,7 +26,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     written
 }
 
-/// Writes a file and syncs its content to the disk. The file's name may still be lost in a crash.
+/// Writes a file and syncs its content to the disk. Does not sync the folder, so the name may be lost in a crash.
 ///
 /// # Errors
 /// Returns an error if the file cannot be written. A partly written file is not removed.
@@ -36,7 +36,7 @@ pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     file.sync_all()
 }
 
-/// Returns the temporary path for writing a file: a hidden name in the same folder.
+/// Returns the temporary path for writing a file. It has a hidden name in the same folder.
 pub fn partial_path(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.mocban-partial"))
@@ -46,7 +46,7 @@ pub fn partial_path(path: &Path) -> PathBuf {
 /// gets the permissions of the old one.
 ///
 /// # Errors
-/// Returns an error if a sync, the renaming or setting the permissions fails.
+/// Returns an error if syncing, renaming or setting the permissions fails.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Ok(earlier) = std::fs::metadata(path) {

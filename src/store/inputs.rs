@@ -35,20 +35,20 @@ pub struct InputDigest {
     pub stat: String,
 }
 
-/// An input file that is being read. Its bytes are hashed as they are read, while they are in the CPU cache.
+/// An input file that is being read. Each chunk is hashed right after it is read, while it is in the CPU cache.
 #[derive(Debug)]
 pub struct InputReader {
     path: PathBuf,
     file: Take<File>,
-    /// Length in bytes at the time when it was opened.
+    /// Length of the file in bytes when it was opened.
     len: u64,
-    /// Most bytes that it may have, and the name of the setting for that.
+    /// Maximum length in bytes, and the name of its setting.
     limit: (u64, &'static str),
     hasher: blake3::Hasher,
     stat: String,
 }
 
-/// Largest number of bytes read and hashed in one step. A step this small stays in the CPU cache.
+/// Maximum number of bytes that are read and hashed in one step. They must fit in the CPU cache.
 const CHUNK: usize = 1 << 17;
 
 impl Read for InputReader {
@@ -61,7 +61,7 @@ impl Read for InputReader {
 }
 
 impl InputReader {
-    /// Returns its length in bytes at the time when it was opened.
+    /// Returns the length of the file in bytes when it was opened.
     pub const fn size(&self) -> u64 {
         self.len
     }
@@ -87,7 +87,7 @@ impl InputReader {
                 setting,
             });
         }
-        // If the file grew after a parser reached its end, the hash includes bytes that the parser did not read.
+        // Reject a changed file: the hash may include bytes that the parser did not read.
         let meta = self.file.get_ref().metadata();
         let now = file_stat(&meta.map_err(|error| self.error(error))?);
         if now != self.stat {
@@ -170,7 +170,7 @@ impl InputError {
         }
     }
 
-    /// Returns whether an automatic retry may succeed. A missing file is not retried automatically.
+    /// Returns whether a retry may succeed without a change by the user.
     pub const fn is_transient(&self) -> bool {
         matches!(self, Self::Changed(_) | Self::Io { .. })
     }
@@ -185,7 +185,7 @@ pub fn stat_input(path: &Path) -> Result<String, InputError> {
     Ok(file_stat(&check_file(path, meta)?))
 }
 
-/// Opens a file of at most `limit` bytes. Error messages name the limit by `setting`.
+/// Opens a file of at most `limit` bytes. `setting` is the name of the limit in error messages.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
@@ -213,10 +213,11 @@ pub fn open_input(
     })
 }
 
-/// Reads a file of at most `limit` bytes. Error messages name the limit by `setting`.
+/// Reads a file of at most `limit` bytes. `setting` is the name of the limit in error messages.
 ///
 /// # Errors
-/// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
+/// Returns an error if the file does not exist, is not a regular file, cannot be read, is too large, or changes
+/// meanwhile.
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
     let mut file = open_input(path, limit, setting)?;
     let about = file.size() as usize;

@@ -1,7 +1,8 @@
-//! Which processes work on a project: locks of the operating system, which end with the process that holds them.
+//! Locks that show which processes work on a project. The operating system releases the locks of a process that ends.
 //!
-//! The process that owns the run holds `run.lock` and writes its pid into it. Every process that works holds a shared
-//! lock on `run.members`: a process that gets an exclusive lock on it knows that no other worker is alive.
+//! The process that owns the run locks `run.lock` and writes its pid into the file. Every working process holds a
+//! shared lock on `run.members`. A process that gets an exclusive lock on `run.members` knows that no other process
+//! works.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -13,8 +14,8 @@ use super::Project;
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// Number of attempts to get the exclusive lock. An attempt fails if [`RunLock::is_held`] in another process holds the
-/// lock for a moment.
+/// Number of attempts to get the exclusive lock. A call of [`RunLock::is_held`] in another process may hold the lock
+/// for a moment.
 const ATTEMPTS: u32 = 20;
 const RETRY_AFTER: Duration = Duration::from_millis(5);
 
@@ -53,7 +54,7 @@ pub enum LockError {
 }
 
 impl RunLock {
-    /// Acquires the right to work on a project. With `join`, another process may already own the run.
+    /// Acquires the right to work on a project. If `join` is set, another process may already own the run.
     ///
     /// # Errors
     /// Returns an error if another process owns the run and `join` is not set, or if a lock file cannot be used.
@@ -86,7 +87,7 @@ impl RunLock {
         })
     }
 
-    /// Returns whether a process is working on the project. The check does not prevent other processes from starting.
+    /// Returns whether a process is working on the project. A process may start right after the check.
     pub fn is_held(project: &Project) -> bool {
         // A lock needs no permission to write.
         match File::open(project.dir().join(MEMBERS)) {
@@ -100,8 +101,8 @@ impl RunLock {
         self.is_exclusive
     }
 
-    /// Writes the fingerprints of this run's settings, for comparison by joining processes. Call it only while the lock
-    /// is exclusive.
+    /// Writes the fingerprints of this run's settings. Joining processes compare these with their own. Call this
+    /// function only while the lock is exclusive.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
@@ -109,7 +110,7 @@ impl RunLock {
         replace_text(&mut self.members, fingerprints).map_err(io(&self.path))
     }
 
-    /// Returns the fingerprints of the working processes' settings. Returns an empty text if none were written.
+    /// Returns the fingerprints of the working processes' settings, or an empty text if none were written.
     ///
     /// # Errors
     /// Returns an error if the file cannot be read.

@@ -101,7 +101,7 @@ impl Project {
         self.dir.join(ARTIFACTS)
     }
 
-    /// Returns the path of an input from its stored path, which is relative to the project or absolute.
+    /// Returns the path of an input. `stored` is relative to the project or absolute.
     pub fn input_path(&self, stored: &str) -> PathBuf {
         self.dir.join(stored)
     }
@@ -125,7 +125,7 @@ impl Project {
     }
 }
 
-/// Returns the relative path after links are resolved. Returns `None` if the path does not exist or is not below `dir`.
+/// Returns the path relative to `dir` after links are resolved, or `None` if it does not exist or is not below `dir`.
 fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
     let dir = dir.canonicalize().ok()?;
