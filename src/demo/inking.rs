@@ -122,8 +122,7 @@ fn fill_corners(printed: &ScalarField) -> ScalarField {
     let ink = ScalarField::from_fn(printed.frame, |_, x, y| f64::from(printed.at(x, y) > 0.0));
     let blurred = ink.blurred(SIGMA_MM);
     ScalarField::from_fn(printed.frame, |_, x, y| {
-        // At the edge, the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. Dividing by this slope converts
-        // it to mm.
+        // At the edge, the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. Dividing by this slope gives mm.
         let blurred_mm = (blurred.at(x, y) - 0.45) * SIGMA_MM * (std::f64::consts::TAU).sqrt();
         0.5 * printed.at(x, y) + 0.5 * blurred_mm
     })
@@ -155,8 +154,7 @@ fn draw_speck(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Ellipse {
     }
 }
 
-/// Returns the approximate signed distance to the edge of a spot in mm, positive inside. Returns -1 far outside the
-/// spot.
+/// Returns the approximate signed distance to the edge of a spot in mm, positive inside. Returns -1 far outside.
 fn inside_spot_mm(spot: &Ellipse, [u, v]: [f64; 2]) -> f64 {
     let (du, dv) = (u - spot.centre[0], v - spot.centre[1]);
     if du * du + dv * dv > (spot.long_mm + 1.0).powi(2) {

@@ -37,8 +37,7 @@ impl SampleFrame {
         ]
     }
 
-    /// Returns the column and row of each sample in a square. The square extends `half_size_mm` from `centre` to each
-    /// side.
+    /// Returns the column and row of each sample in the square with the given centre and half side length.
     pub(super) fn box_around(
         self,
         centre: [f64; 2],

@@ -136,8 +136,7 @@ impl SampledSurface {
     }
 }
 
-/// Returns a mesh of the triangles. Points that no triangle uses are left out, and the others are in the order of first
-/// use.
+/// Returns a mesh of the triangles. Its vertices are the points that the triangles use, in the order of first use.
 fn mesh_of(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Mesh {
     let mut index = vec![u32::MAX; points.len()];
     let mut mesh = Mesh::default();
@@ -220,7 +219,7 @@ fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Returns the edges that belong to only one triangle. They have the direction and order that they have in `triangles`.
+/// Returns the edges that belong to only one triangle. Their direction and order are as in `triangles`.
 fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     let edges = || {
         triangles

@@ -10,13 +10,13 @@ use super::enum_names;
 pub enum FailureClass {
     /// The input file is invalid, for example empty or truncated. The pair is quarantined.
     BadInput,
-    /// The input is valid, but the method finds no solution, for example because nothing is carved. The pair is
-    /// quarantined.
+    /// The input is valid, but the method finds no solution: for example, nothing is carved. The pair is quarantined.
     NoSolution,
     /// Reading or writing failed. If the failure may be temporary, the stage is retried a few times with back-off.
     /// Otherwise, or after the last attempt, the pair is quarantined.
     Io,
-    /// The stage needs too much memory or time. It is retried once without other pairs, then the pair is quarantined.
+    /// The stage needs too much memory or time. It is retried once while no other pair runs. Then the pair is
+    /// quarantined.
     Resource,
     /// A defect of this program, such as a caught panic. Quarantined.
     Bug,

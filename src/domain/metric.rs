@@ -21,9 +21,8 @@ pub enum ThresholdMetric {
     /// `D(t)`. This is SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is
     /// the maximum.
     NlSsim,
-    /// Minimizes `|a(D(t)) / a(P) * s - 1|`, where `a` is the area of a mask and `s` is `register.ink_spread`. The
-    /// paper's method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share of the canvas. The score is minus the
-    /// minimum.
+    /// Minimizes `|a(D(t)) / a(P) * s - 1|`, where `a` is a mask's area and `s` is `register.ink_spread`. The paper's
+    /// method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share of the canvas. The score is minus the minimum.
     Density,
     /// Maximizes the same mean as [`Self::NlSsim`], but only over masks with about the area `A`: `|ln(a(D(t)) / A)| <=
     /// ln 1.12`. `A` is the area of [`Self::Relief`]'s mask, clamped to `a(P) / 2.2 ..= 1.15 a(P)`. If no mask
@@ -33,8 +32,7 @@ pub enum ThresholdMetric {
     /// The depth at which the stroke tops end and the walls begin, from the histogram of heights alone. It is the
     /// geometric mean of the usual depth (0.075 of the relief) and a measured depth (clamped to 0.02..=0.25 of the
     /// relief). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w + peak) /
-    /// 2)`; `w` is the median frequency on the walls. There is no score (0). The paper's method does not have this
-    /// metric.
+    /// 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's method.
     Relief,
 }
 

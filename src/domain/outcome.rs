@@ -45,8 +45,7 @@ pub struct SideEvidence {
 /// Numeric result of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitOutcome {
-    /// Maps mesh coordinates to the plane frame, which is right-handed and in mesh units. Its z axis points out of the
-    /// block.
+    /// Maps mesh coordinates to the right-handed plane frame, in mesh units. The z axis points out of the block.
     pub plane_from_mesh: Rigid3,
     /// Curved surface of the stroke tops. `None` if the block is flat.
     pub bow: Option<Bow>,
@@ -75,8 +74,7 @@ pub struct DepthScale {
     pub height_per_level: f64,
     /// Side of a pixel, in mesh units.
     pub mesh_unit_per_px: f64,
-    /// Maps plane x, y to depth-map pixels. The map includes the reflection, so that the depth map reads like the
-    /// print.
+    /// Maps plane x, y to depth-map pixels. Includes a reflection, so that the depth map reads like the print.
     pub depth_from_plane: Affine2,
     /// Curved surface from which heights are measured; `None` for the plane.
     pub bow: Option<Bow>,

@@ -31,7 +31,7 @@ enum_names! { pub Stage, "a stage":
 }
 
 impl Stage {
-    /// Returns the position of the stage in the processing order, 0 to 3. The cursor of a job is the index of its next
+    /// Returns the position of the stage in the processing order, 0 to 3. A job's cursor is the index of its next
     /// stage.
     pub const fn index(self) -> usize {
         self as usize

@@ -118,7 +118,7 @@ impl Affine2 {
 pub struct Rigid3(pub [[f64; 4]; 4]);
 
 impl Rigid3 {
-    /// Returns the transform that maps `origin` to zero and the right-handed unit vectors `axes` to x, y and z.
+    /// Returns the transform that maps `origin` to zero and the right-handed orthonormal `axes` to x, y and z.
     pub fn to_frame(axes: [[f64; 3]; 3], origin: [f64; 3]) -> Self {
         let row = |axis: [f64; 3]| {
             let shift = -(axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2]);

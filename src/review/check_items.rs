@@ -13,7 +13,7 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
-/// Range of planted rotations in degrees. They exceed the tolerance of 5 degrees, but are not obvious at first sight.
+/// Range of planted rotations in degrees. Each exceeds the tolerance of 5 degrees, but is not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
 /// A relief is mirrored as a fault only if its `IoU` with its mirror image is at most this value.
 const MAX_SYMMETRY_IOU: f64 = 0.6;

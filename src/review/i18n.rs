@@ -30,8 +30,7 @@ impl Language {
         }
     }
 
-    /// Returns the message for a key, or the key itself if there is no message. A test checks that no message is
-    /// missing.
+    /// Returns the message for a key, or the key itself if there is no message. A test checks that all messages exist.
     pub(super) fn translate(self, key: &'static str) -> &'static str {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }

@@ -1,4 +1,4 @@
-//! An item of the queue: an image that a reviewer judges, and data about it that the page does not receive.
+//! An item of the queue: an image that a reviewer judges, and related data that stay on the server.
 
 use crate::catalog::Shown;
 use crate::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};

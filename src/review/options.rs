@@ -14,7 +14,7 @@ pub struct QueueOptions {
     /// Name of the reviewer.
     pub reviewer: String,
     /// Metrics whose results are reviewed. If empty, all metrics are. Results of other metrics get no verdict, even if
-    /// they look the same. They are not a random sample, so such verdicts would bias the accuracy.
+    /// they look the same. They are not a random sample, so such verdicts would bias the measured accuracy.
     pub metrics: Vec<ThresholdMetric>,
     /// Order of the results.
     pub order: ReviewOrder,
@@ -27,8 +27,8 @@ pub struct QueueOptions {
 }
 
 impl QueueOptions {
-    /// Returns whether the queue has attention checks. If it has, the page shows the pair of an item only after the
-    /// answer, because the reviewer would recognise a pair that appears twice.
+    /// Returns whether the queue has attention checks. If so, the page shows the pair of an item only after the answer,
+    /// because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
         let CheckRates { faults, duplicates } = self.rates;
         self.order != ReviewOrder::Adjudicate && (faults > 0.0 || duplicates > 0.0)

@@ -91,7 +91,7 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     let is_of_metric =
         |record: &&MetricRecord| wanted.is_empty() || wanted.contains(&record.outcome.metric);
     // Adjudication covers disputed results only. Undisputed results that look the same get no verdict. They are not a
-    // random sample, so such verdicts would bias the accuracy.
+    // random sample, so such verdicts would bias the measured accuracy.
     let is_wanted = |record: &&MetricRecord| {
         options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };
@@ -120,8 +120,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     groups.into_iter().map(item).collect()
 }
 
-/// Returns a number that is higher for less certain results. Low confidence, low similarity, and a search that ended at
-/// a bound increase it.
+/// Returns a number that is higher for less certain results: those with a low confidence, a low similarity, or a search
+/// that ended at a bound.
 fn uncertainty(record: &MetricRecord) -> f64 {
     let outcome = &record.outcome;
     let doubt = 1.0 - outcome.confidence.unwrap_or(0.5);

@@ -198,8 +198,7 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
-        // The verdicts of other reviewers are hidden. Planted faults have no such verdicts, so a reviewer could tell
-        // faults from results.
+        // The verdicts of other reviewers are hidden: a planted fault has none, and could be recognised by that.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({

@@ -1,7 +1,7 @@
 //! Artifacts: files that are named by the hash of their content. A file with such a name is complete.
 //!
-//! A file is written under a temporary name, synced, and renamed. Then its folder is synced. Only then may a row of the
-//! catalog name the file.
+//! A file is written under a temporary name, synced, and renamed, and then its folder is synced. Only after that may a
+//! row of the catalog name the file.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -99,8 +99,7 @@ impl Project {
         }
     }
 
-    /// Checks an artifact's length and hash without loading the file into memory. If `quick` is set, checks only the
-    /// length.
+    /// Checks an artifact's length and hash without loading the file into memory. If `quick` is set, skips the hash.
     ///
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
@@ -155,8 +154,7 @@ impl Project {
         Ok(())
     }
 
-    /// Removes the folder of temporary files, which killed processes leave. Call this only while no process writes
-    /// artifacts.
+    /// Removes the folder of temporary files, which killed processes leave. No process may write artifacts meanwhile.
     ///
     /// # Errors
     /// Returns an error if the folder exists and cannot be removed.

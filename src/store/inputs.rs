@@ -48,7 +48,7 @@ pub struct InputReader {
     stat: String,
 }
 
-/// Maximum number of bytes that are read and hashed in one step. They must fit in the CPU cache.
+/// Maximum number of bytes that are read and hashed in one step. Chunks of this size stay in the CPU cache.
 const CHUNK: usize = 1 << 17;
 
 impl Read for InputReader {
@@ -216,8 +216,7 @@ pub fn open_input(
 /// Reads a file of at most `limit` bytes. `setting` is the name of the limit in error messages.
 ///
 /// # Errors
-/// Returns an error if the file does not exist, is not a regular file, cannot be read, is too large, or changes
-/// meanwhile.
+/// Returns an error if the file does not exist, is not a regular file, cannot be read, is too large, or changes.
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
     let mut file = open_input(path, limit, setting)?;
     let about = file.size() as usize;

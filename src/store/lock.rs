@@ -14,8 +14,7 @@ use super::Project;
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// Number of attempts to get the exclusive lock. A call of [`RunLock::is_held`] in another process may hold the lock
-/// for a moment.
+/// Number of attempts to get the exclusive lock. [`RunLock::is_held`] in another process may hold it for a moment.
 const ATTEMPTS: u32 = 20;
 const RETRY_AFTER: Duration = Duration::from_millis(5);
 
