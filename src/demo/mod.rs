@@ -1,9 +1,9 @@
 //! The built-in dataset: meshes of carved characters, images of their prints, and the ground truth.
 //!
-//! A pair is generated from seed, tier and index alone. `scene` draws the strokes (`artwork`) and `damage` removes
-//! parts of them. `carving` computes the carved surface. `scanner` and `scan_pose` turn the surface into a mesh.
-//! `inking`, `print_sheet`, `rendered_print` and `print_format` make the print. `truth_line` records the true
-//! alignment. `generator` makes pairs in memory and `dataset` writes them to disk.
+//! `scene` draws the strokes (`artwork`) and `damage` removes parts of them. `carving` computes the carved surface.
+//! `scanner` and `scan_pose` turn the surface into a mesh. `inking`, `print_sheet`, `rendered_print` and `print_format`
+//! make the print. `truth_line` records the true alignment. `generator` makes pairs in memory, from a seed, and
+//! `dataset` writes them to disk.
 
 mod artwork;
 mod calligraphy;

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// An axis-aligned box in mm, as the print reads.
+/// An axis-aligned box in (u, v), in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BoundsMm {
     /// Minimum u and v.
@@ -12,7 +12,7 @@ pub(super) struct BoundsMm {
     pub max: [f64; 2],
 }
 
-/// A closed polygon in mm, as the print reads.
+/// A closed polygon in (u, v), in mm.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
     /// Vertices in order.

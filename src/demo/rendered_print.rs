@@ -18,9 +18,9 @@ pub(super) struct PrintFrame {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Maps mm, as the print reads, to pixels.
+    /// Maps (u, v) in mm to pixels.
     pub print_from_uv: Affine2,
-    /// Maps pixels to mm, as the print reads.
+    /// Maps pixels to (u, v) in mm.
     pub uv_from_print: Affine2,
 }
 

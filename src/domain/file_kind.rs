@@ -1,4 +1,4 @@
-//! File type detection by signature, to choose a decoder and for error messages.
+//! File type detection by signature, for choosing a decoder and for error messages.
 
 /// File type by content, never by name.
 ///

@@ -24,10 +24,10 @@ pub enum ThresholdMetric {
     /// Minimizes `|a(D(t)) / a(P) * s - 1|`, where `a` is a mask's area and `s` is `register.ink_spread`. The paper's
     /// method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share of the canvas. The score is minus the minimum.
     Density,
-    /// Maximizes the same mean as [`Self::NlSsim`], but only over masks with about the area `A`: `|ln(a(D(t)) / A)| <=
-    /// ln 1.12`. `A` is the area of [`Self::Relief`]'s mask, clamped to `a(P) / 2.2 ..= 1.15 a(P)`. If no mask
-    /// qualifies, the threshold nearest to [`Self::Relief`]'s is used. The score is the mean. The paper's method
-    /// instead uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
+    /// Maximizes the same mean as [`Self::NlSsim`], but only over masks with an area between `A / 1.12` and `1.12 A`.
+    /// `A` is the area of [`Self::Relief`]'s mask, clamped to `a(P) / 2.2 ..= 1.15 a(P)`. If no mask qualifies, the
+    /// threshold nearest to [`Self::Relief`]'s is used. The score is the mean. The paper's method instead uses the
+    /// better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
     Ensemble,
     /// The depth at which the stroke tops end and the walls begin, from the histogram of heights alone. It is the
     /// geometric mean of the usual depth (0.075 of the relief) and a measured depth (clamped to 0.02..=0.25 of the

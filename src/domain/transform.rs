@@ -1,7 +1,7 @@
 //! Maps between the frames of mesh, plane, depth map, print image and canvas. `a_from_b` maps from frame b to frame a.
 //!
-//! Matrices are row-major and act on column vectors. Pixel frames have x to the right, y down, and (0, 0) at the
-//! centre of the top-left pixel, so a positive angle is a clockwise rotation on the screen.
+//! Matrices are row-major and act on column vectors. In pixel frames, x points right, y points down, and (0, 0) is the
+//! centre of the top-left pixel. A positive angle is therefore a clockwise rotation on the screen.
 
 use serde::{Deserialize, Serialize};
 

@@ -67,7 +67,7 @@ pub(super) fn mask_overlap(images: &ItemImages, print_from_depth: &Affine2) -> M
 #[derive(Debug, Serialize)]
 pub(super) struct AlignmentSummary {
     reviewer: String,
-    /// Against the result.
+    /// Difference from the alignment of the result.
     #[serde(flatten)]
     correction: ManualCorrection,
     iou: f64,

@@ -85,7 +85,7 @@ impl ReviewItem {
         }
     }
 
-    /// Sets the id, derived from `key`, which is secret.
+    /// Sets the id, which is derived from the secret `key`.
     pub(super) fn with_id(mut self, key: &ContentHash, reviewer: &str) -> Self {
         let kind = self.check.map_or("", |check| check.name());
         let view = self.view.hash();

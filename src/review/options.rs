@@ -27,8 +27,8 @@ pub struct QueueOptions {
 }
 
 impl QueueOptions {
-    /// Returns whether the queue has attention checks. If so, the page shows the pair of an item only after the answer,
-    /// because the reviewer would recognise a pair that appears twice.
+    /// Returns whether the queue can have attention checks. If so, the page shows the pair of an item only after the
+    /// answer, because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
         let CheckRates { faults, duplicates } = self.rates;
         self.order != ReviewOrder::Adjudicate && (faults > 0.0 || duplicates > 0.0)

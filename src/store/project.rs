@@ -49,7 +49,7 @@ impl Project {
     /// # Errors
     /// Returns an error if the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
-        // Whether it is a catalog is checked when it is opened.
+        // The content of the file is checked when the catalog is opened.
         if !dir.join(CATALOG_FILE).exists() {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
