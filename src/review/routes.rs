@@ -95,8 +95,8 @@ impl IntoResponse for ApiError {
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
-/// Accepts the one-time token and sets the session cookie. The response is a page that leads on to the review page.
-/// After a redirect, the browser would not send the `SameSite=Strict` cookie, because the navigation started elsewhere.
+/// Accepts the one-time token and sets the session cookie. Responds with a page that leads on to the review page. A
+/// redirect would not work: a browser sends a `SameSite=Strict` cookie only if the navigation starts on this site.
 async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
     let query = query.unwrap_or_default();
     let token = query.strip_prefix("token=").unwrap_or_default();
@@ -198,7 +198,7 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
-        // The verdicts of other reviewers are hidden: a planted fault has none, and could be recognised by that.
+        // The verdicts of other reviewers are hidden, because a planted fault has none and could be recognised by that.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({
