@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use rustfft::algorithm::butterflies::Butterfly32;
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection, FftPlannerAvx};
 
 /// Side of the squares that are correlated, pixels.
 pub(super) const FFT_SIZE: usize = 32;
@@ -43,9 +44,7 @@ pub(super) struct FftCorrelator {
 impl FftCorrelator {
     pub(super) fn new() -> Self {
         // An FFT is rounded differently on different processors. This can only change the order of nearly equal peaks.
-        let mut planner = FftPlanner::new();
-        let forward = planner.plan_fft_forward(FFT_SIZE);
-        let inverse = planner.plan_fft_inverse(FFT_SIZE);
+        let (forward, inverse) = (fft(FftDirection::Forward), fft(FftDirection::Inverse));
         let scratch_len = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
@@ -117,6 +116,15 @@ impl FftCorrelator {
         }
         fft_2d(&*self.inverse, &mut self.product, &mut self.scratch);
         &self.product
+    }
+}
+
+/// Returns the FFT of length [`FFT_SIZE`], with AVX if the processor has it. The general planner would compile every
+/// algorithm of the library into this crate.
+fn fft(direction: FftDirection) -> Arc<dyn Fft<f32>> {
+    match FftPlannerAvx::new() {
+        Ok(mut planner) => planner.plan_fft(FFT_SIZE, direction),
+        Err(()) => Arc::new(Butterfly32::new(direction)),
     }
 }
 
