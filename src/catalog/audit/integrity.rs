@@ -202,12 +202,17 @@ impl Catalog {
         let mut pairs = found.iter().map(pair).collect::<Result<Vec<_>>>()?;
         let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
         let mut results = stored(&mut conn, &ids).await?;
-        let metrics = stage_results::metric_hashes(&mut conn, &ids).await?;
+        let mut metrics: BTreeMap<i64, BTreeSet<_>> = BTreeMap::new();
+        for (id, metric) in stage_results::metric_hashes(&mut conn, &ids)
+            .await?
+            .into_keys()
+        {
+            metrics.entry(id).or_default().insert(metric);
+        }
         for pair in &mut pairs {
             let id = pair.inputs.pair.0;
             pair.results = results.remove(&id).unwrap_or_default();
-            let of_pair = metrics.keys().filter(|(of, _)| *of == id);
-            pair.metrics = of_pair.map(|(_, metric)| *metric).collect();
+            pair.metrics = metrics.remove(&id).unwrap_or_default();
         }
         Ok(pairs)
     }
