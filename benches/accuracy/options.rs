@@ -40,7 +40,7 @@ pub(super) struct Options {
     #[arg(long, value_name = "N", default_value_t = cores(), hide_default_value = true)]
     pub(super) workers: NonZeroUsize,
     /// The metric for contact sheets and decoys
-    #[arg(long, default_value = ThresholdMetric::ALL[ThresholdMetric::ALL.len() - 1].name())]
+    #[arg(long, default_value = ThresholdMetric::Relief.name())]
     pub(super) metric: ThresholdMetric,
     /// Also run pairs without a right answer: a wrong print, a mirrored mesh, an uncarved mesh
     #[arg(long)]

@@ -30,18 +30,23 @@ async fn check_constraints_and_enums_agree() {
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
     let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
         VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
+    let answered_metric = "INSERT INTO attention_check_answer
+        (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
+        VALUES ('1', 1, ?1, zeroblob(32), 'mirrored', '{}', zeroblob(32), 'fail', 'me', 1)";
+    let scored_metric = "INSERT INTO metric_result VALUES
+        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, zeroblob(32))";
     let queue =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', 1, ?1)";
     let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
     let unit = "UPDATE pair SET unit = ?1";
+    let metrics = ThresholdMetric::ALL.map(ThresholdMetric::name);
     for (sql, names) in [
         (verdict, Verdict::ALL.map(Verdict::name).to_vec()),
         (reason, Reason::ALL.map(Reason::name).to_vec()),
-        (
-            metric,
-            ThresholdMetric::ALL.map(ThresholdMetric::name).to_vec(),
-        ),
+        (metric, metrics.to_vec()),
+        (answered_metric, metrics.to_vec()),
+        (scored_metric, metrics.to_vec()),
         (queue, ReviewOrder::ALL.map(ReviewOrder::name).to_vec()),
         (class, FailureClass::ALL.map(FailureClass::name).to_vec()),
         (unit, LengthUnit::ALL.map(LengthUnit::name).to_vec()),
