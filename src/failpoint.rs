@@ -1,10 +1,10 @@
 //! Named points at which a test can make the process die, stop, wait or panic.
 //!
-//! Each variable names a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or `fit:claimed@0003`. The
-//! variable takes effect the N-th time that the named pair, or any pair if none is named, reaches the point. N is 1 by
-//! default; 0 means every time.
+//! The environment variables below each name a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or
+//! `fit:claimed@0003`. The variable takes effect the N-th time that the pair reaches the point; without `@PAIR`, any
+//! pair counts. N is 1 by default; 0 means every time.
 //!
-//! - `MOCBAN_BREAK_AT` ends the process as a kill does.
+//! - `MOCBAN_BREAK_AT` aborts the process.
 //! - `MOCBAN_STOP_AT` stops the process until it receives SIGCONT.
 //! - `MOCBAN_HOLD_AT` creates the file that `MOCBAN_HOLD_FILE` names and blocks the thread until the file is removed.
 //!   It must name a point on a thread for blocking code: `computed`, `written` or `synced`.
@@ -17,7 +17,7 @@ use crate::domain::{PairName, Stage};
 /// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Point {
-    /// The claim is written and not committed. `@PAIR` never matches here.
+    /// The claim is written but not committed. `@PAIR` never matches here.
     Claiming,
     /// The pair is leased, nothing is computed.
     Claimed,
@@ -27,7 +27,7 @@ pub(crate) enum Point {
     Written,
     /// The stage's files are on the disk, no row names them.
     Synced,
-    /// The stage's rows are written and not committed. `@PAIR` never matches here.
+    /// The stage's rows are written but not committed. `@PAIR` never matches here.
     Recorded,
     /// The stage's rows are committed.
     Committed,
@@ -85,7 +85,7 @@ mod test_build {
     /// Stops the process until it receives SIGCONT.
     pub(super) fn stop() {
         use rustix::process::{Signal, getpid, kill_process};
-        // A signal that cannot be sent leaves the process running, and the test that waits for it fails.
+        // If the signal cannot be sent, the process runs on, and the test that waits for it to stop fails.
         let _ = kill_process(getpid(), Signal::STOP);
     }
 

@@ -1,7 +1,8 @@
 //! Checks a project for damage. Compares the rows of the database with each other and with the files.
 //!
-//! Pairs are read in pages, so that memory does not grow with their number. A repair sends pairs with damaged results
-//! back to be computed again. It never changes verdicts or the history of results.
+//! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair sends pairs with
+//! damaged results back, so that the next run computes the results again. It never changes verdicts or the history of
+//! results.
 
 mod finding;
 mod pairs;
@@ -22,7 +23,7 @@ const PAGE: usize = 500;
 /// Options of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CheckOptions {
-    /// Compare the lengths of files instead of their hashes, and do not compare indexes with tables.
+    /// Compare files by length instead of hash, and do not compare indexes with tables.
     pub quick: bool,
     /// Repair what can be repaired. The caller holds the exclusive run lock.
     pub repair: bool,
@@ -51,10 +52,10 @@ pub enum CheckError {
 
 /// Checks a project and, with `repair`, repairs it.
 ///
-/// A damaged database is not written to. The exception is a repair that rebuilds the indexes, if nothing else is wrong.
+/// A damaged database is not written to, with one exception: if only indexes are damaged, a repair rebuilds them.
 ///
 /// # Errors
-/// If the catalog or the artifact folder cannot be read or written, or a worker thread panics.
+/// Returns an error if the catalog or the artifact folder cannot be read or written, or a worker thread panics.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,
@@ -69,7 +70,7 @@ pub async fn check(
     let rest = rows_and_files(project, catalog, options, &mut summary).await;
     match rest {
         Err(CheckError::Catalog(error)) if is_damage(&error) => {
-            // The integrity check of SQLite can miss a value that does not fit its column.
+            // SQLite's integrity check can miss an invalid value, which is found only when its row is read.
             summary.add(Finding::new(
                 Kind::Database,
                 format!("not read to its end: {error}"),
@@ -219,7 +220,7 @@ async fn repair_pairs(
     Ok(())
 }
 
-/// Counts unreferenced files. With `remove`, also deletes the unreferenced files that this program wrote.
+/// Counts unreferenced files. With `remove`, also deletes those that this program wrote.
 async fn unreferenced_files(
     project: &Project,
     named: ReferencedArtifacts,

@@ -15,7 +15,7 @@ use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 pub(super) struct PairCheck {
     pub(super) pair: PairId,
     pub(super) damage: Vec<Finding>,
-    /// Hashes of all artifacts that the pair's rows reference, including results of stages that will run again.
+    /// Hashes of all artifacts that the pair's rows reference, even if their stage will run again.
     pub(super) named: Vec<ContentHash>,
     /// Number of files checked.
     pub(super) files: u64,
@@ -30,8 +30,9 @@ impl PairCheck {
     }
 }
 
-/// Checks the rows and files of a pair. With `quick`, only the length of each file is checked. Results of stages at or
-/// after the job's cursor remain from an earlier run. Their files are still referenced, but not checked.
+/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. The job's cursor is its next
+/// stage. Results from the cursor on are left over from an earlier run: their files count as referenced, but are not
+/// checked.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
@@ -136,7 +137,8 @@ fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
     Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
 }
 
-/// Lists input files that are missing or have changed since they were read. A run handles them, so they are not damage.
+/// Lists input files that are missing, unreadable or changed since they were read. This is not damage: a run handles
+/// it.
 fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
     for (stored, seen) in [

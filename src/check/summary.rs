@@ -26,9 +26,10 @@ pub struct CheckSummary {
     pub damage: BTreeMap<Kind, Found>,
     /// Missing input files. This is not damage: results computed from them stay valid.
     pub inputs_missing: Notes,
-    /// Input files that changed after they were read. This is not damage: the next run computes their pairs again.
+    /// Input files that changed after they were read, or are unreadable. This is not damage: the next run handles it.
     pub inputs_changed: Notes,
-    /// Unreferenced files in the artifact folder. `None` if they were not counted, such as while a run may be writing.
+    /// Unreferenced files in the artifact folder. `None` if they were not counted, for example because a run may be
+    /// writing.
     pub unreferenced: Option<Unreferenced>,
     /// Repairs made.
     pub repaired: Repaired,
@@ -121,7 +122,8 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair. With `requeued`, its damage counts as repaired, because the pair was sent back.
+    /// Adds the check of a pair. If `requeued`, the pair is sent back when it has damage, so the damage counts as
+    /// repaired.
     pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
         self.pairs += 1;
         self.files += check.files;

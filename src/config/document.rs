@@ -1,4 +1,4 @@
-//! The settings as typed values, one field per section of a settings file.
+//! The settings as typed values, and their conversion from the merged settings tree.
 
 use std::collections::BTreeMap;
 
@@ -42,7 +42,7 @@ pub struct InputLimits {
 pub struct RunSettings {
     /// Pairs processed at the same time; 0 means one per core.
     pub workers: usize,
-    /// Memory for the pairs processed at the same time, in MiB; 0 means most of the free memory.
+    /// Memory limit in MiB for all pairs processed at the same time. 0 means most of the free memory.
     pub memory_mib: u64,
     /// Time limit for one stage of one pair, in seconds.
     pub stage_timeout_s: u64,
@@ -52,15 +52,15 @@ pub struct RunSettings {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReviewSettings {
-    /// Keys by action, each named by its position on the keyboard (`KeyboardEvent.code`).
+    /// The key of each action, named by its position on the keyboard (`KeyboardEvent.code`).
     pub keys: BTreeMap<String, String>,
 }
 
 /// Converts the merged tree to typed settings.
 ///
 /// # Errors
-/// Returns an error if a value has the wrong type or is unknown. The message names the first change that
-/// causes the error.
+/// Returns an error if a value has the wrong type or is not one of the allowed values. The message names the first
+/// change that causes the error.
 pub(super) fn typed(tree: &Tree, changes: &[Setting]) -> Result<Config, ConfigError> {
     read(tree).map_err(|error| blame(changes, &error))
 }
@@ -69,7 +69,8 @@ fn read(tree: &Tree) -> Result<Config, toml::de::Error> {
     Value::Table(tree.table().clone()).try_into()
 }
 
-/// Applies the changes to the defaults one by one. Blames the first change that makes the settings invalid.
+/// Applies the changes to the defaults one by one. Returns an error for the first change that makes the settings
+/// invalid.
 fn blame(changes: &[Setting], error: &toml::de::Error) -> ConfigError {
     let Ok(defaults) = Preset::Default.table() else {
         return ConfigError::BuiltIn(error.message().to_owned());

@@ -1,4 +1,4 @@
-//! Errors of settings: the layer that set the value, the key, the problem and a suggestion.
+//! Errors of settings. A message names the layer, the key and the problem, and may suggest a similar name.
 
 use std::path::PathBuf;
 
@@ -61,14 +61,15 @@ pub enum ConfigError {
     BuiltIn(String),
 }
 
-/// Returns text from outside as messages quote it: sanitized and shortened.
+/// Sanitizes and shortens text from outside, so that messages can quote it.
 pub(super) fn quote(text: &str) -> String {
     sanitize(text, MAX_QUOTE)
 }
 
-/// Returns up to `limit` of the known names that are similar to a mistyped one, most similar first.
+/// Returns up to `limit` of the known names that are similar to a mistyped name, most similar first.
 ///
-/// A name is similar if at most a third of the longer name must be edited, or one name starts with the other.
+/// Names are similar if one starts with the other, or if their edit distance is at most a third of the longer name's
+/// length (or 1 for short names).
 pub fn nearest<'a>(
     typed: &str,
     known: impl IntoIterator<Item = &'a str>,

@@ -1,7 +1,7 @@
-//! Settings: reads, merges and validates them; unknown keys are errors; each value has an origin.
+//! Settings: reads, merges and validates them. Unknown keys are errors. Each value has an origin.
 //!
-//! Flags override environment variables, which override the project's file, which overrides the preset that it names,
-//! which overrides the embedded `config/default.toml` with every setting.
+//! A layer overrides all layers after it in this list: flags, environment variables, the project's file, the preset
+//! that this file names, and the embedded `config/default.toml`, which contains every setting.
 
 mod document;
 mod error;

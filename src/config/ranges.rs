@@ -1,4 +1,4 @@
-//! The ranges of numeric settings, and settings that depend on each other.
+//! The ranges of numeric settings, and pairs of settings that must be in ascending order.
 
 use std::ops::RangeInclusive;
 
@@ -7,7 +7,7 @@ use toml::Value;
 use super::error::{ConfigError, Origin};
 use super::tree::{Setting, Tree};
 
-/// The range of every numeric setting. The comments in `config/default.toml` repeat them, which a test checks.
+/// The range of every numeric setting. A test checks that the comments in `config/default.toml` state the same ranges.
 const RANGES: &[(&str, RangeInclusive<f64>)] = &[
     ("limits.mesh.max_bytes", 1.0..=1e15),
     ("limits.mesh.max_vertices", 3.0..=4_294_967_295.0),
@@ -47,7 +47,7 @@ const ASCENDING: &[(&str, &str)] = &[
     ("register.threshold_min", "register.threshold_max"),
 ];
 
-/// Checks every number against its range, and checks the order of settings that depend on each other.
+/// Checks every number against its range, and the order of each pair of settings in `ASCENDING`.
 ///
 /// # Errors
 /// Returns an error for the first invalid value.
@@ -63,7 +63,7 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Checks that a setting's numbers are in its range, and that the first of two numbers is not above the second.
+/// Checks that all numbers of a setting are in its range. If there are two, the first must not be above the second.
 fn check_range(setting: &Setting) -> Result<(), ConfigError> {
     let Some((_, range)) = RANGES.iter().find(|(key, _)| *key == setting.key) else {
         return Ok(());
@@ -87,7 +87,7 @@ fn range_text(range: &RangeInclusive<f64>) -> String {
     }
 }
 
-/// Blames the value that was set; if both or neither were, the lower one.
+/// Returns an error if `low` is not below `high`. Blames `low`, or `high` if `low` has its default value.
 fn check_ascending(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
     match (&numbers(&low.value)[..], &numbers(&high.value)[..]) {
         ([a], [b]) if a >= b => {

@@ -43,8 +43,8 @@ impl Preset {
     }
 }
 
-/// Returns the comment of a setting in `config/default.toml`, line by line without the comment signs. A comment applies
-/// to all settings below it, up to the next comment; above a section's header it describes the section.
+/// Returns the lines of the comment on a setting in `config/default.toml`, without the comment signs. A comment applies
+/// to all settings below it, up to the next comment or section. A comment above a section's header is not returned.
 pub fn explanation(key: &str) -> Vec<&'static str> {
     let Some((section, name)) = key.rsplit_once('.') else {
         return Vec::new();
@@ -93,7 +93,7 @@ impl Default for BaseLayer {
 pub struct Sources {
     /// Preset or file.
     pub base: BaseLayer,
-    /// Environment variables; those named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` are settings.
+    /// Environment variables. Only names such as `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` are settings.
     pub env: Vec<(String, String)>,
     /// `section.key=value`, as given to `--set`.
     pub sets: Vec<String>,
@@ -120,7 +120,7 @@ impl Sources {
             .iter()
             .filter_map(|(name, text)| Some((env_key(name, defaults)?, name, text)))
             .collect();
-        // If both spellings of a name are set, the value of the spelling with two underscores is used.
+        // If both spellings of a name are set, the one with two underscores is sorted last and overrides the other.
         named.sort();
         let mut values: Vec<_> = named
             .into_iter()
@@ -134,9 +134,9 @@ impl Sources {
     }
 }
 
-/// Returns the setting of an environment variable: both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
-/// `MOCBAN_LIMITS_MESH_MAX_BYTES` name `limits.mesh.max_bytes`. An unknown key is returned too and refused later.
-/// Returns `None` for a name without `__` that does not start with a section.
+/// Returns the key of the setting that an environment variable sets. Both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
+/// `MOCBAN_LIMITS_MESH_MAX_BYTES` set `limits.mesh.max_bytes`. Unknown keys are returned too and reported later.
+/// Returns `None` if the name does not start with `MOCBAN_`, or has neither `__` nor the name of a section after that.
 fn env_key(name: &str, defaults: &Tree) -> Option<String> {
     let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
     if rest.contains("__") {
@@ -157,7 +157,7 @@ fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
     }
 }
 
-/// Parses a TOML value. Text that is not valid TOML becomes a string, so that words need no quotes.
+/// Parses a TOML value. Text that is not valid TOML becomes a string, so strings need no quotes.
 fn value(text: &str) -> Value {
     format!("value = {text}")
         .parse::<Table>()

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, hint, quote};
 
-/// The merged settings and, for each changed dotted key, the layer that changed it.
+/// The merged settings. `changed` holds the origin of each setting, by dotted key, that differs from the lowest layer.
 #[derive(Debug, Clone)]
 pub struct Tree {
     root: Table,
@@ -59,21 +59,21 @@ impl Tree {
 
     /// Returns the changes that a layer's table makes, one per key.
     ///
-    /// A table is a section if the defaults have a section with all of its keys; otherwise it is one value, such as an
-    /// enum variant with data (`{ fixed = 127 }`).
+    /// A table below the top level is a section if the defaults have a section with all of its keys. Otherwise it is
+    /// one value, such as an enum variant with data (`{ fixed = 127 }`).
     ///
     /// # Errors
-    /// Returns an error if the layer names a section or key that does not exist.
+    /// Returns an error if the layer names a section or key that does not exist, or gives a whole section one value.
     pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Setting>, ConfigError> {
         let mut changes = Vec::new();
         collect(&self.root, layer, "", origin, &mut changes)?;
         Ok(changes)
     }
 
-    /// Returns the change of one dotted key.
+    /// Returns the changes that a new value of one dotted key makes: several if the value is a table that is a section.
     ///
     /// # Errors
-    /// Returns an error if there is no such key.
+    /// Returns an error if there is no such key, or if it is a whole section and the value is not a table.
     pub fn change(
         &self,
         key: &str,
@@ -189,8 +189,8 @@ fn collect(
     Ok(())
 }
 
-/// Returns whether a table is a section. A top-level table always is, so that a mistyped key is reported by name. Any
-/// other table is a section only if all of its keys are known.
+/// Returns whether a table of a layer is a section. A top-level table always is, so that a mistyped key is reported by
+/// name. Any other table is a section only if all of its keys are known.
 fn is_section(prefix: &str, section: &Table, layer: &Table) -> bool {
     prefix.is_empty() || layer.keys().all(|key| section.contains_key(key))
 }

@@ -19,8 +19,8 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     Ok(rows)
 }
 
-/// Parses a CSV list like [`parse_csv`], but passes each row to `each` instead of keeping all rows in memory. Valid
-/// rows are passed even if other rows are invalid.
+/// Parses a CSV list like [`parse_csv`], but passes each valid row to `each` instead of keeping all rows in memory.
+/// Does so even if other rows are invalid. Returns the ids.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
@@ -51,7 +51,7 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
     rows.finish()
 }
 
-/// The columns in order: the known name, if it has a meaning, and the name as written.
+/// Each column in order: its standard name, if it is a known column, and its name as written.
 struct CsvHeader(Vec<(Option<&'static str>, String)>);
 
 impl CsvHeader {
@@ -83,7 +83,7 @@ impl CsvHeader {
         }
     }
 
-    /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheets write such rows at the end.
+    /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheet programs append such rows.
     ///
     /// # Errors
     /// Returns an error if the number of cells is wrong or a cell is not UTF-8.

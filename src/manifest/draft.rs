@@ -1,4 +1,4 @@
-//! Rows whose cells are not yet checked, and the checks that all formats share.
+//! Rows of CSV and JSON Lines lists before they are checked, and the checks that both formats share.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Pairs from two directories: files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`.
+//! Pairs from two directories. Files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -24,13 +24,14 @@ pub struct FolderPairs {
     pub ignored: Vec<PathBuf>,
 }
 
-/// Pairs the files of two listings by stem.
+/// Pairs mesh files with print files of the same stem.
 ///
-/// Uses only files with a known extension that are not hidden; their format is detected later, from their content. The
-/// result does not depend on the order of the listings.
+/// Hidden files are skipped. The format of a file is detected later, from its content. The result does not depend on
+/// the order of `meshes` and `prints`.
 ///
 /// # Errors
-/// Returns an error if two meshes or two prints have the same stem, a stem is not a valid id, or there is no pair.
+/// Returns an error if two meshes or two prints have the same stem, the stem of a pair is not a valid id, or there is
+/// no pair.
 pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
     let mut problems = Vec::new();
     let (meshes, mut ignored) = by_stem(meshes, &MESH_EXTENSIONS, "meshes", &mut problems);
@@ -89,7 +90,8 @@ impl Stem {
     }
 }
 
-/// Splits a listing into files with these extensions, by stem, and others.
+/// Returns the files with one of the extensions, by stem, and all other files. Skips hidden files. Adds a problem for
+/// each file whose stem another file has.
 fn by_stem(
     listing: &[PathBuf],
     extensions: &[&str],

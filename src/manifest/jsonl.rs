@@ -7,7 +7,7 @@ use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
 
-/// Parses a JSON Lines list. Keys are the names of the CSV columns. A `null` means no value. Blank lines are
+/// Parses a JSON Lines list. Keys are the names of the CSV columns. A `null` counts as no value. Blank lines are
 /// ignored.
 ///
 /// # Errors
@@ -19,8 +19,8 @@ pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     Ok(rows)
 }
 
-/// Parses a list like [`parse_jsonl`], but passes each row to `each` instead of keeping all rows in memory. Valid rows
-/// are passed even if other rows are invalid.
+/// Parses a list like [`parse_jsonl`], but passes each valid row to `each` instead of keeping all rows in memory. Does
+/// so even if other rows are invalid. Returns the ids.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines
@@ -61,7 +61,7 @@ fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
     Ok(draft)
 }
 
-/// Returns the value of a known key as text. Numbers are accepted, because ids often are numbers.
+/// Returns a cell's value as text. Numbers are accepted, because ids are often numbers.
 fn cell(name: &str, value: Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(text.trim().to_owned()),
@@ -73,7 +73,7 @@ fn cell(name: &str, value: Value) -> Result<String, String> {
     }
 }
 
-/// Returns the parser's message without its line number, because each line is parsed separately.
+/// Formats a parser error without its line number. The number is always 1, because each line is parsed separately.
 fn not_an_object(error: &serde_json::Error) -> String {
     let message = error.to_string();
     let reason = message.split(" at line ").next().unwrap_or(&message);

@@ -1,7 +1,7 @@
-//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem. The functions take text and
-//! listings and return rows or problems; they read no files.
+//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem. The functions parse text or lists of paths;
+//! they read no files.
 //!
-//! All problems of a list are collected before it is refused, so that they can be fixed together.
+//! All problems of a list are collected and reported together, so that users can fix them together.
 
 mod csv;
 mod draft;

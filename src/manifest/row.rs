@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use crate::domain::{ContentHash, LengthUnit, PairName};
 
-/// One pair of a list. Relative paths are stored as written, relative to the list.
+/// One pair of a list. Paths are stored as written; a relative path is relative to the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ManifestRow {
-    /// The line where the row starts, counted from 1. For pairs from two directories, the number of the row.
+    /// The line where the row starts, counted from 1. For pairs from two directories, the number of the pair.
     pub line: usize,
     /// The pair's id.
     pub name: PairName,
@@ -49,7 +49,8 @@ pub(super) fn known_column(name: &str) -> Option<&'static str> {
     columns.find(|known| known.eq_ignore_ascii_case(name))
 }
 
-/// Number of hash bytes stored for each id. Two ids collide in fewer than one of 10^24 lists of ten million rows.
+/// Number of hash bytes stored for each id. The probability that two of ten million ids have equal hashes is below
+/// 10^-24.
 const HASH_BYTES: usize = 16;
 
 /// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows.

@@ -1,4 +1,4 @@
-//! The text of a list: spreadsheets also write UTF-16 and byte-order marks.
+//! Encoding, column separator and line numbers of a list. Spreadsheet programs also write UTF-16 and byte-order marks.
 
 use std::borrow::Cow;
 
@@ -9,8 +9,8 @@ const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 #[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
 pub struct NotText;
 
-/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns all other bytes unchanged, even if they are not
-/// UTF-8; the parser reports invalid bytes with their line.
+/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns any other bytes unchanged, even if they are not
+/// valid UTF-8, so that the parser can report the line with the invalid byte.
 ///
 /// # Errors
 /// Returns an error if UTF-16 is truncated or damaged.
@@ -18,7 +18,7 @@ pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
     match *bytes {
         [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, ref rest @ ..] => from_utf16(rest, u16::from_be_bytes),
-        // Without a mark: a list starts with an ASCII character, and one of its two bytes in UTF-16 is zero.
+        // UTF-16 without a byte-order mark: a list starts with an ASCII character, which has one zero byte in UTF-16.
         [first, 0, ..] if first != 0 => from_utf16(bytes, u16::from_le_bytes),
         [0, second, ..] if second != 0 => from_utf16(bytes, u16::from_be_bytes),
         _ => Ok(bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes).into()),
@@ -36,7 +36,8 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
         .ok_or(NotText)
 }
 
-/// Returns the most frequent tab, semicolon or comma of the first line. Returns a comma if the line has no separator.
+/// Returns the column separator: the most frequent of tab, semicolon and comma in the first line that is not blank.
+/// Returns a comma if the line has none of them.
 pub fn delimiter(bytes: &[u8]) -> u8 {
     let start = bytes.trim_ascii_start();
     let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
@@ -47,8 +48,8 @@ pub fn delimiter(bytes: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Counts the line where a record of a CSV list starts. The parser's own count stops at the end of the previous record,
-/// before the second half of its line end and before blank lines.
+/// Finds the line on which each record of a CSV list starts. The position from the CSV parser is not enough: a line
+/// feed or blank lines may lie between that position and the record.
 #[derive(Debug)]
 pub struct LineCounter<'a> {
     bytes: &'a [u8],
@@ -66,7 +67,8 @@ impl<'a> LineCounter<'a> {
         }
     }
 
-    /// Returns the line of a record, counted from 1. Records must come in order.
+    /// Returns the line of the next record after `position`, counted from 1. Positions must be passed in ascending
+    /// order.
     pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
         let from = position.map_or(0, ::csv::Position::byte) as usize;
         let blank = self.bytes[from..]

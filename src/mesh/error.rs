@@ -104,8 +104,8 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Returns the failure class, which is always `BadInput`. A file over a limit can only be read after raising the
-    /// setting that the message names.
+    /// Returns the failure class, which is always `BadInput`. A file over a limit can be read only with a higher limit,
+    /// and the message names the setting.
     pub const fn class(&self) -> FailureClass {
         FailureClass::BadInput
     }

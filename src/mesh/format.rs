@@ -38,10 +38,11 @@ impl DetectedFormat {
                 Ok(Self::StlBinary)
             }
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
-            // A text file with a stray control character or names in another encoding may be classed as binary.
+            // A text file with a control character may be classed as binary.
             FileKind::Text | FileKind::Binary => match first_words(bytes) {
                 Some(format) => Ok(format),
-                // A truncated binary STL with a text header cannot be recognised by its size, so the file name decides.
+                // A truncated binary STL whose header is text cannot be recognised by its size, so the file name
+                // decides.
                 None if has_extension(name, "stl") && bytes.contains(&0) => Ok(Self::StlBinary),
                 None => Err(MeshError::NotAMesh(kind)),
             },

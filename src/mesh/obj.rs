@@ -1,8 +1,8 @@
 //! Reader of Wavefront OBJ files (<https://paulbourke.net/dataformats/obj/>).
 //!
-//! One parser reads every file in a single pass over its bytes (`parser`). If the parser rejects the file, the `v` and
-//! `f` lines are rewritten without continuations, comments and extra columns, and parsed again. If that fails too, the
-//! first fault is reported with its position in the file.
+//! The module `parser` reads a file in a single pass over its bytes. If it rejects the file, the `v` and `f` lines are
+//! rewritten without continuations, comments and extra columns, and parsed again. If that fails too, the first fault is
+//! reported with its position in the file.
 //!
 //! Normals, texture coordinates, colours, groups and materials are not used. The tests compare the results with the
 //! crate `tobj`, which takes 6 times as long on 500,000 vertices and does not report where a fault is.
@@ -90,8 +90,8 @@ fn join_continued_lines(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(joined)
 }
 
-/// Rewrites the geometry lines with single spaces and line feeds. A vertex keeps its three coordinates but not a weight
-/// or colours after them. A face keeps all its corners.
+/// Rewrites the geometry lines with single spaces and line feeds. Drops a weight or colours after the three coordinates
+/// of a vertex. Keeps all corners of a face.
 fn plain_lines(bytes: &[u8]) -> Vec<u8> {
     let mut lines = Vec::with_capacity(bytes.len());
     for (_, record) in records(bytes) {
@@ -104,7 +104,7 @@ fn plain_lines(bytes: &[u8]) -> Vec<u8> {
             lines.push(b' ');
             lines.extend_from_slice(word);
         }
-        // Without the space, the parser would ignore a `v` that has no coordinates instead of rejecting it.
+        // The space makes the parser reject a `v` without coordinates. The parser ignores a `v` that ends its line.
         lines.extend_from_slice(b" \n");
     }
     lines
@@ -138,8 +138,8 @@ fn find_fault(bytes: &[u8]) -> MeshError {
     }
 }
 
-/// Returns the fault of a face, if it has one: a corner that is not made of integers, or an index outside the file's
-/// vertices. A negative index counts back from the last vertex defined before the face.
+/// Returns the fault of a face, if it has one: a corner that is not one to three integers with slashes between them, or
+/// an index outside the file's vertices. A negative index counts back from the last vertex defined before the face.
 fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> Option<MeshError> {
     for corner in text::words(rest) {
         let parts = || corner.split(|byte| *byte == b'/');

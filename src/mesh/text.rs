@@ -18,7 +18,7 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|word| !word.is_empty())
 }
 
-/// Parses a number. Floats may be NaN or infinite; such vertices are rejected later.
+/// Parses a number. Accepts NaN and infinity, which the readers reject in vertices.
 pub(super) fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }

@@ -12,7 +12,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Creates a mesh in which every three consecutive vertices form a triangle of their own.
+    /// Creates a mesh in which vertices 0 to 2 form the first triangle, vertices 3 to 5 the second, and so on.
     pub(super) fn from_soup(vertices: Vertices) -> Self {
         let triangles = (0..vertices.len() as u32)
             .step_by(3)
@@ -25,8 +25,8 @@ impl Mesh {
     }
 }
 
-/// Finite positions in the mesh's own frame and unit. They are kept in the precision of the file, because memory
-/// traffic dominates the run time.
+/// Finite positions in the mesh's own frame and unit. The precision of the file is kept, because memory traffic
+/// dominates the run time.
 #[derive(Debug, Clone)]
 pub enum Vertices {
     /// From files of 32-bit floats, as scanners write.

@@ -16,8 +16,8 @@ const POWERS_OF_TEN: [f64; 23] = [
 ];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
-/// Bytes of a file per vertex and per triangle. The estimates are high, so that too little rather than too much memory
-/// is reserved.
+/// Estimated bytes of a file per vertex and per triangle. The estimates are high: reserving too little memory is better
+/// than reserving too much.
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 
@@ -31,8 +31,8 @@ pub(super) struct ParsedObj {
     is_finite: bool,
 }
 
-/// Parses a file. Returns `None` if its lines end in CR only, a line is continued on the next, or a word is not a
-/// number or a valid index.
+/// Parses a file. Returns `None` if its lines end in CR only, a line is continued on the next, or a `v` or `f` line
+/// contains an invalid number or index.
 pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
     // Lines of classic Mac OS end in a carriage return only.
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
@@ -145,8 +145,8 @@ impl LineCursor<'_> {
         Some(value)
     }
 
-    /// Appends the next decimal digits of the line to a number and returns how many there are. The number wraps around
-    /// if it overflows.
+    /// Reads the next decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps
+    /// around.
     #[inline]
     fn digits(&mut self, number: &mut u64) -> usize {
         let before = self.rest.len();
@@ -184,7 +184,7 @@ impl LineCursor<'_> {
     }
 
     /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. `vertices` is the number of
-    /// vertices parsed so far. A negative index counts back from the last one.
+    /// vertices parsed so far. A negative index counts back from the last of them.
     fn corner(&mut self, vertices: usize) -> Option<u32> {
         let index = self.index()?;
         let mut parts = 1;

@@ -129,8 +129,8 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads rows of exactly three 32-bit floats in blocks, as most programs write them. Stops where the source returns
-    /// none; the caller then reads the rows that are left one by one.
+    /// Reads rows of exactly three 32-bit floats, the most common layout, in blocks. Stops if the source returns no
+    /// rows; the caller then reads the remaining rows one by one.
     fn packed_vertices(&mut self, rows: u64) -> Result<(), MeshError> {
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
         while self.row < rows {
@@ -283,8 +283,8 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads a list of corners into triangles. The list itself is not stored, so that the limit on triangles bounds the
-    /// memory.
+    /// Reads a list of corners into triangles. The list is not stored, because its length is not limited; the number of
+    /// triangles is.
     fn corners(
         &mut self,
         count: PlyScalar,

@@ -129,7 +129,7 @@ impl PlyElement {
         ["x", "y", "z"].into_iter().all(is_single)
     }
 
-    /// Returns the type of the indices if each row is one list of 32-bit indices with an 8-bit count.
+    /// Returns the type of the indices if each row is one list with an 8-bit count and 32-bit indices.
     pub(super) fn packed_corner_type(&self) -> Option<PlyScalar> {
         let [property] = self.properties.as_slice() else {
             return None;
@@ -194,7 +194,7 @@ impl PlyHeader {
         Err(header_error("the file ends before end_header"))
     }
 
-    /// Returns whether 32-bit floats represent all vertices of the body exactly.
+    /// Returns whether 32-bit floats represent all vertices of a binary body exactly. Returns `false` for text.
     pub(super) fn has_single_vertices(&self) -> bool {
         let mut vertices = self.elements.iter().filter(|e| e.name == "vertex");
         self.encoding != PlyEncoding::Ascii && vertices.all(PlyElement::is_single_position)
@@ -207,9 +207,8 @@ impl PlyHeader {
     }
 }
 
-/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. Lines may end
-/// in LF, CRLF or CR. The first line decides which, because the byte after a later CR may already belong to a binary
-/// body.
+/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. Lines end in
+/// CR if the first line does, otherwise in LF or CRLF. A later CR decides nothing, because a binary body may follow it.
 fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     let old_mac = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
     let end = if old_mac { b'\r' } else { b'\n' };

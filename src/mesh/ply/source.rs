@@ -1,4 +1,4 @@
-//! Readers of the numbers in a PLY body, which are words of text or bytes in either byte order.
+//! Readers of the numbers in a PLY body: words of text, or bytes in either byte order.
 
 use super::header::{PlyElement, PlyScalar};
 use crate::mesh::error::MeshError;
@@ -28,15 +28,15 @@ pub(super) trait NumberSource {
     /// Skips numbers of one type.
     fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault>;
 
-    /// Returns the largest number of rows of an element that the rest of the body can hold.
+    /// Returns how many rows of an element the rest of the body can hold at most.
     fn max_rows(&self, element: &PlyElement) -> u64;
 
-    /// Appends the positions of up to `_most` rows of three 32-bit floats. Appends none from text or at the end of the
-    /// body.
+    /// Appends the positions of up to `_most` rows, each of three 32-bit floats. Appends nothing if the body is text or
+    /// has ended.
     fn packed_positions(&mut self, _most: usize, _into: &mut Vec<[f32; 3]>) {}
 
-    /// Appends the triangles of up to `_most` rows of an 8-bit count and 32-bit indices. Stops before a row with a
-    /// count other than three. Appends none from text or at the end of the body.
+    /// Appends the triangles of up to `_most` rows, each an 8-bit count and 32-bit indices. Stops before a row whose
+    /// count is not three. Appends nothing if the body is text or has ended.
     fn packed_triangles(&mut self, _most: usize, _into: &mut Vec<[u32; 3]>) {}
 }
 
