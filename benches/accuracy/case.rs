@@ -14,7 +14,7 @@ pub(super) struct Case {
     pub(super) seed: u64,
     /// Index in the data.
     pub(super) index: u64,
-    /// Approximate number of vertices of the scan. The number is random if this is `None`.
+    /// Approximate number of vertices of the scan. `None` means a random number.
     vertices: Option<u32>,
 }
 

@@ -16,7 +16,7 @@ Wrong pairs that did not fail; how many of them are among the 3 % of the pairs (
 confidence; share of all couples of a right and a wrong pair in which the right one has the higher confidence (AUC: 0.5 \
 is chance, 1 perfect); Acc of the other 97 %.";
 
-/// Makes a table with a row for each tier, method and metric with a confidence. Returns `None` if nothing has a
+/// Makes a table of confidences with a row for each tier, method and metric. Returns `None` if no pair has a
 /// confidence.
 pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Option<String> {
     let heads = [

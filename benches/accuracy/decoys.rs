@@ -28,7 +28,7 @@ pub(super) struct Answer {
     tier: Tier,
     kind: Decoy,
     method: &'static str,
-    /// Confidence of the alignment, or `None` if it has no confidence. It is `Err` if a stage failed.
+    /// Confidence of the alignment. `Ok(None)` if it has no confidence, `Err` if a stage failed.
     outcome: Result<Option<f64>, ()>,
 }
 
@@ -131,7 +131,7 @@ fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
     ]
 }
 
-/// Returns the confidence threshold that rejects the allowed share of right pairs.
+/// Returns the confidence below which the share `FALSE_ALARMS` of the right pairs lies.
 fn level(trials: &[Trial], method: &Method, metric: ThresholdMetric) -> Option<f64> {
     let of_method = trials.iter().filter(|trial| trial.method == method.name);
     let found = of_method.filter_map(|trial| trial.found(metric));

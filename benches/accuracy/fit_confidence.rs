@@ -1,10 +1,10 @@
 //! Fits the weights of the confidence model (`stages/register/confidence.rs`) and checks them on other seeds.
 //!
-//! Training examples are the pairs asked for and their decoys (another character's print, a mirrored mesh, an uncarved
-//! plate), aligned with `register.min_confidence = 0` so that none is refused for its confidence. The pose's weights are
-//! fitted on whether rotation and landmarks are right, the mask's on whether the mask is right where the pose is. Both
-//! are logistic regressions with a ridge penalty on standardized inputs, solved by Newton's method (iteratively
-//! reweighted least squares).
+//! Training examples are alignments of the chosen pairs and of their decoys (another character's print, a mirrored
+//! mesh, an uncarved plate). `register.min_confidence` is 0, so that no alignment is refused for low confidence. The
+//! pose weights predict whether rotation and landmarks are right. The mask weights predict whether the mask is right,
+//! and are fitted only on examples with a right pose. Both are fitted by logistic regression with a ridge penalty on
+//! standardized inputs, using Newton's method (iteratively reweighted least squares).
 
 use std::fmt::Write as _;
 
@@ -25,7 +25,7 @@ use super::options::Options;
 use super::run::Run;
 use super::workers::in_order;
 
-/// Weight of the penalty on the squared weights of the standardized inputs, as a number of examples.
+/// Weight of the ridge penalty. It applies to the weights of standardized inputs.
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;
@@ -50,7 +50,7 @@ struct Weights {
     mask: Vec<f64>,
 }
 
-/// Fits the weights on the pairs asked for and returns them as Rust with a reliability table on the held-out seeds.
+/// Fits the weights on the chosen pairs. Returns them as Rust code, with a reliability table for the held-out seeds.
 pub(super) fn report(options: &Options, method: &Method) -> anyhow::Result<String> {
     let training = examples(&options.cases(), method, options)?;
     let held_out = examples(&options.held_out_cases(), method, options)?;
@@ -65,7 +65,7 @@ pub(super) fn report(options: &Options, method: &Method) -> anyhow::Result<Strin
     Ok(text)
 }
 
-/// Aligns every pair and its decoys and returns the results that the confidence model judges.
+/// Aligns every pair and its decoys. Returns one example for each metric of each alignment.
 fn examples(cases: &[Case], method: &Method, options: &Options) -> anyhow::Result<Vec<Example>> {
     let mut settings = method.settings.clone();
     settings.register.min_confidence = 0.0;
@@ -197,7 +197,7 @@ impl Weights {
     }
 }
 
-/// Returns the reliability table of both sets of weights and their mean log loss.
+/// Returns the reliability table and the mean log loss, for the built-in and for the fitted weights.
 fn reliability(examples: &[Example], fitted: &Weights) -> String {
     let is_right = |e: &Example| e.is_pose_right && e.is_mask_right;
     let columns: [Vec<(f64, bool)>; 2] = [

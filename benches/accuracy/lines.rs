@@ -25,7 +25,7 @@ const HEADS: [&str; 13] = [
     "normal_deg",
 ];
 
-/// Writes a line for each pair and metric, and a single line for each pair that failed.
+/// Writes a line for each metric of each pair, and a single line for each pair that failed.
 pub(super) fn write(path: &Path, trials: &[Trial]) -> anyhow::Result<()> {
     let paths = paths(trials);
     let text = || -> anyhow::Result<()> {

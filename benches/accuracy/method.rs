@@ -13,7 +13,7 @@ pub(super) struct Method {
 }
 
 impl Method {
-    /// Loads a preset with changed settings, written as for `--set`. Environment variables are ignored.
+    /// Loads a preset with changed settings, each given as `SECTION.KEY=VALUE`. Ignores environment variables.
     pub(super) fn load(preset: Preset, sets: &[String]) -> anyhow::Result<Self> {
         let loaded = config::load(&Sources {
             base: BaseLayer::Preset(preset),

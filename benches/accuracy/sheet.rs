@@ -19,8 +19,8 @@ const COLUMNS: usize = 4;
 /// A pixel of a tops mask that is a true stroke top.
 const TOP: u8 = 255;
 
-/// Draws a sheet for each tier and method. For each pair the sheet shows the print, the aligned relief, and the print
-/// with two outlines: the edges of the true stroke tops in blue and of the depth mask in vermillion.
+/// Draws a sheet for each tier and method. For each pair it shows the print, the aligned relief, and the print with
+/// outlines: blue around the true stroke tops, vermillion around the depth mask.
 pub(super) fn write(
     dir: &Path,
     options: &Options,
@@ -38,7 +38,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Returns the trials of a sheet: failed trials first, then the others by their distance from the truth.
+/// Returns the trials of a sheet: first the failed trials, then the trials farthest from the truth.
 fn worst<'a>(
     trials: &'a [Trial],
     tier: Tier,
@@ -54,7 +54,7 @@ fn worst<'a>(
     worst
 }
 
-/// Images are not kept while all pairs run, so the few pairs on the sheet run again.
+/// The few pairs on the sheet are run again, because images are not kept while all pairs run.
 fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<Rgb> {
     let cells = in_order(worst.len(), options.workers, |index| {
         let trial = worst[index];

@@ -51,8 +51,7 @@ pub(super) struct Found {
     pub(super) numbers: Numbers,
 }
 
-/// Runs every pair with every method. The results are in the order of the pairs, and for each pair in the order of the
-/// methods.
+/// Runs every pair with every method. Returns the results pair by pair, in the order of the methods.
 pub(super) fn all(
     cases: &[Case],
     methods: &[Method],

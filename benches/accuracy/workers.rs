@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use indicatif::ProgressBar;
 
-/// Returns the results of `work` on 0..count, in order. Each item is computed by a single thread, so the processor
-/// time of the thread measures the time of the item.
+/// Runs `work` on each number below `count` and returns the results in order. A single thread computes each item, so
+/// the thread's processor time is the time of the item.
 pub(super) fn in_order<T: Send>(
     count: usize,
     workers: NonZeroUsize,

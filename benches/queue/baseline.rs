@@ -21,7 +21,7 @@ type Queue = Arc<Mutex<std::vec::IntoIter<PairAttributes>>>;
 type Writes = Vec<JoinHandle<anyhow::Result<()>>>;
 
 /// Computes all stages of the pairs and writes their artifacts, on as many threads as a run uses. Returns the time
-/// spent on computing stages, summed over all threads.
+/// spent on computing, summed over all threads.
 pub(super) async fn run_without_catalog(
     project: &Project,
     settings: &Settings,
@@ -61,8 +61,7 @@ struct Worker {
 }
 
 impl Worker {
-    /// Computes pairs until none is left. Returns the time spent on computing stages, and the writes still in
-    /// progress.
+    /// Computes pairs until none is left. Returns the time spent on computing, and the unfinished writes.
     fn compute_all(&self, queue: &Queue) -> anyhow::Result<(Duration, Writes)> {
         let (mut elapsed, mut writes) = (Duration::ZERO, Vec::new());
         loop {

@@ -13,8 +13,7 @@ pub(super) const MANY: usize = 64;
 /// Number of claims that are measured.
 const TIMES: usize = 200;
 
-/// Returns the times of claims of one pair and of [`MANY`] pairs, until each claim is stored and answered. Releases
-/// all leases.
+/// Measures claims of one pair and of [`MANY`] pairs, each until the claim is stored and answered. Releases all leases.
 pub(super) async fn times(world: &World, catalog: &Catalog) -> anyhow::Result<[String; 2]> {
     let fake = Fake::register(&world.project, catalog, &fingerprints(None)?).await?;
     let mut cells = [String::new(), String::new()];

@@ -98,7 +98,7 @@ impl Fake {
         }
     }
 
-    /// Returns the input files that a run reports with this stage: the files that this stage is the first to read.
+    /// Returns the input files that a stage is the first to read. A run stores their versions with the stage.
     fn inputs(&self, stage: Stage) -> InputVersions {
         if stage > Stage::Fit {
             return InputVersions::default();

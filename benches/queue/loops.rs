@@ -1,4 +1,4 @@
-//! A simple queue over the same schema, for comparison: one transaction per claim and per checkpoint, row by row.
+//! A simple queue over the same schema, for comparison. Each claim and each checkpoint is a transaction of its own.
 
 use std::path::Path;
 use std::sync::Arc;

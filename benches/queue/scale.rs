@@ -14,8 +14,7 @@ use super::world::{World, fingerprints, work};
 
 /// Pairs that are left when most are done.
 const LEFT: usize = 1_000;
-/// Number of pairs that are run through the writer. The other pairs of a large catalog get copies of the resulting
-/// rows.
+/// Largest number of pairs of a catalog that are run. All further pairs get copies of the rows of a pair that ran.
 const WORKED: usize = 20_000;
 /// Pairs in progress while a catalog is filled.
 const IN_PROGRESS: usize = 128;
@@ -141,7 +140,7 @@ async fn at(
     Ok(())
 }
 
-/// Measures queries after a change of settings, when every completed pair is stale.
+/// Measures queries after a changed setting has made every completed pair stale.
 async fn changed(
     world: &World,
     catalog: &Catalog,

@@ -1,4 +1,4 @@
-//! Measures what catalog and artifacts cost in addition to the stages, on the demo.
+//! Measures the time that the catalog and the artifacts add to the time of the stages, on pairs of the demo.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -178,8 +178,8 @@ impl Watch {
         })
     }
 
-    /// Stops the measurement, after all compute threads have ended. `compute_time` is the mean time that a slot spent
-    /// on computing stages.
+    /// Stops the measurement. All compute threads must have ended. `compute_time` is the mean time that a slot spent on
+    /// computing stages.
     fn stop(self, compute_time: Duration) -> anyhow::Result<RunTimes> {
         let (wall, cores) = (self.start.elapsed(), process::cpu_time());
         let threads = process::thread_cpu_times()?.into_iter();

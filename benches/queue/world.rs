@@ -85,7 +85,7 @@ pub(super) async fn work(
     in_progress: usize,
 ) -> anyhow::Result<Duration> {
     let fake = Arc::new(Fake::register(&world.project, catalog, &fingerprints(None)?).await?);
-    // Commit without delay, so that each checkpoint is durable before the next one.
+    // Commits are not delayed, so each checkpoint is durable before the same pair's next checkpoint.
     let _waiting = catalog.waiting().await?;
     let start = Instant::now();
     let mut left = pairs;

@@ -14,8 +14,8 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     let (mesh, picture) = (read(&stl)?, decode(&png)?);
     let print = Print::from(picture.clone());
     let aligned = AlignedPair::new(&mesh.clone().into(), &print, &settings)?;
-    // The binarizations and the indexed surface are cached. `fit` computes both, and `depth` alone computes only the
-    // surface.
+    // Scans cache an indexed surface, and prints their binarizations. `fit` computes both, and `depth` only the
+    // surface, so only these stages get fresh inputs.
     let fresh = |name: &str| match name {
         "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
         "depth" | "depth_1024" => (Scan::from(mesh.clone()), print.clone()),

@@ -1,12 +1,12 @@
-//! Accessibility of the pages, checked by axe-core. Skipped without a browser or without `AXE_JS`, the path of
-//! `axe.min.js`.
+//! Accessibility of the pages, checked by axe-core. `AXE_JS` is the path of `axe.min.js`. Without it or without a
+//! browser, the tests are skipped.
 
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{PLAIN, enter, judge};
 
-/// Returns the text of axe-core. Returns `None`, with a line on stderr, if axe-core is not available.
+/// Returns the source of axe-core. Returns `None`, with a line on stderr, if axe-core is not available.
 #[expect(
     clippy::print_stderr,
     reason = "the one line that says why a test was skipped"
@@ -19,7 +19,7 @@ fn axe() -> Option<String> {
     Some(std::fs::read_to_string(path).expect("axe.min.js"))
 }
 
-/// Fails if axe finds a serious violation; `what` names the state of the page.
+/// Fails if axe-core finds a serious violation. `what` names the state of the page.
 fn nothing_serious(tab: &Tab<'_>, what: &str) {
     let found = tab.eval(
         "axe.run().then(({ passes, violations }) => ({

@@ -1,4 +1,5 @@
-//! `agreement`, and the statistics of reviewers in `report`, on verdicts from the page and from the command line.
+//! Statistics on the agreement of reviewers, from `agreement` and `report`. The verdicts come from the page and the
+//! command line.
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -24,7 +25,8 @@ fn set(project: &Project, pair: &Value, verdict: &str, reviewer: &str) {
     mocban(project.dir(), &args).expect(0);
 }
 
-/// `lan` fails everything on the page, attention checks included; `minh` passes all pairs except the first.
+/// Stores verdicts. On the page, `lan` fails all items, attention checks included. `minh` passes all pairs but the
+/// first.
 fn reviewer_pairs(project: &Project) -> Vec<Value> {
     let page = Page::open(
         project,
@@ -60,7 +62,7 @@ fn two_reviewers_are_compared_and_a_third_settles_a_conflict() {
         (count(&two["failed_by_any"]), count(&two["failed_by_both"])),
         (n, agreed)
     );
-    // A reviewer who always gives the same verdict agrees no more often than by chance.
+    // If a reviewer always gives the same verdict, kappa is 0: agreement is at the level of chance.
     assert!(
         two["kappa"]
             .as_f64()
@@ -172,7 +174,7 @@ fn results_are_measured_against_the_newest_manual_alignment() {
     for name in ["angle_median_deg", "shift_median_pct", "scale_p95_pct"] {
         assert_near(&same, name, 0.0);
     }
-    // Rotated by 12 degrees about the corner of the image, and enlarged by a quarter.
+    // Rotated by 12 degrees about the image's corner and enlarged by 25 %.
     let (sin, cos) = 12.0_f64.to_radians().sin_cos();
     let rotate = |x: f64, y: f64| [1.25 * (cos * x - sin * y), 1.25 * (sin * x + cos * y)];
     let columns = [rotate(a, d), rotate(b, e), rotate(c, f)];

@@ -1,4 +1,4 @@
-//! `backup` through the real binary: during a run, restored, and never incomplete.
+//! `backup` through the real binary: backs up during a run, can be restored, and is never incomplete.
 
 use std::process::Stdio;
 

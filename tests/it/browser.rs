@@ -1,5 +1,5 @@
-//! Headless Chromium, controlled by the `DevTools` protocol over two pipes: JSON objects, each terminated by a zero byte.
-//! Tests are skipped with a line on stderr if there is no Chromium.
+//! Controls headless Chromium by the `DevTools` protocol. JSON objects, each ended by a zero byte, go through two
+//! pipes. If there is no Chromium, tests are skipped with a line on stderr.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -58,7 +58,7 @@ impl Browser {
         let [to, from] = ["to", "from"].map(|name| dir.path().join(name));
         let made = Command::new("mkfifo").args([&to, &from]).status();
         assert!(made.expect("mkfifo starts").success());
-        // The shell opens the pipes as file descriptors 3 and 4, which the browser uses.
+        // The shell opens the pipes as file descriptors 3 and 4, as `--remote-debugging-pipe` expects.
         let child = Command::new("sh")
             .arg("-c")
             .arg("exec 3<\"$0\" 4>\"$1\"; shift; exec \"$@\"")
@@ -80,8 +80,7 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .expect("a shell");
-        // Opening a pipe blocks until the other end is open, so the pipes are opened in the same order as in the
-        // shell.
+        // Opening a pipe blocks until the other end is open. The pipes are therefore opened in the shell's order.
         let to = File::options().write(true).open(to).expect("a pipe");
         let from = BufReader::new(File::open(from).expect("a pipe"));
         Some(Self {

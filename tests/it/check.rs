@@ -1,4 +1,4 @@
-//! `check` and `check --repair` through the real binary: damage is found and repaired, and the results are the same.
+//! `check` and `check --repair` through the real binary. Damage is found and repaired, and the results are the same.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use sqlx::{ConnectOptions as _, Connection as _};
 use crate::cli::{Call, mocban};
 use crate::resume::{copy, pairs};
 
-/// A demo of two small pairs, aligned and judged, created once; tests work on copies.
+/// A demo project of two small pairs, run and judged, created once. Each test works on a copy.
 static DONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let demo = ["demo", "done", "--pairs", "2", "--no-run"];
@@ -231,7 +231,7 @@ fn rows_and_counters_that_disagree_are_found_and_repaired() {
 fn indexes_that_disagree_with_their_tables_are_rebuilt() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
-    // A job becomes ready while the index covers other rows; then the index covers ready jobs again.
+    // All jobs become ready while the index of ready jobs covers other rows. Afterwards the index lacks these jobs.
     let redefine = |from: &str, to: &str| {
         format!(
             "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'status = {from}', 'status = {to}')
@@ -323,7 +323,7 @@ fn project_is_checked_but_not_repaired_during_a_run() {
     let refused = at(&project, &["check", "--repair"]).expect(11);
     let owner = format!("in use by pid {}", std::process::id());
     assert!(refused.err.contains(&owner), "{}", refused.err);
-    // A process that joined the run still holds the project, even after the first process ended.
+    // A process that joined the run still holds the project when the first process has ended.
     let joined = RunLock::acquire(&project, true).expect("joined");
     drop(lock);
     at(&project, &["check", "--repair"]).expect(11);

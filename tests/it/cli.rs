@@ -1,4 +1,4 @@
-//! The real binary: exit codes, help, JSON. The helpers here are used by most other modules.
+//! The real binary: exit codes, help, JSON. Most other modules use the helpers of this file.
 
 use std::path::Path;
 use std::process::Command;
@@ -39,7 +39,7 @@ impl Call {
     }
 }
 
-/// Calls the binary in a directory, without environment variables that change its output.
+/// Runs the binary in a directory, without environment variables that change its output.
 pub(crate) fn mocban(dir: &Path, args: &[&str]) -> Call {
     call(binary().current_dir(dir).args(args))
 }
@@ -196,7 +196,7 @@ fn completions_and_manual_pages_are_written() {
     assert!(dir.path().join("pages/mocban-verdict-set.1").is_file());
 }
 
-/// Returns a directory with the project `p` of two pairs whose files do not exist, and its list `pairs.csv`.
+/// Creates a directory with a list `pairs.csv` and a project `p` of its two pairs. Their files do not exist.
 fn imported() -> tempfile::TempDir {
     let dir = empty();
     let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";

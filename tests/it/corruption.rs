@@ -1,4 +1,4 @@
-//! Corrupts valid files the way disks, programs and people do, deterministically from a seed.
+//! Corrupts valid files in the ways that disks, programs and people do. The same seed gives the same corruption.
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -101,7 +101,7 @@ impl Corruptor {
         }
     }
 
-    /// Overwrites a number. Half of the time the number is within the first 200 bytes, where headers are.
+    /// Overwrites bytes with a number. Half of the time, they are among the first 200 bytes, where headers are.
     fn number(&mut self, bytes: &mut [u8]) {
         let value = NUMBERS[self.below(NUMBERS.len())];
         let width = [1, 2, 4, 8][self.below(4)];

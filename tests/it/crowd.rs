@@ -1,6 +1,6 @@
-//! Many hostile pairs with a few good ones among them. Each hostile pair is reported in one sentence and none stops
-//! the other pairs. The good pairs have the same results as in a run without hostile pairs. `MOCBAN_HOSTILE` sets the
-//! number of hostile pairs.
+//! Many hostile pairs with a few good pairs among them. Each hostile pair is reported in one sentence and stops no
+//! other pair. The good pairs have the same results as in a run without hostile pairs. `MOCBAN_HOSTILE` sets the number
+//! of hostile pairs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,8 +21,7 @@ use crate::test_size::size_from_env;
 
 /// Number of good pairs among the hostile ones.
 const GOOD: u64 = 2;
-/// Memory limit of a run, and the most memory that the run may take. It is far less than the headers of the files ask
-/// for.
+/// Memory limit of a run in MiB, and limit of its peak memory. The headers of some files ask for far more.
 const MEMORY_MIB: u64 = 256;
 /// Longest time for a stage in seconds.
 const STAGE_LIMIT_S: u64 = 60;
@@ -37,8 +36,7 @@ fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
     parse_csv(&fs::read(files.manifest).expect("a manifest")).expect("rows")
 }
 
-/// Writes two manifests: one of the hostile pairs with the good pairs spread among them, and one of the good pairs
-/// alone.
+/// Writes two manifests: one of the good pairs spread among the hostile pairs, and one of the good pairs alone.
 fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     let good = good_pairs(dir);
     let row = |id: &str, mesh: &Path, print: &Path| {
@@ -63,7 +61,7 @@ fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     fs::write(dir.join("alone.csv"), alone).expect("written");
 }
 
-/// Runs the binary and watches its memory. Returns the exit code with both streams, and the peak memory in KiB.
+/// Runs the binary. Returns its exit code and streams, and its peak memory in KiB.
 pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
     let mut command = binary();
     command
@@ -87,7 +85,7 @@ pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
         let err = scope.spawn(|| read(&mut streams.1));
         let mut peak = 0;
         let code = loop {
-            // The kernel drops its record of the peak when the process ends, so the peak is read repeatedly.
+            // The peak is read repeatedly, because the kernel drops it when the process ends.
             peak = peak.max(peak_kib(&status).unwrap_or(0));
             if let Some(code) = child.try_wait().expect("waited for") {
                 break code.code().expect("no signal");
@@ -121,7 +119,7 @@ fn lines(export: &Path) -> BTreeMap<String, Vec<Value>> {
     lines
 }
 
-/// Asserts that neither stream contains text from a panic, from Rust debug output or from the database.
+/// Asserts that neither stream contains text of a panic, Rust debug output or SQLite codes.
 #[track_caller]
 fn assert_plain(call: &Call) {
     for stream in [&call.out, &call.err] {
@@ -139,8 +137,7 @@ fn assert_plain(call: &Call) {
     }
 }
 
-/// Asserts that the error is one sentence that names the faulty file, and that the error class is not the class for
-/// bugs.
+/// Asserts that the error is one sentence that names a file of the pair, and that its class is not the class for bugs.
 fn assert_reported(pair: &HostilePair, line: &Value) {
     let (class, message) = (
         &line["error_class"],
@@ -163,7 +160,7 @@ fn assert_reported(pair: &HostilePair, line: &Value) {
     assert!(named, "{}: {message}", pair.id);
 }
 
-/// Runs the good pairs in another project; returns the folder of its export.
+/// Runs the good pairs alone in another project. Returns the folder of its export.
 fn export_good_pairs(dir: &Path) -> PathBuf {
     mocban(dir, &["-C", "clean", "import", "data/alone.csv"]).expect(0);
     mocban(dir, &["-C", "clean", "run"]).expect(0);

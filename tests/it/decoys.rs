@@ -1,4 +1,4 @@
-//! Pairs without a correct alignment are refused: a print of another character, a mirrored mesh, an uncarved plate.
+//! Pairs that have no correct alignment are refused: a print of another character, a mirrored mesh, an uncarved plate.
 
 use mocban::demo::{PairGenerator, Tier};
 use mocban::mesh::Mesh;

@@ -1,4 +1,4 @@
-//! The built-in dataset: the same seed gives the same bytes, and every file can be read.
+//! The built-in dataset: a seed always gives the same bytes, and every file can be read.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -70,8 +70,8 @@ impl Fault {
         Self { half: true, ..self }
     }
 
-    /// Makes the n-th matching call of a command fail, or no call if `nth` is 0. The path pattern is relative to
-    /// `root`. Matching calls and injected faults are logged in `notes`.
+    /// Makes the n-th matching call of a command fail, or no call if `nth` is 0. The fault's path pattern is relative
+    /// to `root`. Matching calls and injected faults are logged in `notes`.
     pub(crate) fn inject<'c>(
         &self,
         nth: usize,
@@ -134,7 +134,7 @@ fn lines(file: &Path) -> usize {
     std::fs::read_to_string(file).map_or(0, |text| text.lines().count())
 }
 
-/// Returns `wanted` evenly spaced numbers from 1 to `last`. If `wanted` is 1, returns the middle number.
+/// Returns `wanted` evenly spaced numbers from 1 to `last`, or the middle number if `wanted` is 1.
 pub(crate) fn spread(last: usize, wanted: usize) -> BTreeSet<usize> {
     match wanted.min(last) {
         0 | 1 => BTreeSet::from([last.div_ceil(2)]),

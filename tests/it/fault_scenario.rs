@@ -1,4 +1,4 @@
-//! A command that runs while system calls on the disk fail, and the expected outcome.
+//! A command that is run while system calls on the disk fail, and its expected outcome.
 
 use std::path::Path;
 use std::process::Command;
@@ -25,7 +25,7 @@ pub(crate) struct FaultScenario {
     pub(crate) before: fn(&Comparison, &Path),
     /// Returns the command for that directory.
     pub(crate) command: fn(&Path) -> Command,
-    /// Checks the state after the command and completes the work. The last argument is whether the command succeeded.
+    /// Checks the state after the command and completes the work. The `bool` says whether the command succeeded.
     pub(crate) after: fn(&Comparison, &Path, bool),
 }
 
@@ -41,7 +41,7 @@ impl FaultScenario {
     }
 
     /// Runs the command with a fault at the n-th call, then checks the outcome and completes the work without faults.
-    /// Returns the exit code, or `None` if the command made fewer calls.
+    /// Returns the exit code, or `None` if the command made fewer than `nth` calls.
     fn check(&self, comparison: &Comparison, fault: &Fault, nth: usize, end: End) -> Option<i32> {
         let (root, notes) = (comparison.folder("injected"), comparison.folder("notes"));
         (self.before)(comparison, &root);
@@ -55,7 +55,7 @@ impl FaultScenario {
         Some(result.code)
     }
 
-    /// Injects each fault at `points` system calls, spread evenly over all calls that the fault applies to.
+    /// Injects each fault at `points` of the system calls that it applies to, evenly spaced.
     #[expect(clippy::print_stderr, reason = "figures of the long test")]
     pub(crate) fn check_all(&self, faults: &[(Fault, End)], points: usize) {
         let comparison = Comparison::new("1");
@@ -73,7 +73,7 @@ impl FaultScenario {
     }
 }
 
-/// Asserts the outcome. An error must be one line that names the file and the reason.
+/// Asserts the outcome. If the command failed, its error must be one line that names the file and the reason.
 fn assert_outcome(result: &Call, end: End, root: &Path, at: &str) {
     match end {
         End::Fails => assert_ne!(result.code, 0, "{at}"),

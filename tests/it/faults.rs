@@ -1,5 +1,5 @@
 //! Disk faults while the binary runs. A command that fails reports the fault in one sentence and leaves nothing
-//! incomplete, and the next command succeeds as if there had been no fault. `MOCBAN_FAULT_MOMENTS` sets the number of
+//! incomplete. The next command succeeds as if there had been no fault. `MOCBAN_FAULT_MOMENTS` sets the number of
 //! system calls at which each fault is injected. With 24 the tests take minutes.
 
 use std::path::Path;
@@ -114,7 +114,7 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Fails),
 ];
 
-/// Faults during `check`. A file that cannot be read must not be reported as damaged.
+/// Faults during `check`. An unreadable database must not be reported as damaged.
 const OF_A_CHECK: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Either),
     (Fault::once("read", CATALOG, EIO).and_later(), End::Fails),
@@ -134,7 +134,7 @@ const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("write", "*", ENOSPC).and_later(), End::Fails),
 ];
 
-/// Locks that are refused for more attempts than the roughly one hundred after which SQLite itself gives up.
+/// Locks that are refused 300 times in a row. SQLite itself gives up after about a hundred attempts.
 const LOCKED: &[(Fault, End)] = &[
     (Fault::once("lock", INDEX, EAGAIN).times(300), End::Succeeds),
     (
@@ -366,7 +366,7 @@ fn a_repair_that_fails_on_the_disk_is_reported_and_done_by_the_next() {
     REPAIR.check_all(OF_A_REPAIR, fault_points());
 }
 
-/// Another process holds each lock of the database for longer than SQLite itself waits.
+/// Each lock of the database is refused for longer than SQLite itself waits.
 #[test]
 fn a_run_waits_for_a_locked_catalog() {
     RUN.check_all(LOCKED, 4 * fault_points());

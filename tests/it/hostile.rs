@@ -1,5 +1,5 @@
-//! Bad inputs: each bad pair fails with one clear line and the right error class, without affecting other pairs. Bad
-//! manifests leave no files.
+//! Bad inputs. Each bad pair fails with one clear line and the right error class, and does not affect other pairs. A
+//! bad manifest leaves no files.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::cli::mocban;
 
-/// A replacement for the good mesh or the good print. `None` removes the file.
+/// Replaces the good mesh or the good print. `None` removes the file.
 enum BadInput {
     Mesh(Option<Vec<u8>>),
     Print(Option<Vec<u8>>),

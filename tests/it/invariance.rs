@@ -1,6 +1,7 @@
-//! Invariance of the alignment under changes of unit, pose, vertex order, and position and rotation of the print.
+//! The alignment must not change with the unit, pose and vertex order of the mesh or the position and rotation of the
+//! print.
 //!
-//! Each test aligns original and changed pairs and compares the landmarks in print pixels.
+//! Each test aligns a pair and a changed copy, and compares the landmarks in print pixels.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -92,7 +93,7 @@ impl Motion {
 }
 
 impl Case {
-    /// Returns the largest distance in pixels between the expected and the found landmarks of the changed pair.
+    /// Returns the largest distance in pixels between the expected and found landmarks of the changed pair.
     fn max_error_px(
         &self,
         mesh: &Mesh,
@@ -196,7 +197,7 @@ fn rotated_by_quarters(print: &PrintImage, quarters: usize) -> (PrintImage, Affi
     })
 }
 
-/// Adds white pixels at the left, top, right and bottom. Negative numbers crop the image.
+/// Adds white pixels at the left, top, right and bottom. A negative number crops that side.
 fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintImage, Affine2) {
     let side = |length: usize, added: i64| (length as i64 + added) as usize;
     let width = side(print.rgb.width(), left + right);
@@ -211,7 +212,7 @@ fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintIma
 
 /// Tolerance of changes that leave the data of the stages equal, pixels.
 const EXACT_PX: f64 = 0.02;
-/// Tolerance in pixels for meshes in other rotations. The depth map of a rotated mesh samples different points.
+/// Tolerance in pixels for a rotated mesh. Its depth map samples other points of the mesh.
 const ROTATED_PX: f64 = 0.15;
 /// Tolerance of cropped prints, pixels.
 const CROPPED_PX: f64 = 0.1;

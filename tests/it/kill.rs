@@ -1,6 +1,6 @@
-//! The binary under random `kill -9` until its run is done: no work is lost or stored twice, and the results are the
-//! same bytes. `MOCBAN_KILLS` sets the number of kills and `MOCBAN_KILLED_PAIRS` the number of pairs. With 300 kills
-//! and 200 pairs the test takes some minutes.
+//! Random `kill -9` until a run succeeds: no work is lost or stored twice, and the results are the same bytes.
+//! `MOCBAN_KILLS` sets the number of kills and `MOCBAN_KILLED_PAIRS` the number of pairs. With 300 kills and 200 pairs
+//! the test takes some minutes.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -16,9 +16,8 @@ use crate::uninterrupted::{Expected, files};
 /// Deaths during a claim, before the random kills.
 const DEATHS_WHILE_CLAIMING: u32 = 12;
 
-/// Kills runs while they claim and no pair is leased. From these deaths the catalog concludes that the cause is
-/// outside the pairs. Without them, a pair that happens to be the only leased pair at the first three kills is
-/// correctly quarantined.
+/// Kills runs while they claim a job and no pair is leased. From these deaths the catalog concludes that no pair is the
+/// cause. Without them, a pair that is the only leased pair at the first three random kills is correctly quarantined.
 fn die_while_claiming(project: &Project) {
     for _ in 0..DEATHS_WHILE_CLAIMING {
         let died = run(project, &[])
@@ -29,15 +28,15 @@ fn die_while_claiming(project: &Project) {
     }
 }
 
-/// The time that a run gets before it is killed. On a busy machine half a second may be too short for any progress,
-/// and a pair is then correctly quarantined. The time therefore doubles after every three runs without a new artifact.
+/// Decides how long a run may take before it is killed. On a busy machine, half a second may be too short for any
+/// progress, and a pair would be quarantined. The time therefore doubles after every three runs without a new artifact.
 struct Patience {
     files: usize,
     runs_without_progress: u32,
 }
 
 impl Patience {
-    /// Returns the factor by which the time of the next run is multiplied, from the number of artifacts now.
+    /// Counts the artifacts and returns the factor for the time of the next run.
     fn next(&mut self, project: &Project) -> u64 {
         let folder = project.artifacts_dir();
         let found = if folder.exists() {
@@ -55,8 +54,8 @@ impl Patience {
     }
 }
 
-/// Starts the run repeatedly and kills it after 50 to 500 ms, or later if there is no progress, until a run ends by
-/// itself. Returns the number of kills.
+/// Starts runs until one ends by itself. Kills each after 50 to 500 ms, or later if recent runs made no progress.
+/// Returns the number of kills.
 fn run_with_kills(project: &Project, dice: &mut ChaCha8Rng) -> usize {
     let mut patience = Patience {
         files: 0,
@@ -76,7 +75,7 @@ fn run_with_kills(project: &Project, dice: &mut ChaCha8Rng) -> usize {
                 assert!(ended.success(), "{ended:?}");
                 return kills;
             }
-            // The kill has to come at a random moment, so there is no event to wait for.
+            // The kill must come at a random moment, so the test waits for a time and not for an event.
             std::thread::sleep(Duration::from_millis(1));
         }
         child.kill().expect("killed");

@@ -1,4 +1,5 @@
-//! Imports between the rooms of the crate, checked against the table in `src/lib.rs`, and import cycles among files.
+//! Checks that rooms (top-level modules) import only the rooms that the table in `src/lib.rs` allows, and that files
+//! have no import cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -31,7 +32,7 @@ const IMPURE: &[&str] = &[
 /// Imports that only the unit tests of a room may use, beyond the table.
 const TEST_IMPORTS: &[(&str, &[&str])] = &[];
 
-/// Files that may take part in import cycles. Remove entries when a cycle is broken; add none.
+/// Files that may take part in import cycles. Remove a file when its cycle is broken; add none.
 const CYCLIC_FILES: &[&str] = &[];
 
 /// Returns the files that belong to rooms.
@@ -41,7 +42,7 @@ fn room_files() -> Vec<SourceFile> {
     files
 }
 
-/// Returns the table in the code map: each room with the rooms that it may import.
+/// Returns the table of rooms (top-level modules) in `src/lib.rs`: each room with the rooms that it may import.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
     let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
     let rooms: Vec<(String, String)> = lib
@@ -237,7 +238,7 @@ impl ImportGraph {
             .collect()
     }
 
-    /// Returns the paths used in a piece of code of a file, each from the crate root.
+    /// Returns the paths that a piece of a file's code uses, each from the crate root.
     fn absolute_paths(&self, index: usize, code: &str) -> Vec<Vec<String>> {
         let module = self.files[index].module();
         let below = |base: &[String], paths: Vec<Vec<String>>| {
@@ -280,7 +281,7 @@ impl ImportGraph {
         None
     }
 
-    /// Returns the imports of a file. Re-exports do not count as imports, because they do not use the item.
+    /// Returns the files that a file imports from. A re-export is no import, because it does not use the item.
     fn imports(&self, index: usize) -> BTreeSet<usize> {
         let code = without_visibility_paths(&self.files[index].production_code());
         let mut used = String::new();
@@ -327,7 +328,7 @@ impl ImportGraph {
     }
 }
 
-/// Replaces `pub(in path)` by `pub(crate)`: a visibility is not an import.
+/// Replaces `pub(in path)` by `pub(crate)`, because the path of a visibility is not an import.
 fn without_visibility_paths(code: &str) -> String {
     let mut parts = code.split("pub(in ");
     let mut text = parts.next().unwrap_or_default().to_owned();
@@ -358,12 +359,12 @@ fn files_do_not_import_each_other_in_cycles() {
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }
 
-/// Limit on the number of files that the code map lists for following one pair through the program, and limit on their
-/// lines without unit tests.
+/// Limits on the list of files in `src/lib.rs` for following one pair: their number, and their lines without unit
+/// tests.
 const MAX_WALK_FILES: usize = 18;
 const MAX_WALK_LINES: usize = 4500;
 
-/// Returns the files that start the list items of a section of the code map, relative to `src`.
+/// Returns the files at the start of list items below a heading in `src/lib.rs`. Paths are relative to `src`.
 fn listed_files(heading: &str) -> Vec<String> {
     let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
     let heading = format!("//! ## {heading}");

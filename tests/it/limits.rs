@@ -1,4 +1,4 @@
-//! Pairs that kill their process, hang, or need too much memory, and runs with too many failures.
+//! Pairs that kill their process, hang, or need too much memory, and runs in which too many pairs fail.
 
 use std::process::Stdio;
 
@@ -13,7 +13,7 @@ fn status(project: &Project) -> Vec<JobStatus> {
     all.iter().map(|pair| pair.results.status).collect()
 }
 
-/// Starts runs until one ends by itself. Returns the number of runs that died before, and the exit code of the last
+/// Starts runs until one ends by itself. Returns the number of earlier runs, which died, and the exit code of the last
 /// run.
 fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
     for deaths in 0..10 {
@@ -36,7 +36,7 @@ fn a_pair_that_kills_its_process_three_times_is_quarantined_and_the_others_finis
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = project(dir.path(), "p", "3");
         let (deaths, code) = deaths(&project, jobs, "fit:computed@upright-0001");
-        // The first death may be blamed on two pairs, because another pair was running or was not stored yet.
+        // The first death may count against two pairs, because another pair was running or was not stored yet.
         assert!((3..=4).contains(&deaths), "{deaths} deaths");
         assert_eq!(code, Some(3));
         let all = pairs(&project);

@@ -1,4 +1,4 @@
-//! Messages of commands if something is missing, exists already, is too long to list, or is interrupted.
+//! Messages of commands if something is missing, exists already or is too long to list, or the command is interrupted.
 
 use std::process::{Command, Stdio};
 

@@ -13,7 +13,7 @@ use crate::resume::{copy, pairs, project};
 const PAIRS: u64 = 4;
 /// Most pixels of each print; each has only a few less.
 const PIXELS: usize = 5_000_000;
-/// Memory limit of all pairs together: enough for one pair, at up to 50 bytes per pixel, and too little for two pairs.
+/// Memory limit of a run. One pair needs up to 50 bytes per pixel, so one pair fits, but not two.
 const MEMORY_MIB: u64 = 400;
 
 /// Scales a print up to nearly [`PIXELS`] pixels.
@@ -31,7 +31,7 @@ fn enlarge(path: &Path) {
     std::fs::write(path, jpeg_rgb8(&large, 90)).expect("written");
 }
 
-/// Runs a project with as many workers as pairs. Returns the peak memory in MiB.
+/// Runs a project with one worker per pair. Returns the peak memory in MiB.
 fn peak_mib(project: &Project, memory: &str) -> u64 {
     let jobs = PAIRS.to_string();
     let small = ["--set", "depth.longest_px=96"];

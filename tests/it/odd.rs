@@ -1,4 +1,4 @@
-//! Unusual states of the disk: each gives one clear sentence that names the file and the remedy, and no data is lost.
+//! Unusual states of the disk. Each gives one clear sentence that names the file and the remedy, and no data is lost.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::process::CommandExt as _;
@@ -9,8 +9,7 @@ use mocban::store::Project;
 use crate::check::{at, below, done, exported, sql};
 use crate::cli::{binary, call, empty, mocban};
 
-/// Overwrites the part of the catalog from `from` to `to` eighths of its length with garbage. Returns its former
-/// content.
+/// Overwrites the catalog from `from` eighths to `to` eighths of its length with garbage. Returns the former content.
 pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<u8> {
     let path = project.catalog_path();
     let intact = std::fs::read(&path).expect("read");
@@ -60,7 +59,7 @@ fn file_that_is_not_a_catalog_is_reported_in_a_sentence() {
             assert_eq!(std::fs::read(&file).expect("read"), bytes);
         }
     }
-    // A kill at the start of an import leaves an empty file. The import can be repeated.
+    // A kill at the start of an import leaves an empty file. The next import succeeds.
     std::fs::write(&file, "").expect("written");
     mocban(dir.path(), &import).expect(0);
     std::fs::remove_file(&file).expect("removed");
@@ -151,7 +150,7 @@ fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
     call(&mut command)
 }
 
-/// Removes the permission to write below a directory, or restores it for the owner.
+/// Removes the write permission below a directory, or restores it for the owner.
 fn set_writable(dir: &Path, writable: bool) {
     use std::os::unix::fs::PermissionsExt as _;
     for entry in std::fs::read_dir(dir).expect("a folder") {
@@ -189,7 +188,7 @@ fn read_only_project_can_be_read() {
         plain(&refused.err, "cannot be written to; status, show, report");
     }
 
-    // A write-ahead log that was never checkpointed must not be ignored silently.
+    // If the write-ahead log was never checkpointed, it must not be ignored silently.
     set_writable(project.dir(), true);
     std::fs::write(project.dir().join("catalog.sqlite-wal"), [7; 64]).expect("written");
     set_writable(project.dir(), false);

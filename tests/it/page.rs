@@ -14,7 +14,7 @@ use crate::resume::{copy, project, run};
 /// Number of pairs of the shared project, with up to four results each.
 const PAIRS: &str = "15";
 
-/// Copies a project in which every pair has results. The results are computed once for all tests.
+/// Copies a project in which every pair has results. All tests copy the same project.
 pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
     static MADE: OnceLock<(tempfile::TempDir, Project)> = OnceLock::new();
     let (_, made) = MADE.get_or_init(|| {
@@ -199,7 +199,7 @@ pub(crate) fn answer(event: &str, item: &Value, verdict: &str) -> Value {
     })
 }
 
-/// Sends a request with exactly these headers, and reads the whole response.
+/// Sends a request with only the given headers and reads the whole response.
 pub(crate) fn send(
     to: SocketAddr,
     method: &str,

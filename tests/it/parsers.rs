@@ -1,4 +1,5 @@
-//! Every parser on valid and on corrupted files: an error in one sentence, never a panic, never an invalid mesh or image.
+//! Every parser on valid and on corrupted files. A parser may give an error in one sentence, but never panics and never
+//! returns an invalid mesh or image.
 
 use std::path::Path;
 
@@ -56,7 +57,7 @@ fn read_list(name: &str, bytes: &[u8]) -> Result<(), String> {
     })
 }
 
-/// Loads TOML as a settings file, and other text line by line as `--set` flags.
+/// Loads a TOML file as settings, or any other text line by line as `--set` flags.
 fn read_settings(name: &str, bytes: &[u8]) -> Result<(), String> {
     let dir = crate::cli::empty();
     let file = dir.path().join("mocban.toml");
@@ -87,7 +88,7 @@ fn parsers() -> [(&'static str, Vec<NamedFile>, Parser); 4] {
     ]
 }
 
-/// Valid files that are rejected, because the range of signed samples is not defined.
+/// Valid files that are refused, because no range is defined for signed samples.
 const REFUSED: [&str; 1] = ["grey_signed16.tif"];
 
 #[test]
@@ -148,8 +149,7 @@ fn the_fuzzing_corpus_holds_valid_files() {
     }
 }
 
-/// Regression test for a finding of the fuzzer: text from a file reached the terminal together with its control
-/// sequences.
+/// Found by fuzzing: text from a file reached the terminal with its control sequences.
 #[test]
 fn control_sequences_in_files_are_escaped_in_messages() {
     for (read, name, bytes) in [

@@ -1,9 +1,7 @@
-//! Power cuts while the binary runs: the state of the disk after each sync is rebuilt, opened, checked, and run to the
-//! end.
+//! Power cuts while the binary runs. The state of the disk after each sync is rebuilt, checked, and its run completed.
 //!
-//! The bytes of a file are on the disk once the file is synced. Depending on the file system, the name of the file is
-//! on the disk immediately or only after its folder is synced. Both cases are tested, and bytes and names may reach
-//! the disk in any order.
+//! Once a file is synced, its bytes are on the disk. Depending on the file system, the file's name is on the disk at
+//! once or only after its folder is synced. Both cases are tested, and bytes and names may reach the disk in any order.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt as _;
@@ -30,7 +28,7 @@ struct Entry {
 
 type Folders = BTreeMap<Inode, BTreeMap<String, Entry>>;
 
-/// The state of a disk: the names in each folder, and for each file the path of a copy of its bytes.
+/// The state of a disk: the names in each folder, and a copy of the bytes of each file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Disk {
     root: Inode,
@@ -58,8 +56,7 @@ enum Names {
 }
 
 impl Disk {
-    /// Returns the state in which every file of a project is on the disk. `bytes` is a copy of the project that does
-    /// not change.
+    /// Returns the state in which every file of a project is on the disk. `bytes` is an unchanging copy of the project.
     fn of(project: &Path, bytes: &Path) -> Self {
         let mut disk = Self {
             root: inode(project),
@@ -151,7 +148,7 @@ struct Recorded {
 }
 
 impl Recorded {
-    /// Runs a command and records its syncs below a folder. `notes` is a folder that does not exist yet.
+    /// Runs a command and records its syncs below a folder. `notes` is a new folder for the records.
     fn of(root: &Path, notes: &Path, start: Disk, command: &mut Command) -> Self {
         std::fs::create_dir(notes).expect("a folder");
         command.env("SHADOW_OF", root).env("SHADOW_IN", notes);
@@ -161,7 +158,7 @@ impl Recorded {
         Self { start, syncs }
     }
 
-    /// Returns the successive states of the disk, each different from the one before it.
+    /// Returns the states of the disk in order of time, without repetitions.
     fn disks(&self, names: Names) -> Vec<Disk> {
         let mut disks = vec![self.start.clone()];
         let mut disk = self.start.clone();
@@ -203,7 +200,7 @@ impl Comparison {
         Recorded::of(project.dir(), &root.join("notes"), start, &mut command)
     }
 
-    /// Opens the project on a disk, checks it, completes its run, and compares the results.
+    /// Writes the project from a disk, checks it, completes its run, and compares the results.
     fn assert_recovers(&self, disk: &Disk, name: &str) {
         let parent = self.dir.path().join(name);
         let path = parent.join("p");
@@ -244,7 +241,7 @@ fn all(recorded: &Recorded) -> Vec<(String, Disk)> {
     named(Names::Late).chain(named(Names::Early)).collect()
 }
 
-/// Returns about `wanted` of the disks, evenly spaced. The step is odd because names and bytes alternate.
+/// Returns about `wanted` of the disks, evenly spaced. The step is odd because changes of names and of bytes alternate.
 fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
     let step = disks.len().div_ceil(wanted) | 1;
     disks.into_iter().step_by(step).collect()
@@ -287,8 +284,8 @@ fn all_stages_reach_the_disk_in_their_order() {
     );
 }
 
-/// A process creates a folder of artifacts and dies before the name of the folder is on the disk. The next process
-/// finds the folder.
+/// A process creates the folders of artifacts and dies before their names are on the disk. The next process finds the
+/// folders.
 #[test]
 fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
     let comparison = Comparison::new("1");
@@ -337,7 +334,7 @@ fn an_import_is_durable_when_it_ends_and_can_be_repeated_before() {
     }
 }
 
-/// Returns the command that imports the data beside a project that does not exist yet.
+/// Returns the command that imports the data into a new project beside it.
 fn import(root: &Path) -> Command {
     let mut command = binary();
     command.arg("-C").arg(root.join("p")).arg("import");

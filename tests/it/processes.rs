@@ -1,4 +1,4 @@
-//! Several processes on one catalog, and processes that are suspended, held at a failpoint, or asked to stop.
+//! Several processes on one catalog, and processes that are suspended, held at a failpoint, or told to stop.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -15,8 +15,7 @@ use serde_json::Value;
 use crate::cli::{call, mocban};
 use crate::resume::{attempts, pairs, project, results, run, run_with_progress, stages_done};
 
-/// Shortens leases from nearly a minute to about a second, and the intervals that depend on the lease by the same
-/// factor.
+/// Shortens leases from nearly a minute to about a second, and the intervals that depend on leases by the same factor.
 const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "50");
 
 /// Most pairs of a test in this module.
@@ -60,9 +59,9 @@ impl Fixture {
         (child, file)
     }
 
-    /// Returns a project whose run with one worker is suspended after the files of the first stage were synced and
-    /// before its rows were written. If the signal arrives while another thread writes a heartbeat, the process keeps
-    /// the catalog locked, and the function tries again.
+    /// Returns a project whose run is suspended between the sync of the first stage's files and the write of its rows.
+    /// Starts again if another thread of the run was writing a heartbeat: the suspended process then keeps the catalog
+    /// locked.
     fn suspended(count: &str) -> (Self, Running) {
         loop {
             let fixture = Self::new(count);
@@ -96,10 +95,10 @@ impl Fixture {
         stderr.matches("asked to stop").count()
     }
 
-    /// Asserts that the results are those of an uninterrupted run, and that no stage was stored twice.
+    /// Asserts that the results equal those of an uninterrupted run and no stage was stored twice.
     fn assert_uninterrupted_results(&self) {
         let found = results(&self.project);
-        // The lines are in the order of the pairs, and a smaller dataset consists of the first pairs of a larger one.
+        // Results are in the order of the pairs, and a small dataset consists of the first pairs of a large one.
         assert_eq!(found, UNINTERRUPTED[..found.len()]);
         assert!(attempts(&self.project).iter().all(|count| *count == 1));
     }
@@ -157,7 +156,7 @@ impl Drop for Running {
     }
 }
 
-/// Returns whether a process is stopped by a signal (`proc_pid_stat(5)`: the state follows the name in parentheses).
+/// Returns whether a signal has stopped a process (`proc_pid_stat(5)`: the state follows the name in parentheses).
 fn is_suspended(pid: u32) -> bool {
     let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat"));
     stat.is_ok_and(|stat| {
@@ -179,8 +178,7 @@ fn two_processes_share_the_work() {
     assert!(refused.err.contains("in use by pid"), "{}", refused.err);
 
     let mut second = Running::start(&mut joined(&fixture.project));
-    // The second process finishes every pair that the held process has not leased, and then waits for the held
-    // process.
+    // The second process finishes the three pairs that the held process has not leased. Then it waits for that process.
     second.wait_until("the others are done", || {
         stages_done(&fixture.project) == 12
     });
@@ -231,7 +229,7 @@ fn a_late_checkpoint_of_a_suspended_process_changes_nothing() {
     fixture.assert_uninterrupted_results();
 }
 
-/// A process that is suspended inside a transaction keeps all others from writing until it continues.
+/// While a process is suspended inside a transaction, no other process can write.
 #[test]
 fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     let fixture = Fixture::new("2");
@@ -254,8 +252,8 @@ fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     fixture.assert_uninterrupted_results();
 }
 
-/// No other process takes back the leases of the suspended process. The catalog still refuses its late write, and it
-/// continues under a new worker id.
+/// No other process takes over the suspended process's leases. The catalog still refuses its late write, and the
+/// process continues under a new worker id.
 #[test]
 fn a_process_suspended_past_its_leases_drops_its_work_and_continues() {
     let (fixture, mut suspended) = Fixture::suspended("2");
@@ -286,7 +284,7 @@ fn pairs_of_a_dead_process_are_recovered_by_a_living_one() {
     fixture.assert_uninterrupted_results();
 }
 
-/// Leases have their full length in this test, but the lock proves that no other process is alive.
+/// Leases have their full length here. They end early because the run lock proves that no other process is alive.
 #[test]
 fn pairs_of_a_dead_process_are_recovered_at_once_by_the_only_process() {
     let fixture = Fixture::new("2");
@@ -353,7 +351,7 @@ fn a_second_signal_stops_at_once_and_leaves_all_resumable() {
 
 #[test]
 fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
-    // After the last stage nothing is left to compute, but the pair is not done until its files are written.
+    // After `register` nothing is left to compute, but the pair is not done before its files are written.
     for (at, stored, next) in [
         ("depth:written", 1, Stage::Depth),
         ("register:written", 3, Stage::Register),
@@ -364,7 +362,7 @@ fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
         child.wait_until("it drains", || fixture.stop_requests() == 1);
         child.send(Signal::INT);
         let (code, json, stderr) = child.end();
-        // A stage is stored only after the files of this stage and of all earlier stages were written.
+        // A stage is stored only after its files and the files of all earlier stages were written.
         let ended = (code, &json["stages"], &json["done"]);
         assert_eq!(ended, (Some(130), &stored.into(), &0.into()), "{stderr}");
         let pair = &pairs(&fixture.project)[0];

@@ -1,4 +1,4 @@
-//! The job queue through the real binary: changed files and settings, missing files, two processes.
+//! The job queue through the real binary: changed files and settings, missing files, and two processes.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ fn print(project: &Project, index: usize) -> PathBuf {
     project.input_path(&pairs(project)[index].results.attributes.print_path)
 }
 
-/// Appends a byte, which changes the content hash but not the decoded mesh or image.
+/// Appends a byte. That changes the file's hash, but not the decoded mesh or image.
 fn append_byte(path: &std::path::Path) {
     let mut file = std::fs::OpenOptions::new()
         .append(true)

@@ -1,4 +1,4 @@
-//! Numbers of report and export after a real run, recomputed from the exported files.
+//! Numbers in reports and exports after a real run, recomputed from the exported files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use serde_json::Value;
 /// An arbitrary time.
 const NOW: i64 = 1_700_000_000_000;
 
-/// A run of two demo pairs and one whose mesh is empty, with its report and export.
+/// A finished run of three demo pairs, one of them with an empty mesh.
 struct FinishedRun {
     dir: tempfile::TempDir,
     project: Project,
@@ -162,7 +162,7 @@ fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Computes `IoU`, Dice and box `IoU` of two masks by counting pixels. A pixel of 255 is set.
+/// Computes `IoU`, Dice and bounding-box `IoU` of two masks by counting pixels with the value 255.
 fn agreement(a: &Grid<u8>, b: &Grid<u8>) -> [f64; 3] {
     let set = |grid: &Grid<u8>, x, y| grid.at(x, y) == 255;
     let (mut both, mut either, mut sum) = (0.0, 0.0, 0.0);

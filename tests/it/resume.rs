@@ -1,5 +1,5 @@
-//! The binary killed at every failpoint and run again: no stage is stored twice or lost, and the results are the same.
-//! This file also holds the helpers with which other modules run projects and read their results.
+//! The binary is killed at every failpoint and run again. No stage is stored twice or lost, and the results are the
+//! same. This file also contains helpers of other modules for running projects and reading results.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -13,10 +13,9 @@ use crate::cli::{binary, call, mocban};
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
 
-/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. The
-/// second value is the last stage of a run that completes before the failpoint is set, for failpoints that need a
-/// stage to be claimed by itself: stages computed together are stored together. Failpoints that need a file to be
-/// written come early, because existing files are not written again.
+/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. If a
+/// second value is given, a run first completes that stage, so that the next stage is claimed and stored by itself.
+/// Failpoints at file writes come early, because existing files are not written again.
 const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:claiming", None),
     ("fit:claimed", None),
@@ -97,7 +96,7 @@ pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
     })
 }
 
-/// Returns the numbers, files and hashes of the results, without times. Checks each artifact against its hash.
+/// Returns the results without times as lines of numbers, files and hashes. Checks each artifact against its hash.
 pub(crate) fn results(project: &Project) -> Vec<String> {
     let mut lines = Vec::new();
     for pair in pairs(project) {
@@ -145,7 +144,7 @@ pub(crate) fn attempts(project: &Project) -> Vec<usize> {
     counts
 }
 
-/// Returns the number of completed stages of all pairs together. A run may be in progress.
+/// Returns how many stages of all pairs are completed. A run may be in progress.
 pub(crate) fn stages_done(project: &Project) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
@@ -207,7 +206,7 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
 fn stages_are_computed_while_files_of_earlier_stages_are_written() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let broken = project(dir.path(), "broken", "1");
-    // The file of the depth map is never finished. Later stages are computed only if they do not wait for this file.
+    // The file of the depth map is never finished. `register` is reached only if no stage waits for this file.
     let died = run(&broken, &["-j", "1"])
         .env("MOCBAN_HOLD_AT", "depth:written")
         .env("MOCBAN_HOLD_FILE", dir.path().join("held"))

@@ -1,4 +1,5 @@
-//! Manual alignments: stored and exported, scored like results, hidden from duplicates.
+//! Manual alignments are stored, exported and scored like results. A duplicate item does not show them before the
+//! answer.
 
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;
@@ -84,7 +85,7 @@ fn a_manual_alignment_is_stored_with_the_result_and_exported() {
         assert_eq!(manual["print_from_mesh"], json!(second.print_from_mesh));
         assert_ne!(manual["print_from_mesh"], line["print_from_mesh"]);
     }
-    // The page and `show` report the alignment, and the editor starts from it.
+    // The page and `show` report the alignment. The editor starts with it.
     let near = |a: &Value, b: f64| (a.as_f64().expect("a number") - b).abs() < 1e-6;
     let summary = &page.queue()[0]["manual_alignment"];
     assert!(near(&summary["rotation_deg"], 0.0), "{summary}");

@@ -1,4 +1,4 @@
-//! The review page in a browser: keyboard only, reload, two reviewers, lost server, manual alignment.
+//! The review page in a browser: keyboard use, reload, two reviewers, a lost server, manual alignment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{NO_CHECKS, Page, read_project};
 
-/// Without attention checks, the log holds exactly what was pressed. Without a minimum view time, tests do not wait.
+/// Options for simple tests: the log holds only pressed verdicts, and no test waits for a minimum view time.
 pub(crate) const PLAIN: [&str; 6] = [
     "--attention-checks",
     "0",
@@ -50,7 +50,7 @@ fn shown(tab: &Tab<'_>) -> String {
         .to_owned()
 }
 
-/// Presses a verdict key once the next items are prefetched, and waits for the next item.
+/// Waits until the next item is prefetched, presses a verdict key, and waits until the next item is shown.
 pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     let before = shown(tab);
     tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
@@ -62,7 +62,7 @@ fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
 
-/// Returns the current verdicts and reasons of a reviewer by the number of the action that stored them.
+/// Returns a reviewer's current verdicts and reasons, keyed by the number of the action that stored them.
 fn current_verdicts(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let events = output
@@ -295,7 +295,7 @@ fn keys_work_as_soon_as_a_dialog_is_closed() {
     on_a_page(|_, tab| {
         tab.key("KeyJ");
         tab.wait("document.activeElement.id === 'jump-to'");
-        // During the same task of the event loop, the focus is still inside the closed dialog.
+        // Both statements run in one task of the event loop. In it, the focus stays inside the closed dialog.
         tab.eval(
         "document.getElementById('jump').close();
         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));

@@ -21,7 +21,7 @@ const REDACTED: [&str; 12] = [
     "canvas_from_view",
 ];
 
-/// Replaces the values of [`REDACTED`] fields by the names of the fields, and rounds other numbers to three decimals.
+/// Replaces the value of each [`REDACTED`] field by the field's name, and rounds other floats to three decimals.
 fn redacted(value: Value) -> Value {
     match value {
         Value::Object(object) => {

@@ -1,4 +1,4 @@
-//! Attacks on the review server: requests that do not come from its own page are rejected.
+//! Attacks on the review server. It rejects requests that do not come from its own page.
 
 use mocban::store::Project;
 use serde_json::{Value, json};

@@ -1,5 +1,5 @@
-//! The review server under random `kill -9`: no acknowledged verdict is lost or stored twice.
-//! `MOCBAN_REVIEW_KILLS` sets the number of kills.
+//! The review server under random `kill -9`. No acknowledged verdict is lost or stored twice. `MOCBAN_REVIEW_KILLS`
+//! sets the number of kills.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc;
@@ -25,7 +25,7 @@ struct RequestLog {
 }
 
 impl RequestLog {
-    /// Answers random items until the server is gone; sometimes undoes the last answer.
+    /// Answers random items until the server is gone. Sometimes undoes the last answer.
     fn review(&mut self, site: &Site, queue: &[Value], rng: &mut ChaCha8Rng) {
         if let Some((path, body)) = self.open.take()
             && !self.send(site, path, body)
@@ -65,8 +65,8 @@ impl RequestLog {
     }
 }
 
-/// Returns every event in the log with its verdict, or with `None` if the verdict was undone. Fails if an event is
-/// stored twice for a metric.
+/// Returns the verdict of every event in the log, or `None` if it was undone. Fails if an event has two rows for one
+/// metric.
 fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let mut rows = BTreeSet::new();

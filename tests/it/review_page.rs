@@ -1,4 +1,4 @@
-//! What the review server stores and reveals: verdicts belong to what was shown, items are blind, and a restart
+//! What the review server stores and reveals. A verdict belongs to what was shown, items are blind, and a restart
 //! changes nothing.
 
 use std::collections::{BTreeMap, BTreeSet};

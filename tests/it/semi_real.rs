@@ -1,4 +1,4 @@
-//! Photographed prints with reliefs carved from their own ink, through all four stages.
+//! Aligns photographed prints with reliefs generated from their own ink, through all four stages.
 
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoPair, PairGenerator, Tier};
@@ -11,7 +11,7 @@ use mocban::report::{
 use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
-/// Largest landmark error in percent of the character height; the ground truth is accurate to about a pixel.
+/// Largest landmark error in percent of the character height. The ground truth is accurate to about a pixel.
 const MAX_LANDMARKS_PCT: f64 = 3.0;
 
 pub(crate) fn settings() -> Settings {
@@ -19,7 +19,7 @@ pub(crate) fn settings() -> Settings {
     loaded.config.stages
 }
 
-/// Returns the errors of all metrics. The pair is aligned without its unit and its carved side.
+/// Aligns a pair without its unit and carved side. Returns the errors of all metrics.
 fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
     let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;

@@ -1,4 +1,4 @@
-//! The C libraries of `tests/faults`, compiled once and preloaded into the binary.
+//! The C libraries of `tests/faults`. They are compiled once and preloaded into the binary.
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -8,7 +8,7 @@ use mocban::store::Project;
 use crate::check::{done, sql};
 use crate::cli::{binary, call, empty, mocban};
 
-/// Patterns of text that differs between calls, each with its replacement in snapshots.
+/// Patterns of text that differs between calls, each with the text that replaces it in snapshots.
 const VARYING: [(&str, &str); 7] = [
     (r"\S*/debug/mocban|\S*/release/mocban", "mocban"),
     (r"/\S*/\.tmp[A-Za-z0-9]+", "[DIR]"),
@@ -42,7 +42,7 @@ fn assert_text(name: &str, text: &str, filters: &[(&str, &str)]) {
     settings.bind(|| insta::assert_snapshot!(name, text));
 }
 
-/// Calls the binary and returns the exit code and both streams as one text.
+/// Runs the binary. Returns both streams and the exit code as one text.
 pub(crate) fn transcript(dir: &Path, args: &[&str]) -> String {
     let mut command = binary();
     command.current_dir(dir).args(args);
@@ -77,7 +77,7 @@ pub(crate) fn write(dir: &Path, name: &str, text: &str) {
 
 pub(crate) const TWO_PAIRS: &str = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
 
-/// A directory with the project `p` of two pairs whose files do not exist.
+/// Creates a directory with a project `p` of two pairs whose files do not exist.
 pub(crate) fn imported() -> tempfile::TempDir {
     let dir = empty();
     write(dir.path(), "pairs.csv", TWO_PAIRS);
@@ -122,7 +122,7 @@ fn help_of_every_command() {
     }
 }
 
-/// The section `run` of `config show`; the method's settings have tests of their own.
+/// Only the section `run` of `config show` is compared; other tests check the other sections.
 #[test]
 fn settings_with_origins_and_explanations() {
     let dir = empty();

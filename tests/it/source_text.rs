@@ -16,7 +16,7 @@ pub(crate) struct SourceFile {
 }
 
 impl SourceFile {
-    /// Returns the code without comments and unit tests. Returns an empty text for a test file.
+    /// Returns the code without comments and unit tests. Returns an empty text if the file contains only tests.
     pub(crate) fn production_code(&self) -> String {
         if self.is_test {
             return String::new();
@@ -40,7 +40,7 @@ impl SourceFile {
         self.text[..test_module_start(&self.text)].lines().count()
     }
 
-    /// Returns the module path from the crate root. The path is empty for `lib.rs` and `main.rs`.
+    /// Returns the module's path from the crate root. The path of `lib.rs` and `main.rs` is empty.
     pub(crate) fn module(&self) -> Vec<String> {
         let name = self.name.trim_end_matches(".rs");
         let mut parts: Vec<String> = name.split('/').map(str::to_owned).collect();
@@ -114,7 +114,7 @@ pub(crate) fn source_files() -> Vec<SourceFile> {
         .collect()
 }
 
-/// Returns the modules declared as `#[cfg(test)] mod NAME;`, as paths below `src` without an extension.
+/// Returns the modules declared as `#[cfg(test)] mod NAME;`, as file paths below `src` without an extension.
 fn test_modules(name: &str, text: &str) -> Vec<String> {
     let stem = name.trim_end_matches(".rs");
     let dir = ["/mod", "lib", "main"]
@@ -135,7 +135,7 @@ fn test_modules(name: &str, text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Returns the offset of the inline test module, or the length of the text.
+/// Returns the offset of the inline test module. Returns the length of the text if there is none.
 fn test_module_start(text: &str) -> usize {
     let found = text
         .match_indices("#[cfg(test)]\n")
@@ -160,7 +160,7 @@ pub(crate) fn identifier(text: &str) -> String {
     text.chars().take_while(is_part).collect()
 }
 
-/// Returns every path that follows `prefix`, with groups in braces expanded: `crate::{a::B, c}` gives `a::B` and `c`.
+/// Returns every path that follows `prefix` and expands groups in braces: `crate::{a::B, c}` gives `a::B` and `c`.
 pub(crate) fn paths_after(code: &str, prefix: &str) -> Vec<Vec<String>> {
     code.match_indices(prefix)
         .filter(|(at, _)| {
@@ -193,7 +193,7 @@ fn expand_paths(text: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Splits the inside of a group at its top-level commas, up to the closing brace.
+/// Splits the inside of a brace group, up to the closing brace, at commas that are not in inner groups.
 fn group_members(text: &str) -> Vec<String> {
     let mut depth = 0;
     let mut members = vec![String::new()];

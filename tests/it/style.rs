@@ -1,4 +1,4 @@
-//! Conventions that hold for every source file: names, lengths and documentation.
+//! Conventions for every source file: names, lengths and documentation.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use crate::source_text::{identifier, package_dir, rust_files, source_files};
 /// Longest source file, tests included.
 const MAX_LINES: usize = 450;
 
-/// Type names that are declared more than once. Remove a name here when it is unique; add none.
+/// Names of types that are declared more than once. Remove a name here when it is unique; add none.
 const REPEATED_TYPES: &[&str] = &[];
 
 /// Names of associated types, which repeat by nature.

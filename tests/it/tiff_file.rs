@@ -1,4 +1,4 @@
-//! Writes uncompressed TIFF files of kinds that the `image` crate cannot encode.
+//! Writes kinds of uncompressed TIFF files that the `image` crate cannot encode.
 
 /// Photometric interpretation: 0 is white.
 pub(crate) const WHITE_IS_ZERO: u16 = 0;
@@ -141,7 +141,7 @@ impl TiffFile {
         self.with_tags(&tags)
     }
 
-    /// Writes the header, the pixels, the values that are too long for a tag, and the tags.
+    /// Writes the header, the pixels, the values that do not fit in their tags, and the tags.
     fn with_tags(&self, tags: &[(u16, TagValue)]) -> Vec<u8> {
         let mut bytes = b"II*\0\0\0\0\0".to_vec();
         bytes.extend(&self.data);

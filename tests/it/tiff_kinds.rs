@@ -69,7 +69,7 @@ fn grey_with_alpha_is_composited_on_white() {
         extra: Some(2),
         ..TiffFile::grey(4, 1, 8, data.clone())
     };
-    // Unassociated alpha, premultiplied alpha, and an unknown extra sample. The unknown sample is ignored.
+    // Unassociated alpha, premultiplied alpha, and an extra sample of unknown meaning, which is ignored.
     for (extra, levels) in [
         (2, [0, 65535, 25700, 52428]),
         (1, [0, 65535, 25700, 52428]),

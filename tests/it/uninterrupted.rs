@@ -1,4 +1,4 @@
-//! The results of an uninterrupted run, with which the results of an interrupted run are compared.
+//! The results of an uninterrupted run, to be compared with those of an interrupted run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use mocban::store::Project;
 use crate::cli::{call, mocban};
 use crate::resume::{attempts, copy, pairs, project, results, run};
 
-/// A project that has not run, and the results of an uninterrupted run of that project.
+/// A project that has not run, and the expected results of its run.
 pub(crate) struct Comparison {
     pub(crate) dir: tempfile::TempDir,
     pub(crate) fresh: Project,
@@ -49,7 +49,7 @@ pub(crate) struct Expected {
     artifacts: Vec<PathBuf>,
 }
 
-/// Returns the content of every file below a folder by its path relative to the folder.
+/// Returns the content of every file below a folder, by path relative to the folder.
 pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -103,7 +103,7 @@ impl Expected {
         &self.project
     }
 
-    /// Asserts that a project whose interrupted run was completed has the same results.
+    /// Asserts that a project has the same results after its interrupted run was completed.
     pub(crate) fn assert_met_by(&self, resumed: &Project) {
         for pair in pairs(resumed) {
             assert_eq!(pair.results.status, JobStatus::Done);

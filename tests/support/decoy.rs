@@ -6,9 +6,9 @@ use mocban::mesh::Mesh;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Amplitude of the height noise of an uncarved plate, as a share of the character's height (about 15 µm).
+/// Range of the height noise of an uncarved plate, as a share of the character's height (about 15 µm).
 const PLATE_NOISE: f64 = 0.0016;
-/// Depth below which a vertex of a closed scan belongs to the base or the walls, as a share of the character's height.
+/// Depth, as a share of the character's height, below which the vertices of a closed scan belong to its base or walls.
 const BASE_DEPTH: f64 = 0.165;
 
 /// A kind of pair without a correct alignment.
@@ -48,7 +48,7 @@ pub(crate) struct DecoyPair {
 /// Makes a decoy from a pair.
 ///
 /// # Errors
-/// Fails when an image cannot be encoded or decoded.
+/// Returns an error if an image cannot be encoded or decoded.
 pub(crate) fn decoy_pair(
     pairs: &PairGenerator,
     kind: Decoy,
@@ -87,7 +87,7 @@ fn print_of_another_character(
     }
 }
 
-/// Reflects the mesh in x and reverses its faces, so that they still face outward.
+/// Reflects the mesh in x and reverses its faces, so that all faces still face outward.
 fn mirrored(mut mesh: Mesh) -> Mesh {
     mesh.vertices.map_in_place(|[x, y, z]| [-x, y, z]);
     for [_, b, c] in mesh.triangles.iter_mut() {
@@ -96,7 +96,7 @@ fn mirrored(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// Moves every vertex of the carved face onto the plane of the stroke tops and adds noise.
+/// Flattens the carved face: moves its vertices onto the plane of the stroke tops and adds noise.
 fn flattened(pair: &DemoPair, seed: u64) -> Mesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut mesh = pair.mesh.clone();

@@ -1,4 +1,4 @@
-//! apalis-sqlite under the load of `benches/queue`, in four ways.
+//! Runs apalis-sqlite under the load of `benches/queue`, in four ways.
 //!
 //! `peers-queue FILE PAIRS WORKERS LOAD SET-UP` creates a database with the tasks and runs them, WORKERS at a time. It
 //! prints the seconds from the first claim to the last acknowledged task.
@@ -10,7 +10,7 @@
 //!   at least one connection per worker.
 //!
 //! All connections use a write-ahead log and `synchronous=FULL`. `SqliteStorage::setup` would turn syncing off on its
-//! connection, so it gets a pool of its own. All tasks exist from the start.
+//! connection, so a separate pool is used for it. All tasks exist from the start.
 
 mod load;
 
@@ -65,7 +65,7 @@ async fn pool(path: &str, connections: u32) -> anyhow::Result<SqlitePool> {
     Ok(pool.connect_with(options).await?)
 }
 
-/// Creates the tables and the tasks. The connections used for this are closed afterwards.
+/// Creates the tables and the tasks. Closes its connections afterwards.
 async fn fill(path: &str, pairs: u32, load: Load, config: &Config) -> anyhow::Result<()> {
     let pool = pool(path, 1).await?;
     SqliteStorage::setup(&pool).await?;

@@ -1,4 +1,4 @@
-//! Runs arbitrary bytes as a mesh, with a print selected by the first byte, through all four stages.
+//! Runs all four stages on arbitrary bytes as a mesh. The first byte selects the print.
 
 #![no_main]
 

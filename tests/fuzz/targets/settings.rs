@@ -1,5 +1,5 @@
 //! Reads arbitrary text as a settings file, as `--set` and as environment variables: gives valid settings, or an error
-//! with the position.
+//! that names the position.
 
 #![no_main]
 
