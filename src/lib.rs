@@ -3,10 +3,10 @@
 //! # Code map
 //!
 //! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** runs four **stages**:
-//! `fit`, `depth`, `normalize` and `register`. A **worker** is one process that runs stages. It leases the pair, runs
-//! the remaining stages and writes a **checkpoint** after each one while the next stage is computed: first the files,
-//! then one transaction, which may hold the checkpoints of several pairs. Stages are pure functions. The catalog is the
-//! only module with SQL, the store the only one with artifact files, and the runner connects both with the stages.
+//! `fit`, `depth`, `normalize` and `register`. A **worker** is one process that runs stages. It leases a pair and runs
+//! the remaining stages. While a stage is computed, the worker writes a **checkpoint** of the stage before: first the
+//! files, then the rows in a transaction, which may hold the checkpoints of several pairs. Stages are pure functions.
+//! Only the catalog contains SQL, only the store handles artifact files, and the runner connects both with the stages.
 //!
 //! ## One pair, from manifest row to report cell
 //!
@@ -14,13 +14,13 @@
 //!
 //! 1. `src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs in one transaction
-//! 3. `src/runner/run.rs`: starts a run: lock, recovery of dead workers, requeue of stale results
-//! 4. `src/runner/scheduler.rs`: the main loop, starts a task for each leased pair
-//! 5. `src/runner/prefetch.rs`: leases pairs for free slots and a little ahead
+//! 3. `src/runner/run.rs`: starts a run: takes the lock, recovers jobs of dead workers, requeues stale pairs
+//! 4. `src/runner/scheduler.rs`: the main loop, which starts a task for each leased pair
+//! 5. `src/runner/prefetch.rs`: leases pairs for free slots, and a few more in advance
 //! 6. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token; called through `api.rs`
-//! 7. `src/runner/pair_task.rs`: follows the thread of one leased pair, stores a failure
+//! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
 //! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
-//! 9. `src/runner/stage_executor.rs`: reads what a stage needs, calls it and encodes its result
+//! 9. `src/runner/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
 //! 10. `src/stages/pipeline.rs`: chooses the method of each stage; the stages start in `fit/upper_surface.rs` (plane,
 //!     curvature, carved side), `depth.rs` (depth map), `normalize/mod.rs` (print and relief on a common scale) and
 //!     `register/mod.rs` (pose, thresholds, scores, confidence)
@@ -35,20 +35,20 @@
 //!
 //! ## A lost lease
 //!
-//! Every write of a worker is fenced: the statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
+//! Every write of a worker is fenced. The statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
 //! only if the worker and the fencing token equal those of the lease, the worker has not ended, and its last heartbeat
-//! is recent. If a statement changes no row, `group_commit.rs` replies that the lease is lost, and `api.rs` returns
+//! is recent. If a statement changes no row, `group_commit.rs` replies that the lease is lost. `api.rs` then returns
 //! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome) for a checkpoint and `false` for a failure or a
-//! heartbeat. The checkpointer then stores nothing more. The pair ends as `PairEnd::LeaseLost`: in
+//! heartbeat. The checkpointer stores nothing more, and the pair ends as `PairEnd::LeaseLost`: in
 //! `src/runner/pair_task.rs`, or in `checkpointer.rs` (`StoredStages::finish`) if it was the last stage. Stages stored
-//! earlier stay; the pair is leased again after its job was recovered.
+//! before stay. Once the job is recovered, the pair can be leased again.
 //!
 //! ## Why `fit` reads the print
 //!
-//! The carved side is decided in `fit`. Measured on 740 generated pairs: the mesh alone decides 13 % by the relief and
-//! at most 2 % of a tier by its other evidence without errors; it is wrong for 97 pairs. For the other 85 %, `fit` and
-//! `depth` would process both sides, which takes 25 % more CPU time (58.8 against 47.0 ms). [`stages::pipeline`] shows
-//! both methods side by side.
+//! `fit` decides which side of the mesh is carved. On 740 generated pairs, the mesh alone decided this for 13 % of the
+//! pairs by the relief, and for at most 2 % of the pairs of a tier by its other evidence without errors. It was wrong
+//! for 97 pairs. For the other 85 %, `fit` and `depth` would process both sides, with 25 % more CPU time (58.8 against
+//! 47.0 ms). [`stages::pipeline`] shows both methods side by side.
 //!
 //! ## A new threshold metric
 //!
@@ -56,13 +56,13 @@
 //!
 //! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics
 //! - `src/cli/show.rs`: the metric of the summary; no change needed
-//! - `src/domain/metric.rs`: the variant with its definition, name and title; the order is that of the tables
+//! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
-//! - `src/stages/register/confidence.rs`: compares masks with that of the relief metric; its weights are fitted
+//! - `src/stages/register/confidence.rs`: compares each mask with the mask of the relief metric; has fitted weights
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
 //! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text in `src/cli/verdict.rs`, the `CHECK` lists
@@ -72,8 +72,8 @@
 //! ## Rooms
 //!
 //! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
-//! source files do not import each other in cycles, that the files listed above exist, and that the list of files that
-//! name a metric is complete.
+//! source files do not import each other in cycles, that the files listed above exist, and that every file that
+//! names a metric is listed.
 //!
 //! | room | purpose | may import |
 //! |---|---|---|

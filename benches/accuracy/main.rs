@@ -9,9 +9,9 @@
 //! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
 //!
-//! The pairs equal those of `mocban demo`. They are generated in memory from tier, seed and index and passed to the stages
-//! as a binary STL and an image file. Neither unit nor carved side is given, which is harder. The tables are Markdown on standard
-//! output. `cargo test --all-targets` runs one pair a tier as a smoke test.
+//! The pairs equal those of `mocban demo`. They are generated in memory from tier, seed and index, and passed to the
+//! stages as a binary STL and an image file. Unit and carved side are not given, which makes the task harder. The
+//! tables are Markdown on standard output. `cargo test --all-targets` runs one pair per tier as a smoke test.
 
 mod accuracy;
 mod case;

@@ -8,10 +8,10 @@
 //! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
 //! ```
 //!
-//! Catalogs are created in the target directory and removed afterwards. Stages are faked: nothing is computed, and a pair
-//! gets the rows that a run stores, with small outcomes and no artifacts. The writer task runs at `synchronous=FULL`, and
-//! tables say where the program itself is timed as a separate process. The tables are Markdown on the standard output.
-//! `cargo test --all-targets` runs a few pairs as a smoke test.
+//! Catalogs are created in the target directory and removed afterwards. Stages are faked: they compute nothing, and
+//! store the same rows as a run, with small outcomes and no artifacts. The catalog's writer runs at `synchronous=FULL`.
+//! The tables say where the program is timed as a separate process. They are Markdown on standard output. `cargo test
+//! --all-targets` runs a few pairs as a smoke test.
 
 mod baseline;
 mod claims;

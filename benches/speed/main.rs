@@ -6,9 +6,10 @@
 //! cargo bench --bench speed -- --save-baseline before
 //! ```
 //!
-//! The scans are those of `mocban demo` in the tier `pose`, one of each size, stored under `target/tmp/speed` so that
-//! `benches/peers` can give them to other programs. One thread; files are read before the clock starts, except for
-//! `read/raw` and `read/file`. `cargo test --all-targets` runs each benchmark once on the smallest scan.
+//! The scans are generated as by `mocban demo` in the tier `pose`, one of each size. They are stored under
+//! `target/tmp/speed`, so that `benches/peers` can give them to other programs. Each benchmark uses one thread. Files
+//! are read before the clock starts, except in `read/raw` and `read/file`. `cargo test --all-targets` runs each
+//! benchmark once on the smallest scan.
 
 mod files;
 mod readers;
@@ -25,7 +26,7 @@ use files::Files;
 const SIZES: [(&str, u32); 3] = [("60k", 54_100), ("500k", 480_000), ("2M", 1_950_000)];
 
 fn main() -> anyhow::Result<()> {
-    // `cargo test` calls it without `--bench`: everything runs once.
+    // `cargo test` starts this program without `--bench`: everything runs once.
     let sizes = if std::env::args().any(|arg| arg == "--bench") {
         &SIZES[..]
     } else {

@@ -24,7 +24,7 @@ use format::DetectedFormat;
 ///
 /// The format is detected from the content; `name` is used only if the content is truncated or ambiguous. Polygons are
 /// triangulated as fans; faces of fewer than three corners are ignored. Each triangle of an STL gets three vertices of
-/// its own. The counts in a header never reserve more memory than a file of this size could need.
+/// its own. A wrong count in a header never reserves more memory than a file of this size could need.
 ///
 /// ```
 /// use mocban::mesh::{MeshLimits, read};
@@ -58,11 +58,11 @@ pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshE
     Ok(mesh)
 }
 
-/// Some programs write it before text.
+/// Some programs write this mark before text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Reads a mesh or point set like [`read`], from a source of about `about` bytes. A binary STL of exactly `about` bytes
-/// is read in parts, so the whole file is never in memory.
+/// Reads a mesh or point set like [`read`], but from a stream. `about` is its approximate length in bytes. A binary STL
+/// of exactly this length is read in parts, so the whole file is never in memory.
 ///
 /// ```
 /// use mocban::mesh::{MeshLimits, read, read_from};

@@ -23,7 +23,7 @@ use crate::test_size::size_from_env;
 const GOOD: u64 = 2;
 /// Memory limit of a run in MiB, and limit of its peak memory. The headers of some files ask for far more.
 const MEMORY_MIB: u64 = 256;
-/// Longest time for a stage in seconds.
+/// Time limit of a stage in seconds.
 const STAGE_LIMIT_S: u64 = 60;
 
 fn good_pairs(dir: &Path) -> Vec<ManifestRow> {

@@ -26,9 +26,9 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, S
 
 use load::Load;
 
-/// Between two looks whether all tasks are acknowledged.
+/// Time between two checks whether all tasks are acknowledged.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// Connections of a pool as they come.
+/// Connections of a default pool.
 const PLAIN_CONNECTIONS: u32 = 10;
 
 #[tokio::main]
