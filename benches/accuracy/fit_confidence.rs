@@ -25,7 +25,7 @@ use super::options::Options;
 use super::run::Run;
 use super::workers::in_order;
 
-/// Weight of the ridge penalty. It applies to the weights of standardized inputs.
+/// Weight of the ridge penalty on the weights of the standardized inputs.
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;

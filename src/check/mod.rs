@@ -1,8 +1,7 @@
 //! Checks a project for damage. Compares the rows of the database with each other and with the files.
 //!
-//! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair sends pairs with
-//! damaged results back, so that the next run computes the results again. It never changes verdicts or the history of
-//! results.
+//! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair makes the next run
+//! compute damaged results again. It never changes verdicts or the history of results.
 
 mod finding;
 mod pairs;

@@ -68,8 +68,8 @@ pub(super) fn quote(text: &str) -> String {
 
 /// Returns up to `limit` of the known names that are similar to a mistyped name, most similar first.
 ///
-/// Names are similar if one starts with the other, or if their edit distance is at most a third of the longer name's
-/// length (or 1 for short names).
+/// Two names are similar if one starts with the other, or if their edit distance is 1 or at most a third of the longer
+/// name's length.
 pub fn nearest<'a>(
     typed: &str,
     known: impl IntoIterator<Item = &'a str>,

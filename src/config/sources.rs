@@ -136,7 +136,8 @@ impl Sources {
 
 /// Returns the key of the setting that an environment variable sets. Both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
 /// `MOCBAN_LIMITS_MESH_MAX_BYTES` set `limits.mesh.max_bytes`. Unknown keys are returned too and reported later.
-/// Returns `None` if the name does not start with `MOCBAN_`, or has neither `__` nor the name of a section after that.
+/// Returns `None` if the name does not start with `MOCBAN_`, or if neither `__` nor a section's name follows this
+/// prefix.
 fn env_key(name: &str, defaults: &Tree) -> Option<String> {
     let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
     if rest.contains("__") {

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, hint, quote};
 
-/// The merged settings. `changed` holds the origin of each setting, by dotted key, that differs from the lowest layer.
+/// The merged settings. `changed` maps the dotted key of each changed setting to the layer that changed it.
 #[derive(Debug, Clone)]
 pub struct Tree {
     root: Table,
@@ -63,17 +63,18 @@ impl Tree {
     /// one value, such as an enum variant with data (`{ fixed = 127 }`).
     ///
     /// # Errors
-    /// Returns an error if the layer names a section or key that does not exist, or gives a whole section one value.
+    /// Returns an error if the layer names a section or key that does not exist, or sets a top-level section to a
+    /// single value.
     pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Setting>, ConfigError> {
         let mut changes = Vec::new();
         collect(&self.root, layer, "", origin, &mut changes)?;
         Ok(changes)
     }
 
-    /// Returns the changes that a new value of one dotted key makes: several if the value is a table that is a section.
+    /// Returns the changes that setting one dotted key makes. If the value is a table, it can set several keys.
     ///
     /// # Errors
-    /// Returns an error if there is no such key, or if it is a whole section and the value is not a table.
+    /// Returns an error if there is no such key, or if a top-level section is set to a single value.
     pub fn change(
         &self,
         key: &str,

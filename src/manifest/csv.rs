@@ -7,8 +7,8 @@ use super::error::{ManifestError, at_line, of_list};
 use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
 use super::text::{LineCounter, as_utf8, delimiter};
 
-/// Parses a CSV list with a header line. Columns may be in any order. The case of their
-/// names does not matter. Blank lines are ignored.
+/// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
+/// ignored.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
@@ -19,8 +19,8 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     Ok(rows)
 }
 
-/// Parses a CSV list like [`parse_csv`], but passes each valid row to `each` instead of keeping all rows in memory.
-/// Does so even if other rows are invalid. Returns the ids.
+/// Parses a CSV list like [`parse_csv`], but passes each row to `each` instead of keeping all rows in memory. Valid
+/// rows are passed even if other rows are invalid. Returns the ids of the rows.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names

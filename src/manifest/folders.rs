@@ -91,7 +91,7 @@ impl Stem {
 }
 
 /// Returns the files with one of the extensions, by stem, and all other files. Skips hidden files. Adds a problem for
-/// each file whose stem another file has.
+/// each file with the same stem as an earlier file.
 fn by_stem(
     listing: &[PathBuf],
     extensions: &[&str],

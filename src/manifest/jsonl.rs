@@ -7,8 +7,7 @@ use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
 
-/// Parses a JSON Lines list. Keys are the names of the CSV columns. A `null` counts as no value. Blank lines are
-/// ignored.
+/// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines
@@ -19,8 +18,8 @@ pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     Ok(rows)
 }
 
-/// Parses a list like [`parse_jsonl`], but passes each valid row to `each` instead of keeping all rows in memory. Does
-/// so even if other rows are invalid. Returns the ids.
+/// Parses a list like [`parse_jsonl`], but passes each row to `each` instead of keeping all rows in memory. Valid rows
+/// are passed even if other rows are invalid. Returns the ids of the rows.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines

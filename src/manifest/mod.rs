@@ -1,7 +1,5 @@
-//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem. The functions parse text or lists of paths;
-//! they read no files.
-//!
-//! All problems of a list are collected and reported together, so that users can fix them together.
+//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem. The functions parse text or lists of paths
+//! and read no files. All problems of a list are reported together.
 
 mod csv;
 mod draft;

@@ -1,4 +1,4 @@
-//! Encoding, column separator and line numbers of a list. Spreadsheet programs also write UTF-16 and byte-order marks.
+//! Encoding, column separator and line numbers of a list. Spreadsheet programs may write UTF-16 or a byte-order mark.
 
 use std::borrow::Cow;
 
@@ -9,8 +9,8 @@ const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 #[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
 pub struct NotText;
 
-/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns any other bytes unchanged, even if they are not
-/// valid UTF-8, so that the parser can report the line with the invalid byte.
+/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns all other bytes unchanged: if they are not valid
+/// UTF-8, the parser reports the line.
 ///
 /// # Errors
 /// Returns an error if UTF-16 is truncated or damaged.

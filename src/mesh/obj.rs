@@ -104,7 +104,7 @@ fn plain_lines(bytes: &[u8]) -> Vec<u8> {
             lines.push(b' ');
             lines.extend_from_slice(word);
         }
-        // The space makes the parser reject a `v` without coordinates. The parser ignores a `v` that ends its line.
+        // The parser must reject a `v` without coordinates. Without the space, it would ignore such a line.
         lines.extend_from_slice(b" \n");
     }
     lines

@@ -1,5 +1,5 @@
-//! Statistics on the agreement of reviewers, from `agreement` and `report`. The verdicts come from the page and the
-//! command line.
+//! Statistics on the agreement of reviewers, from `agreement` and `report`, on verdicts from the page and from
+//! commands.
 
 use mocban::store::Project;
 use serde_json::{Value, json};

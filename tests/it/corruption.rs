@@ -101,7 +101,7 @@ impl Corruptor {
         }
     }
 
-    /// Overwrites bytes with a number. Half of the time, they are among the first 200 bytes, where headers are.
+    /// Overwrites bytes with a number. Half of the time, these bytes are among the first 200, where headers are.
     fn number(&mut self, bytes: &mut [u8]) {
         let value = NUMBERS[self.below(NUMBERS.len())];
         let width = [1, 2, 4, 8][self.below(4)];

@@ -1,5 +1,5 @@
-//! Checks that rooms (top-level modules) import only the rooms that the table in `src/lib.rs` allows, and that files
-//! have no import cycles.
+//! Checks that top-level modules import only what the table in `src/lib.rs` allows, and that files have no import
+//! cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -238,7 +238,7 @@ impl ImportGraph {
             .collect()
     }
 
-    /// Returns the paths that a piece of a file's code uses, each from the crate root.
+    /// Returns the paths that a piece of a file's code uses, as paths from the crate root.
     fn absolute_paths(&self, index: usize, code: &str) -> Vec<Vec<String>> {
         let module = self.files[index].module();
         let below = |base: &[String], paths: Vec<Vec<String>>| {

@@ -1,4 +1,5 @@
-//! Power cuts while the binary runs. The state of the disk after each sync is rebuilt, checked, and its run completed.
+//! Power cuts while the binary runs. The state of the disk after each sync is rebuilt and checked, and its run is
+//! completed.
 //!
 //! Once a file is synced, its bytes are on the disk. Depending on the file system, the file's name is on the disk at
 //! once or only after its folder is synced. Both cases are tested, and bytes and names may reach the disk in any order.
@@ -284,7 +285,7 @@ fn all_stages_reach_the_disk_in_their_order() {
     );
 }
 
-/// A process creates the folders of artifacts and dies before their names are on the disk. The next process finds the
+/// A process creates folders of artifacts and dies before their names are on the disk. The next process finds the
 /// folders.
 #[test]
 fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
@@ -334,7 +335,7 @@ fn an_import_is_durable_when_it_ends_and_can_be_repeated_before() {
     }
 }
 
-/// Returns the command that imports the data into a new project beside it.
+/// Returns the command that imports the folder `data` into a new project `p`. Both are below `root`.
 fn import(root: &Path) -> Command {
     let mut command = binary();
     command.arg("-C").arg(root.join("p")).arg("import");

@@ -60,8 +60,7 @@ impl Fixture {
     }
 
     /// Returns a project whose run is suspended between the sync of the first stage's files and the write of its rows.
-    /// Starts again if another thread of the run was writing a heartbeat: the suspended process then keeps the catalog
-    /// locked.
+    /// Tries again if the run was suspended while a thread wrote a heartbeat, because it then keeps the catalog locked.
     fn suspended(count: &str) -> (Self, Running) {
         loop {
             let fixture = Self::new(count);

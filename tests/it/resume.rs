@@ -1,5 +1,5 @@
 //! The binary is killed at every failpoint and run again. No stage is stored twice or lost, and the results are the
-//! same. This file also contains helpers of other modules for running projects and reading results.
+//! same. Other modules use the helpers of this file to run projects and to read results.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -13,9 +13,9 @@ use crate::cli::{binary, call, mocban};
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
 
-/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. If a
-/// second value is given, a run first completes that stage, so that the next stage is claimed and stored by itself.
-/// Failpoints at file writes come early, because existing files are not written again.
+/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. The
+/// second value, if given, is a stage that a run completes first, so that the next stage is claimed and stored by
+/// itself. Failpoints at file writes come early, because existing files are not written again.
 const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:claiming", None),
     ("fit:claimed", None),

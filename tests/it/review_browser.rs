@@ -295,7 +295,7 @@ fn keys_work_as_soon_as_a_dialog_is_closed() {
     on_a_page(|_, tab| {
         tab.key("KeyJ");
         tab.wait("document.activeElement.id === 'jump-to'");
-        // Both statements run in one task of the event loop. In it, the focus stays inside the closed dialog.
+        // In the same task of the event loop that closes the dialog, the focus is still inside the dialog.
         tab.eval(
         "document.getElementById('jump').close();
         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));

@@ -65,7 +65,7 @@ impl RequestLog {
     }
 }
 
-/// Returns the verdict of every event in the log, or `None` if it was undone. Fails if an event has two rows for one
+/// Returns each event in the log with its verdict, or `None` if it was undone. Fails if an event is stored twice for a
 /// metric.
 fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);

@@ -1,5 +1,5 @@
-//! What the review server stores and reveals. A verdict belongs to what was shown, items are blind, and a restart
-//! changes nothing.
+//! What the review server stores and reveals. Verdicts belong to what was shown, items are blind, restarts change
+//! nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 

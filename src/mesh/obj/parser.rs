@@ -16,8 +16,8 @@ const POWERS_OF_TEN: [f64; 23] = [
 ];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
-/// Estimated bytes of a file per vertex and per triangle. The estimates are high: reserving too little memory is better
-/// than reserving too much.
+/// Estimated bytes of a file per vertex and per triangle. High values make the parser reserve too little memory rather
+/// than too much.
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 

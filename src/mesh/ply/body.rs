@@ -283,8 +283,8 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads a list of corners into triangles. The list is not stored, because its length is not limited; the number of
-    /// triangles is.
+    /// Reads a list of corners into triangles. Does not store the list, because only the number of triangles is
+    /// limited.
     fn corners(
         &mut self,
         count: PlyScalar,
