@@ -219,7 +219,7 @@ async fn repair_pairs(
     Ok(())
 }
 
-/// Counts unreferenced files. With `remove`, also deletes those that this program wrote.
+/// Counts unreferenced files. With `remove`, also deletes the files that this program wrote.
 async fn unreferenced_files(
     project: &Project,
     named: ReferencedArtifacts,

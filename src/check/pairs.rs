@@ -30,9 +30,8 @@ impl PairCheck {
     }
 }
 
-/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. The job's cursor is its next
-/// stage. Results from the cursor on are left over from an earlier run: their files count as referenced, but are not
-/// checked.
+/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of stages from the
+/// job's next stage (its cursor) on are left from an earlier run. Their files count as referenced, but are not checked.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
@@ -137,8 +136,7 @@ fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
     Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
 }
 
-/// Lists input files that are missing, unreadable or changed since they were read. This is not damage: a run handles
-/// it.
+/// Lists input files that are missing, unreadable or changed since they were read. A run handles them: no damage.
 fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
     for (stored, seen) in [

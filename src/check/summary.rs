@@ -28,8 +28,7 @@ pub struct CheckSummary {
     pub inputs_missing: Notes,
     /// Input files that changed after they were read, or are unreadable. This is not damage: the next run handles it.
     pub inputs_changed: Notes,
-    /// Unreferenced files in the artifact folder. `None` if they were not counted, for example because a run may be
-    /// writing.
+    /// Unreferenced files in the artifact folder. `None` if not counted, for example because a run may be writing.
     pub unreferenced: Option<Unreferenced>,
     /// Repairs made.
     pub repaired: Repaired,
@@ -122,8 +121,7 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair. If `requeued`, the pair is sent back when it has damage, so the damage counts as
-    /// repaired.
+    /// Adds the check of a pair. If `requeued`, damaged pairs are sent back, so their damage counts as repaired.
     pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
         self.pairs += 1;
         self.files += check.files;

@@ -93,7 +93,7 @@ impl Default for BaseLayer {
 pub struct Sources {
     /// Preset or file.
     pub base: BaseLayer,
-    /// Environment variables. Only names such as `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` are settings.
+    /// Environment variables. Settings are named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY`; others are ignored.
     pub env: Vec<(String, String)>,
     /// `section.key=value`, as given to `--set`.
     pub sets: Vec<String>,

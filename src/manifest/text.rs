@@ -67,8 +67,7 @@ impl<'a> LineCounter<'a> {
         }
     }
 
-    /// Returns the line of the next record after `position`, counted from 1. Positions must be passed in ascending
-    /// order.
+    /// Returns the line of the next record after `position`, counted from 1. Positions must be in ascending order.
     pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
         let from = position.map_or(0, ::csv::Position::byte) as usize;
         let blank = self.bytes[from..]

@@ -1,5 +1,4 @@
-//! Statistics on the agreement of reviewers, from `agreement` and `report`, on verdicts from the page and from
-//! commands.
+//! Statistics on the agreement of reviewers in `agreement` and `report`.
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -25,8 +24,7 @@ fn set(project: &Project, pair: &Value, verdict: &str, reviewer: &str) {
     mocban(project.dir(), &args).expect(0);
 }
 
-/// Stores verdicts. On the page, `lan` fails all items, attention checks included. `minh` passes all pairs but the
-/// first.
+/// Stores verdicts. `lan` fails all items on the page, attention checks too. `minh` passes all pairs but the first.
 fn reviewer_pairs(project: &Project) -> Vec<Value> {
     let page = Page::open(
         project,

@@ -1,5 +1,4 @@
-//! The alignment must not change with the unit, pose and vertex order of the mesh or the position and rotation of the
-//! print.
+//! The alignment must not change with the mesh's unit, pose and vertex order or the print's position and rotation.
 //!
 //! Each test aligns a pair and a changed copy, and compares the landmarks in print pixels.
 

@@ -36,7 +36,7 @@ struct Patience {
 }
 
 impl Patience {
-    /// Counts the artifacts and returns the factor for the time of the next run.
+    /// Counts the artifacts. Returns the factor by which the next run may take longer.
     fn next(&mut self, project: &Project) -> u64 {
         let folder = project.artifacts_dir();
         let found = if folder.exists() {

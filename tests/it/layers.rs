@@ -1,5 +1,4 @@
-//! Checks that top-level modules import only what the table in `src/lib.rs` allows, and that files have no import
-//! cycles.
+//! Checks that top-level modules import only what the table in `src/lib.rs` allows, and that no imports form cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -359,8 +358,7 @@ fn files_do_not_import_each_other_in_cycles() {
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }
 
-/// Limits on the list of files in `src/lib.rs` for following one pair: their number, and their lines without unit
-/// tests.
+/// Limits on the list of files in `src/lib.rs` that follow one pair: number of files, and of lines without unit tests.
 const MAX_WALK_FILES: usize = 18;
 const MAX_WALK_LINES: usize = 4500;
 

@@ -13,8 +13,7 @@ fn status(project: &Project) -> Vec<JobStatus> {
     all.iter().map(|pair| pair.results.status).collect()
 }
 
-/// Starts runs until one ends by itself. Returns the number of earlier runs, which died, and the exit code of the last
-/// run.
+/// Starts runs until one ends by itself. Returns the number of runs that died before it, and its exit code.
 fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
     for deaths in 0..10 {
         let mut command = run(project, &["-j", jobs]);

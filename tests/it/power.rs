@@ -1,5 +1,4 @@
-//! Power cuts while the binary runs. The state of the disk after each sync is rebuilt and checked, and its run is
-//! completed.
+//! Power cuts while the binary runs. After each sync, the disk is rebuilt and checked, and the run on it is completed.
 //!
 //! Once a file is synced, its bytes are on the disk. Depending on the file system, the file's name is on the disk at
 //! once or only after its folder is synced. Both cases are tested, and bytes and names may reach the disk in any order.
@@ -285,8 +284,7 @@ fn all_stages_reach_the_disk_in_their_order() {
     );
 }
 
-/// A process creates folders of artifacts and dies before their names are on the disk. The next process finds the
-/// folders.
+/// A process creates artifact folders and dies before their names are on the disk. The next process finds the folders.
 #[test]
 fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
     let comparison = Comparison::new("1");

@@ -1,5 +1,4 @@
-//! Manual alignments are stored, exported and scored like results. A duplicate item does not show them before the
-//! answer.
+//! Manual alignments are stored, exported and scored like results. A duplicate item hides them until it is answered.
 
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;

@@ -65,8 +65,7 @@ impl RequestLog {
     }
 }
 
-/// Returns each event in the log with its verdict, or `None` if it was undone. Fails if an event is stored twice for a
-/// metric.
+/// Returns the verdict of each event in the log, or `None` if undone. Fails if an event is stored twice for a metric.
 fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let mut rows = BTreeSet::new();

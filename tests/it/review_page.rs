@@ -1,5 +1,4 @@
-//! What the review server stores and reveals. Verdicts belong to what was shown, items are blind, restarts change
-//! nothing.
+//! What the review server stores and reveals: verdicts belong to what was shown, and items are blind.
 
 use std::collections::{BTreeMap, BTreeSet};
 

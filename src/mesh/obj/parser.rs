@@ -16,8 +16,8 @@ const POWERS_OF_TEN: [f64; 23] = [
 ];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
-/// Estimated bytes of a file per vertex and per triangle. High values make the parser reserve too little memory rather
-/// than too much.
+/// Estimated bytes of a file per vertex and per triangle. The values are high, to reserve too little rather than too
+/// much memory.
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 
@@ -145,8 +145,7 @@ impl LineCursor<'_> {
         Some(value)
     }
 
-    /// Reads the next decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps
-    /// around.
+    /// Reads decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps around.
     #[inline]
     fn digits(&mut self, number: &mut u64) -> usize {
         let before = self.rest.len();

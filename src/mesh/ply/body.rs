@@ -283,8 +283,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads a list of corners into triangles. Does not store the list, because only the number of triangles is
-    /// limited.
+    /// Reads a list of corners into triangles. The list is not stored, because its length has no limit.
     fn corners(
         &mut self,
         count: PlyScalar,
