@@ -30,8 +30,9 @@ impl PairCheck {
     }
 }
 
-/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of stages from the
-/// job's next stage (its cursor) on are left from an earlier run. Their files count as referenced, but are not checked.
+/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of the job's next
+/// stage (its cursor) and of later stages are left from an earlier run. Their files count as referenced, but are not
+/// checked.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
@@ -136,7 +137,8 @@ fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
     Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
 }
 
-/// Lists input files that are missing, unreadable or changed since they were read. A run handles them: no damage.
+/// Lists input files that are missing, unreadable or changed since they were read. They are not damage, because a run
+/// handles them.
 fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
     for (stored, seen) in [

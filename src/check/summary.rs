@@ -121,7 +121,7 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair. If `requeued`, damaged pairs are sent back, so their damage counts as repaired.
+    /// Adds the check of a pair. If `requeued`, a damaged pair was sent back, so its damage counts as repaired.
     pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
         self.pairs += 1;
         self.files += check.files;

@@ -69,7 +69,8 @@ fn read(tree: &Tree) -> Result<Config, toml::de::Error> {
     Value::Table(tree.table().clone()).try_into()
 }
 
-/// Applies the changes to the defaults one by one. Returns an error for the first that makes the settings invalid.
+/// Applies the changes to the defaults one by one. Returns an error for the first change that makes the settings
+/// invalid.
 fn blame(changes: &[Setting], error: &toml::de::Error) -> ConfigError {
     let Ok(defaults) = Preset::Default.table() else {
         return ConfigError::BuiltIn(error.message().to_owned());

@@ -41,7 +41,7 @@ impl DetectedFormat {
             // A text file with a control character may be classed as binary.
             FileKind::Text | FileKind::Binary => match first_words(bytes) {
                 Some(format) => Ok(format),
-                // A truncated binary STL with a text header has an unexpected size, so the file name decides.
+                // A truncated binary STL with a text header cannot be recognised by its size, so the file name decides.
                 None if has_extension(name, "stl") && bytes.contains(&0) => Ok(Self::StlBinary),
                 None => Err(MeshError::NotAMesh(kind)),
             },

@@ -54,7 +54,7 @@ impl Patience {
     }
 }
 
-/// Starts runs until one ends by itself. Kills each after 50 to 500 ms, or later if recent runs made no progress.
+/// Starts runs until one ends by itself. Kills each run after 50 to 500 ms, or later if recent runs made no progress.
 /// Returns the number of kills.
 fn run_with_kills(project: &Project, dice: &mut ChaCha8Rng) -> usize {
     let mut patience = Patience {
