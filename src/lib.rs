@@ -31,17 +31,36 @@
 //! 15. `src/catalog/records/pair_results.rs`: reads results back; the scores come from `stage_result.outcome`
 //! 16. `src/report/build.rs`: iterates over all pairs
 //! 17. `src/report/accumulate.rs`: sums results per metric
-//! 18. `src/report/render/report_tables.rs`: defines the columns; `table.rs` and the formats beside it write them
+//! 18. `src/report/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML; `csv.rs` has its own
+//!     columns, and JSON is the serialized `Report`
+//!
+//! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `stage_inputs.rs` and
+//! `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns the write connection),
+//! `records/stage_results.rs` (the SQL that reads results) and `cli/report.rs`.
 //!
 //! ## A lost lease
 //!
-//! Every write of a worker is fenced. The statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
-//! only if the worker and the fencing token equal those of the lease, the worker has not ended, and its last heartbeat
-//! is recent. If a statement changes no row, `group_commit.rs` replies that the lease is lost. `api.rs` then returns
-//! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome) for a checkpoint and `false` for a failure or a
-//! heartbeat. The checkpointer stores nothing more, and the pair ends as `PairEnd::LeaseLost`: in
-//! `src/runner/pair_task.rs`, or in `checkpointer.rs` (`StoredStages::finish`) if it was the last stage. Stages stored
-//! before stay. Once the job is recovered, the pair can be leased again.
+//! A worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process recovers the job:
+//! at the start of a run (`src/runner/run.rs`), during a run (`src/runner/worker_session.rs`) or in a repair. The
+//! statements are in `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`. Each of them increases the job's
+//! fencing token.
+//!
+//! All writes of a worker are fenced. The statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
+//! only if the worker and the token equal those of the lease, the worker has not ended, and its last heartbeat is
+//! recent. If a statement changes no row, `group_commit.rs` stores nothing of that request, and the worker learns it
+//! from the reply of `src/catalog/queue/api.rs`:
+//!
+//! | refused write | reply | noticed in | what happens |
+//! |---|---|---|---|
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | the result is dropped; the thread ends after its current stage |
+//! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored |
+//! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process registers as a new worker; its running pairs end at their next write |
+//! | claim | no leases | `prefetch.rs` | nothing, until the next heartbeat |
+//! | release | `false`, ignored | | nothing: the job already belongs to another worker or is ready |
+//!
+//! The pair ends as `PairEnd::LeaseLost`. `StoredStages::finish` in `checkpointer.rs` decides this after any refused
+//! checkpoint, `store_failure` after a refused failure. Stages stored before stay. The pair is leased again when its job
+//! is ready; artifact files without a row are used again if a stage gives the same bytes.
 //!
 //! ## Why `fit` reads the print
 //!
@@ -52,10 +71,10 @@
 //!
 //! ## A new threshold metric
 //!
-//! These source files name individual metrics; all others iterate over [`domain::ThresholdMetric::ALL`]:
+//! These source files name a variant of [`domain::ThresholdMetric`]; all others iterate over its `ALL` or `PAPER`:
 //!
 //! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics
-//! - `src/cli/show.rs`: the metric of the summary; no change needed
+//! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
@@ -65,9 +84,9 @@
 //! - `src/stages/register/confidence.rs`: compares each mask with the mask of the relief metric; has fitted weights
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
-//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text in `src/cli/verdict.rs`, the `CHECK` lists
-//! in `migrations/` with `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, the list of
-//! variants in `tests/it/layers.rs`, and tests and snapshots that count four metrics (`cargo test` names them).
+//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text in `src/cli/verdict.rs`, the `CHECK` lists of
+//! three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`,
+//! `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## Rooms
 //!
