@@ -1,8 +1,8 @@
 //! Builds a report by adding one pair at a time.
 //!
-//! Some numbers of each pair stay in memory for medians and percentiles: the time of each stage, the threshold of each
-//! metric, the errors against ground truth and manual alignments, and the confidence of each result that is known to be
-//! right or wrong. For the bootstrap, sums of scores stay in memory for up to 100,000 units.
+//! Most numbers are summed at once. For medians and percentiles, each pair's stage times, thresholds and errors stay in
+//! memory. For risk-coverage curves, confidences stay in memory. For the bootstrap, sums of scores stay in memory for
+//! up to 100,000 resampling units.
 
 use std::collections::BTreeMap;
 
@@ -58,8 +58,8 @@ struct MetricSums {
     manual: Vec<ManualErrors>,
     /// Relative heights of the thresholds.
     thresholds: Vec<f64>,
-    /// For each [`Basis`]: the confidence of each result that is known to be right or wrong, and whether the result is
-    /// right.
+    /// For each [`Basis`]: the confidence of each result, and whether the result is right. Undecided results are left
+    /// out.
     confidences: [Vec<(f64, bool)>; Basis::ALL.len()],
 }
 
@@ -91,7 +91,7 @@ impl ReportAccumulator {
         }
     }
 
-    /// Sets the rates at which reviewers detected planted faults. Ignores the rates if no planted fault was judged.
+    /// Sets the rates at which reviewers detected planted faults, unless no planted fault was judged.
     pub fn set_attention_checks(&mut self, rates: AttentionCheckRates) {
         self.attention_checks = (rates.all.n > 0).then_some(rates);
     }

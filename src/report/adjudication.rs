@@ -7,15 +7,15 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
-/// Acc of a metric under three rules for disagreement: the share of passed results among the results that the rule
-/// counts as passed or failed.
+/// Acc of a metric under three rules for disagreement. Each rule decides which results pass, fail or are left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct AdjudicationRules {
     /// Results that at least two reviewers independently passed or failed. If there are none, all three rules agree.
     pub double_read: u64,
     /// A result fails if any reviewer fails it.
     pub either_fails: Rate,
-    /// A disputed result counts as adjudicated, and is left out until somebody adjudicates. This is `MetricRow::acc`.
+    /// A disputed result counts as the adjudicator decided. Undecided results are left out. This rate is
+    /// `MetricRow::acc`.
     pub adjudicated: Rate,
     /// A result fails only if every reviewer who decided fails it.
     pub both_fail: Rate,

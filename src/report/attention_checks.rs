@@ -1,4 +1,4 @@
-//! Reviewers' answers to attention checks, which are planted faults and results shown twice.
+//! Reviewers' answers to attention checks. A check is a planted fault or a result that is shown twice.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Shares of the judged planted faults that reviewers failed. An unsure verdict does not detect a fault.
+/// Planted faults that reviewers failed, as a share of those they judged. An unsure verdict is not a detection.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AttentionCheckRates {
     /// Of every kind.

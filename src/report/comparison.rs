@@ -10,7 +10,7 @@ use crate::domain::enum_names;
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
-/// The metrics that are compared two by two: every two of the paper's metrics, and `relief` with `ensemble`.
+/// The metrics that are compared with each other: each two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
     (Ensemble, Density),
@@ -29,7 +29,7 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Returns the term for pairs whose results are known to be right or wrong.
+    /// Returns the words for pairs that count on this basis.
     const fn pairs(self) -> &'static str {
         match self {
             Self::Verdicts => "judged pairs",
@@ -70,7 +70,7 @@ pub struct Comparison {
 pub(super) struct ComparisonSums([McNemarTest; COMPARED_METRICS.len()]);
 
 impl ComparisonSums {
-    /// Counts one pair. `right` returns whether a metric's result is right, or `None` if this is not known.
+    /// Counts one pair. `right` returns whether the result of a metric is right, or `None` if that is unknown.
     pub(super) fn add(&mut self, right: impl Fn(ThresholdMetric) -> Option<bool>) {
         for (test, (a, b)) in self.0.iter_mut().zip(COMPARED_METRICS) {
             if let (Some(a), Some(b)) = (right(a), right(b)) {
@@ -79,7 +79,7 @@ impl ComparisonSums {
         }
     }
 
-    /// Returns the comparisons that have at least one pair on which both metrics are known to be right or wrong.
+    /// Returns the comparisons with at least one pair that counts for both metrics.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
         let compared = self.0.into_iter().zip(COMPARED_METRICS);
         let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();
@@ -136,7 +136,7 @@ fn conclusion(
     )
 }
 
-/// Formats a sample size, rounded up to two significant digits because the estimate is not more precise.
+/// Formats a sample size, rounded up to two significant digits. The estimate is not more precise than that.
 fn about(pairs: f64) -> String {
     if pairs > MAX_SAMPLE_SIZE {
         return format!("more than {}", format_count(MAX_SAMPLE_SIZE as u64));

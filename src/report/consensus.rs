@@ -62,7 +62,7 @@ impl Consensus {
     }
 }
 
-/// Splits verdicts into adjudications, whose reviewers were shown a conflict, and independent verdicts.
+/// Splits verdicts into adjudications and independent verdicts. An adjudicator was shown the conflicting verdicts.
 pub(crate) fn partition_verdicts(
     record: &MetricRecord,
 ) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {

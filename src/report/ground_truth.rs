@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 
-/// Largest angle error of a result that passes, in degrees (the paper's rule).
+/// A result passes only if its angle error is at most this, in degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
-/// Largest mean landmark error of a result that passes, in percent of the character's height.
+/// A result passes only if its mean landmark error is at most this, in percent of the character's height.
 pub const MAX_TRE_PCT: f64 = 5.0;
-/// Smallest intersection over union of the depth mask with the true stroke tops at which a result passes.
+/// A result with a tops mask passes only if the overlap of this mask and the depth mask, as `mask_iou`, is at least
+/// this.
 pub const MIN_MASK_IOU: f64 = 0.7;
 
 /// One line of `truth.jsonl`.
@@ -25,7 +26,7 @@ pub struct TruthRecord {
     pub landmarks: Vec<[f64; 3]>,
     /// Height of the character in the print, in print pixels.
     pub char_height_px: f64,
-    /// Path of the mask of true stroke tops, which is in the frame of the print. `None` if there is no such mask.
+    /// Path of the mask of the true stroke tops, in print pixels. `None` if there is no mask.
     #[serde(default)]
     pub tops_mask: Option<String>,
 }
@@ -80,7 +81,7 @@ pub struct TruthErrors {
     /// Mean distance in the print between the true and the found positions of the landmarks (target registration
     /// error), in percent of the character's height.
     pub tre_pct: f64,
-    /// Intersection over union of the depth mask with the true stroke tops, in 0..=1. `None` without a tops mask.
+    /// Intersection over union of the depth mask and the mask of true stroke tops, in 0..=1. `None` without the latter.
     pub mask_iou: Option<f64>,
 }
 
@@ -92,7 +93,7 @@ impl TruthErrors {
             && self.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU)
     }
 
-    /// Returns the largest error as a multiple of its limit. The value is at most 1 if the result passes.
+    /// Returns the largest of the errors, each divided by its limit. The value is at most 1 if the result passes.
     pub fn severity(&self) -> f64 {
         let mask = self
             .mask_iou
@@ -104,7 +105,7 @@ impl TruthErrors {
 }
 
 impl TruthRecord {
-    /// Parses a stored record and checks that errors can be measured with the record.
+    /// Parses a stored record and checks that it is complete enough to measure errors.
     ///
     /// # Errors
     /// Returns an error if the value is not a record, or if its plane, map, landmarks or height are degenerate.
@@ -185,7 +186,7 @@ impl TruthRecord {
     }
 }
 
-/// Restricts `map` to a plane. Returns the linear map from coordinates along the `tangents` to print pixels.
+/// Returns the linear part of `map` on a plane. The part maps coordinates along the `tangents` to print pixels.
 fn in_plane(map: &PrintFromMesh, tangents: [Vector3<f64>; 2]) -> Affine2 {
     let row = |r: [f64; 4]| {
         let [a, b] = tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);

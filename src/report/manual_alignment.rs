@@ -22,7 +22,7 @@ pub struct ManualAlignmentErrors {
     pub angle_median_deg: Option<f64>,
     /// 95th percentile of the angle error, in degrees.
     pub angle_p95_deg: Option<f64>,
-    /// Median shift of the relief's centre, in percent of the relief's longer side.
+    /// Median shift of the relief's centre, in percent of the longer side of the relief.
     pub shift_median_pct: Option<f64>,
     /// 95th percentile of the shift, in percent.
     pub shift_p95_pct: Option<f64>,
@@ -48,9 +48,8 @@ pub struct ManualCorrection {
 }
 
 impl ManualCorrection {
-    /// Returns the correction from one `print_from_depth` to another, or `None` if either map is singular.
-    ///
-    /// `depth_px` is the width and height of the depth map.
+    /// Returns the correction that turns `found` into `manual`, or `None` if either map is singular. Both maps are a
+    /// `print_from_depth`.
     pub fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let depth_from_print = found.inverse()?;
         manual.inverse()?;
@@ -75,7 +74,7 @@ impl ManualCorrection {
 /// One result's errors against a manual alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ManualErrors {
-    /// Rotation, in degrees in 0..=180. It is 180 if one of the two is mirrored.
+    /// Rotation, in degrees in 0..=180. It is 180 if the result is mirrored relative to the manual alignment.
     angle_deg: f64,
     /// Shift of the relief's centre, in percent of the relief's longer side.
     shift_pct: f64,
@@ -86,7 +85,7 @@ pub struct ManualErrors {
 }
 
 impl ManualErrors {
-    /// Returns the errors of one `print_from_depth` against another, or `None` if either map is singular.
+    /// Returns the errors of the map `found` against the map `manual`, or `None` if either map is singular.
     fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let correction = ManualCorrection::between(found, manual, depth_px)?;
         let [x, y] = correction.shift_px;

@@ -37,8 +37,7 @@ pub struct Report {
     pub comparisons: Vec<Comparison>,
     /// Metrics compared by their scores.
     pub score_comparisons: Vec<ScoreComparison>,
-    /// How the bootstrap was done. `None` if there are no results, or more than 100,000 units, for which the sampling
-    /// error is negligible.
+    /// Settings of the bootstrap. `None` if nothing was resampled: there are no results, or more than 100,000 units.
     pub bootstrap: Option<BootstrapSettings>,
     /// Risk-coverage curves of every metric that has confidences: first by verdicts, then by ground truth.
     pub risk_coverage: Vec<RiskCoverageCurve>,
@@ -46,8 +45,7 @@ pub struct Report {
     pub failures: Vec<FailureGroup>,
     /// The thresholds that the metrics chose.
     pub thresholds: Vec<ThresholdDistribution>,
-    /// Computing times of the stages. The times differ from run to run. All other fields are equal if the results and
-    /// verdicts are equal.
+    /// Computing times of the stages. Unlike all other fields, they differ from run to run.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<StageTimes>,
     /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
@@ -85,11 +83,11 @@ pub struct MetricRow {
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub judged: u64,
-    /// Results passed by every reviewer who was not unsure, or by an adjudicator.
+    /// Results that every reviewer with a decision passed, and conflicts adjudicated as a pass.
     pub passed: u64,
-    /// Results failed by every reviewer who was not unsure, or by an adjudicator.
+    /// Results that every reviewer with a decision failed, and conflicts adjudicated as a fail.
     pub failed: u64,
-    /// Results about which all reviewers were unsure, or on which reviewers disagree and nobody has adjudicated.
+    /// Results on which all reviewers were unsure, and conflicts that nobody has adjudicated.
     pub unsure: u64,
     /// The unsure results on which reviewers disagree.
     pub conflicts: u64,

@@ -156,8 +156,8 @@ impl<'a> PairArtifacts<'a> {
         Ok(grey.map(|value| *value == INK))
     }
 
-    /// Restricts a map from mesh to print to the fitted plane, and returns it as a map from depth-map pixels to print
-    /// pixels. Returns `None` if `depth_from_plane` is singular.
+    /// Returns the map from depth-map pixels to print pixels that `print_from_mesh` gives on the fitted plane. Returns
+    /// `None` if `depth_from_plane` is singular.
     ///
     /// # Errors
     /// Returns an error if the result of the fit or depth stage cannot be read.
@@ -181,7 +181,7 @@ impl<'a> PairArtifacts<'a> {
         }))
     }
 
-    /// Returns the map from mesh to print: a metric's `print_from_depth` composed with the maps of fit and depth.
+    /// Returns the map from mesh to print that follows from a metric's `print_from_depth`, the fit and the depth scale.
     ///
     /// # Errors
     /// Returns an error if the result of the fit or depth stage cannot be read.

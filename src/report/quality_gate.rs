@@ -5,8 +5,8 @@ use super::number_format::format_count;
 
 /// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
 ///
-/// Every row that has an Acc must reach `least` (0..=1). A report in which nobody passed or failed a result does not
-/// reach it, because ground truth never replaces a verdict.
+/// Every row that has an Acc must reach `least` (0..=1). If nobody passed or failed a result, there is no Acc, and the
+/// report misses it. Ground truth does not replace verdicts here.
 pub fn below(report: &Report, least: f64) -> Vec<String> {
     let rows = report.rows.iter();
     let judged: Vec<_> = rows

@@ -24,8 +24,8 @@ pub const MIN_RESULTS: u64 = 30;
 
 /// Agreement of all reviewers of a project.
 ///
-/// Results of one pair that look the same count once. Adjudications are not compared, because the adjudicators have
-/// seen the verdicts of others.
+/// Results of one pair with the same threshold and alignment count once. Adjudications are not compared, because
+/// adjudicators have seen the verdicts of other reviewers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReviewerAgreement {
     /// Version of the JSON form.
@@ -36,7 +36,7 @@ pub struct ReviewerAgreement {
     pub reviewer_pairs: Vec<ReviewerPair>,
     /// Every reviewer, by name.
     pub reviewers: Vec<ReviewerRecord>,
-    /// Share of planted faults that reviewers failed, over the answers of all reviewers.
+    /// Planted faults that reviewers failed, as a share of all answers to planted faults.
     pub attention_checks: Rate,
 }
 
@@ -229,12 +229,12 @@ impl AgreementCounts {
     }
 }
 
-/// Returns each reviewer's verdict on a group of results that look the same. Adjudications are left out.
+/// Returns each reviewer's independent verdict on results with the same threshold and alignment.
 fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Verdict> {
     let mut by_reviewer = BTreeMap::new();
     for record in group {
         for given in partition_verdicts(record).1 {
-            // The review page stores the same verdict for all results of the group. If the verdicts differ, the first
+            // The review page stores one verdict for all results of the group. If stored verdicts differ, the first
             // counts.
             by_reviewer
                 .entry(given.reviewer.as_str())

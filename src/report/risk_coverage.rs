@@ -6,9 +6,9 @@ use super::comparison::Basis;
 use super::stats::Rate;
 use crate::domain::ThresholdMetric;
 
-/// Coverages of a curve: percentages of the results that are kept. The most confident results are kept.
+/// Coverages of a curve, in percent of the results. At each coverage, the most confident results are kept.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
-/// Size of the least confident part of the results, in percent. Failures in this part are counted.
+/// Percentage of the results that count as the least confident. The curve states how many of these are wrong.
 pub const LEAST_CONFIDENT_PERCENT: u64 = 3;
 
 /// The risk-coverage curve of one metric.
@@ -48,14 +48,14 @@ pub struct RiskCoveragePoint {
 }
 
 impl RiskCoverageCurve {
-    /// Returns the curve of a metric, or `None` without results. A sample is the confidence of a result and whether the
-    /// result is right; the samples are in the order of the pairs' names.
+    /// Returns the curve of a metric, or `None` without results. `samples` holds the confidence of each result, and
+    /// whether the result is right, in the order of the pairs' names.
     pub(super) fn of(
         basis: Basis,
         metric: ThresholdMetric,
         samples: &mut [(f64, bool)],
     ) -> Option<Self> {
-        // The sort is stable. Of results with equal confidence, the first by pair name is kept longest.
+        // The sort is stable. If confidences are equal, the result whose pair comes first by name is kept longer.
         samples.sort_by(|a, b| b.0.total_cmp(&a.0));
         let kept = |percent| samples.len() * percent as usize / 100;
         let failures =

@@ -14,8 +14,8 @@ use crate::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
-/// Number of resampled quantities: every score of every metric, whether each metric passed, and the difference in every
-/// score between every two compared metrics.
+/// Number of resampled quantities. Each metric has its scores and its passes. Each two compared metrics have the
+/// differences of their scores.
 const WIDTH: usize = METRICS * SCORES + METRICS + COMPARED_METRICS.len() * SCORES;
 
 /// How the bootstrap was done.
@@ -33,7 +33,7 @@ pub struct BootstrapSettings {
     pub seed: u64,
 }
 
-/// The 95 % bootstrap intervals of one metric's means. An interval is `None` if there are too few units.
+/// The 95 % bootstrap intervals of one metric. An interval is `None` if there are too few units.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MeanIntervals {
     /// Of the mean structural similarity.
@@ -44,7 +44,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc, over whole blocks. `None` also if there are no blocks, or if all results passed or all failed.
+    /// Of Acc, if whole blocks were resampled. `None` if no pair names its block, or all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 
@@ -86,7 +86,7 @@ impl Default for ScoreSample {
 }
 
 impl ScoreSample {
-    /// Counts one pair. `passed` returns whether a metric's result passed, or `None` if reviewers did not decide.
+    /// Counts one pair. `passed` returns whether the result of a metric passed, or `None` if reviewers did not decide.
     pub(super) fn add(
         &mut self,
         pair: &PairResults,
@@ -240,7 +240,7 @@ mod tests {
         assert_eq!(how(&by_block), Some((ResamplingUnit::Block, 14)));
         assert_eq!(by_pair.means[0].acc_by_block, None);
         let [low, high] = by_block.means[0].acc_by_block.expect("14 blocks");
-        // A million resamples in NumPy 2.4.6 give 0.762 and 0.929, with a standard deviation of 0.045.
+        // The bounds are from NumPy 2.4.6 with a million resamples, whose standard deviation is 0.045.
         assert!(
             (low - 0.762).abs() < 0.006 && (high - 0.929).abs() < 0.006,
             "{low} {high}"

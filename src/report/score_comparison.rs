@@ -72,7 +72,8 @@ pub struct ScoreComparison {
     pub conclusion: String,
 }
 
-/// Adds conclusions and Holm's correction within each score. The comparisons must be sorted by score.
+/// Sets `p_holm` and `conclusion` of every comparison. Holm's correction covers the comparisons by the same score,
+/// which must be adjacent.
 pub(super) fn conclude(comparisons: &mut [ScoreComparison], unit: ResamplingUnit) {
     for family in comparisons.chunk_by_mut(|a, b| a.score == b.score) {
         let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
@@ -110,7 +111,7 @@ impl ScoreComparison {
     }
 }
 
-/// Returns one sentence for every two metrics. Scores with the same conclusion are listed together, such as in
+/// Returns one sentence for each two compared metrics. Scores with the same conclusion are listed together, as in
 /// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU); no significant difference (Dice).`
 pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
     let mut compared: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();

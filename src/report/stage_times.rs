@@ -21,7 +21,7 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// Returns the times of a stage from the milliseconds of each of its results. Returns `None` without results.
+    /// Returns the times of a stage. `ms` holds the time of each result. Returns `None` if `ms` is empty.
     pub(super) fn of(stage: Stage, ms: &mut [f64]) -> Option<Self> {
         Some(Self {
             stage,

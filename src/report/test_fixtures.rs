@@ -20,7 +20,7 @@ use crate::domain::{
     Verdict,
 };
 
-/// Returns a result with an IoU and the matching Dice. The verdicts are by reviewers `r0`, `r1` and so on.
+/// Returns a result with an IoU, and the Dice that follows from it. The reviewers are named `r0`, `r1` and so on.
 pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) -> MetricRecord {
     MetricRecord {
         outcome: metric_outcome(metric, iou),
@@ -161,7 +161,7 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
     }
 }
 
-/// Returns the agreement of two reviewers who both passed `pass` results and disagree on `disputed` others.
+/// Returns the agreement of two reviewers who both pass `pass` results and disagree on `disputed` more.
 pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
     let mut table = VerdictTable::default();
     (0..pass).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));

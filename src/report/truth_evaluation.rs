@@ -13,7 +13,7 @@ use crate::store::Project;
 
 /// Value of pixels in a tops mask that are a true stroke top.
 const TOP: u8 = 255;
-/// Value of pixels in a tops mask that are left out of the score: a neighbour's stroke or a border line.
+/// Value of pixels in a tops mask that are not scored, for example a neighbouring character's stroke or a border line.
 const IGNORED: u8 = 128;
 
 /// One pair's errors against ground truth.
@@ -105,7 +105,7 @@ fn errors_by_metric(
         None => None,
     };
     let mut by_metric = BTreeMap::new();
-    // Results with the same threshold and alignment have the same errors, so their mask is warped only once.
+    // Results with the same threshold and alignment have the same errors. Each group is measured once.
     for group in group_identical(&pair.metrics) {
         let outcome = &group[0].outcome;
         let found = artifacts.print_from_mesh(&outcome.print_from_depth)?;
@@ -150,7 +150,7 @@ pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f
 
 /// Returns the intersection over union of a depth mask and the true stroke tops, both in the print's frame, in 0..=1.
 ///
-/// Pixels with the value 128 in the tops mask are ignored. If neither mask has a set pixel, the value is 0.
+/// Pixels with the value 128 in the tops mask are ignored. If neither mask has any other set pixel, the value is 0.
 ///
 /// # Errors
 /// Returns an error if the masks differ in size.

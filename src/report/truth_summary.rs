@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
 use super::stats::{Rate, median};
 
-/// A metric's errors against ground truth. They are never mixed with verdicts.
+/// A metric's errors against ground truth. Verdicts are not part of these numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TruthSummary {
     /// Results with usable ground truth.
@@ -22,7 +22,7 @@ pub struct TruthSummary {
     pub angle_median_deg: Option<f64>,
     /// Median landmark error, in percent of the character's height.
     pub tre_median_pct: Option<f64>,
-    /// Median intersection over union of the depth masks with the true stroke tops. `None` without any tops mask.
+    /// Median `mask_iou` of the results that have a tops mask. `None` if none has one.
     pub mask_iou_median: Option<f64>,
     /// Mirrored results.
     pub mirrored: u64,

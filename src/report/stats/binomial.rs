@@ -3,7 +3,7 @@
 /// Returns P(X <= `count`), in 0..=1, for a binomial X with `n` trials and success probability `p`.
 ///
 /// `p` must lie strictly between 0 and 1, and `count` must be at most `n`. If `count` is at most the mean, the terms of
-/// the lower tail are added, so the relative error is at rounding level. Otherwise the upper tail is subtracted from 1.
+/// the lower tail are added, so even a tiny result is accurate. Otherwise the upper tail is subtracted from 1.
 ///
 /// ```
 /// use mocban::report::stats::binomial_cdf;
@@ -21,7 +21,7 @@ pub fn binomial_cdf(count: u64, n: u64, p: f64) -> f64 {
     }
 }
 
-/// Sums the terms from `count` down to 0. The terms shrink, because `count` is not above the mean.
+/// Sums the terms from `count` down to 0. `count` must be at most the mean, so that the terms shrink.
 fn lower_tail(count: u64, n: u64, p: f64) -> f64 {
     let ln_choose: f64 = (0..count.min(n - count))
         .map(|k| ((n - k) as f64 / (k + 1) as f64).ln())

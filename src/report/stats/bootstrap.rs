@@ -14,17 +14,16 @@ pub const BOOTSTRAP_SEED: u64 = 1;
 const MAX_RESAMPLES: usize = 10_000;
 /// Fewest resamples, however many units there are.
 const MIN_RESAMPLES: usize = 1000;
-/// Limit on the draws of all resamples together, so that large samples take seconds. `MIN_RESAMPLES` overrides it.
+/// Limit on the draws of all resamples together: a large sample gets fewer resamples, but at least `MIN_RESAMPLES`.
 const MAX_DRAWS: usize = 50_000_000;
 /// Resamples that one thread adds up in one pass over the units.
 const STREAMS_PER_PASS: usize = 8;
 
-/// One unit's contribution to each quantity, as `[sum, count]`. A quantity's mean is its total sum over its total
-/// count.
+/// One unit's `[sum, count]` for each quantity. The mean of a quantity is its total sum divided by its total count.
 pub type QuantitySums = Vec<[f64; 2]>;
 
-/// Returns the number of resamples for a sample of `units` units: 10,000 for up to 5,000 units, fewer for more units,
-/// but at least 1,000. Returns 0 for an empty sample.
+/// Returns the number of resamples for a sample of `units` units. It is 10,000 for up to 5,000 units, and falls to
+/// 1,000 for larger samples. Returns 0 for an empty sample.
 ///
 /// ```
 /// use mocban::report::stats::resample_count;
@@ -38,10 +37,10 @@ pub fn resample_count(units: usize) -> usize {
     }
 }
 
-/// Returns each quantity's mean in each resample that has the quantity. Every unit has `width` quantities.
+/// Returns, for each of the `width` quantities, its mean in every resample. Resamples without the quantity are skipped.
 ///
-/// All quantities are computed from the same draws, so differences between them are paired. The result depends on the
-/// order of the units, not on the number of threads.
+/// All quantities use the same drawn units, so the means of two quantities can be compared resample by resample. The
+/// result depends on the order of the units, not on the number of threads.
 ///
 /// ```
 /// use mocban::report::stats::{percentile_interval_95, resampled_means};
@@ -68,11 +67,11 @@ pub fn resampled_means(units: &[QuantitySums], width: usize) -> Vec<Vec<f64>> {
     (0..width).map(means).collect()
 }
 
-/// Draws one resample for each random stream: as many units as the sample has, with replacement. Returns the sums of
-/// each resample.
+/// Returns the sums of one resample for each random stream. A resample draws as many units as the sample has, with
+/// replacement.
 ///
-/// `units` holds the quantities of the first unit, then of the second, and so on. Each unit is read once for all
-/// streams, because with many units most of the time goes into reading.
+/// `units` is flat: `width` entries for each unit. Reading the units takes most of the time if there are many, so one
+/// pass over them serves all streams.
 fn resample(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<QuantitySums> {
     let count = units.len() / width.max(1);
     let multiplicities: Vec<Vec<u32>> = streams
@@ -113,11 +112,11 @@ pub fn percentile_interval_95(means: &mut [f64]) -> Option<[f64; 2]> {
     Some([quantile(means, 0.025)?, quantile(means, 0.975)?])
 }
 
-/// Returns the two-sided p-value, in 0..=1, of the hypothesis that the true difference is 0. Returns `None` if there
-/// are no resampled differences.
+/// Returns the two-sided p-value, in 0..=1, of the hypothesis that the true difference is 0. Returns `None` if
+/// `differences` is empty.
 ///
-/// The p-value is twice the share of differences on the rarer side of 0. The sample itself is counted on that side, so
-/// the p-value is never 0. Source: Davison and Hinkley 1997, section 4.4, doi:10.1017/CBO9780511802843.
+/// The p-value is twice the share of resampled differences on the rarer side of 0. One is added to both counts, so the
+/// p-value is never 0. Source: Davison and Hinkley 1997, section 4.4, doi:10.1017/CBO9780511802843.
 ///
 /// ```
 /// use mocban::report::stats::bootstrap_p;
@@ -152,7 +151,7 @@ mod tests {
             .collect()
     }
 
-    /// Sums units one after another as they are drawn, which is the textbook form of `resample`.
+    /// Sums units one after another as they are drawn, as textbooks describe the bootstrap.
     fn resample_slowly(units: &[QuantitySums], width: usize, stream: u64) -> QuantitySums {
         let mut rng = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
         rng.set_stream(stream);
@@ -212,8 +211,7 @@ mod tests {
             .collect();
         assert_eq!(units.len(), 14);
         let mut means = resampled_means(&units, 1).remove(0);
-        // The bounds are from NumPy 2.4.6 with a million resamples of the sums and counts of blocks, drawn with
-        // `integers`.
+        // The bounds are from NumPy 2.4.6: a million resamples of the blocks, drawn with `integers`.
         let found = percentile_interval_95(&mut means).expect("means");
         assert_near(found, [0.006_332_87, 0.013_707_07], 0.001_885_758);
         assert_eq!(bootstrap_p(&means), Some(2.0 / 10_001.0));

@@ -5,8 +5,7 @@ pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 /// Returns the p-values adjusted by Holm's step-down method, each in 0..=1, in the given order.
 ///
-/// The i-th smallest of m values is multiplied by m - i + 1. An adjusted value is never below that of a smaller
-/// p-value.
+/// The i-th smallest of m values is multiplied by m - i + 1. The adjusted values keep the order of the p-values.
 /// Source: Holm 1979, <https://www.jstor.org/stable/4615733>.
 ///
 /// ```
@@ -30,10 +29,10 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     adjusted
 }
 
-/// Returns [`holm`] over a family in which some tests have no p-value.
+/// Returns [`holm`] over a family of tests, some of which have no p-value.
 ///
-/// For example, `McNemar`'s test has no p-value without discordant pairs. The adjusted value of such a test is `None`,
-/// but the test counts as p = 1 in the size of the family.
+/// For example, `McNemar`'s test has no p-value without discordant pairs. Such a test gets `None`, but still counts in
+/// the size of the family.
 ///
 /// ```
 /// use mocban::report::stats::holm_of_known;

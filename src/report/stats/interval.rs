@@ -82,7 +82,7 @@ pub fn clopper_pearson_95(count: u64, n: u64) -> Option<[f64; 2]> {
     (n > 0).then(|| [1.0 - upper_bound(n - count, n), upper_bound(count, n)])
 }
 
-/// Finds by bisection the proportion at which at most `count` successes in `n` trials have a probability of 2.5 %.
+/// Returns the proportion for which `n` trials give at most `count` successes with a probability of 2.5 %.
 fn upper_bound(count: u64, n: u64) -> f64 {
     let (mut low, mut high) = (count as f64 / n as f64, 1.0);
     for _ in 0..f64::MANTISSA_DIGITS {

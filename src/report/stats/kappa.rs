@@ -80,7 +80,7 @@ impl AgreementTable {
         })
     }
 
-    /// Returns how far the observed agreement exceeds chance, as a share of the largest possible excess.
+    /// Returns `(observed - chance) / (1 - chance)`, where `chance` computes the agreement expected by chance.
     fn beyond_chance(self, chance: fn(f64, f64) -> f64) -> Option<f64> {
         let share = |count: u64| ratio(count as f64, self.n());
         let observed = share(self.agreed())?;

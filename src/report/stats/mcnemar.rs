@@ -33,7 +33,7 @@ impl McNemarTest {
         mcnemar_exact(self.a_only, self.b_only)
     }
 
-    /// Returns the number of pairs needed at these rates. See [`mcnemar_sample_size`].
+    /// Returns the number of pairs needed to show the observed difference. See [`mcnemar_sample_size`].
     pub fn sample_size(self) -> Option<f64> {
         mcnemar_sample_size(self.a_only, self.b_only, self.n)
     }
@@ -41,9 +41,8 @@ impl McNemarTest {
 
 /// Returns the two-sided p-value of McNemar's exact test from the counts of discordant pairs, or `None` if both are 0.
 ///
-/// The value is `min(1, 2 P(X <= min(a_only, b_only)))` for a binomial X with `a_only + b_only` trials of probability
-/// 1/2.
-/// Source: McNemar 1947, doi:10.1007/BF02295996, in its exact (binomial) form.
+/// The value is `min(1, 2 P(X <= min(a_only, b_only)))`. X is binomial with `a_only + b_only` trials of probability
+/// 1/2. Source: McNemar 1947, doi:10.1007/BF02295996, in its exact (binomial) form.
 ///
 /// ```
 /// use mocban::report::stats::mcnemar_exact;
@@ -58,11 +57,11 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
 }
 
 /// Returns the number of pairs for which McNemar's test has 80 % power at the two-sided 5 % level. Returns `None` if
-/// `a_only` and `b_only` are equal, because no number of pairs shows a difference of 0.
+/// `a_only` and `b_only` are equal.
 ///
 /// The true rates are assumed to be `a_only / n` and `b_only / n`. With psi = `(a_only + b_only) / n` and delta =
-/// `|a_only - b_only| / n`, the number is `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. It is the number
-/// for the asymptotic test; the exact test needs slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
+/// `|a_only - b_only| / n`, the number is `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. This holds for the
+/// asymptotic test; the exact test needs slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
 ///
 /// ```
 /// use mocban::report::stats::mcnemar_sample_size;
@@ -122,8 +121,8 @@ mod tests {
         assert_eq!((test.p(), test.sample_size()), (Some(1.0), None));
     }
 
-    /// Returns the power of the exact test with `pairs` pairs, summed over all numbers of discordant pairs. These
-    /// numbers are assumed to be Poisson distributed.
+    /// Returns the power of the exact test with `pairs` pairs, if the counts of discordant pairs are Poisson
+    /// distributed.
     fn exact_power(a_rate: f64, b_rate: f64, pairs: f64) -> f64 {
         let mut power = 0.0;
         let mut a_chance = (-a_rate * pairs).exp();

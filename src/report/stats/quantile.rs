@@ -1,8 +1,6 @@
 //! Order statistics.
 
-/// Returns the median: the middle value, or the mean of the two middle values. Returns `None` without values.
-///
-/// Sorts `values`.
+/// Returns the middle value, or the mean of the two middle values. Returns `None` without values. Sorts `values`.
 ///
 /// ```
 /// use mocban::report::stats::median;

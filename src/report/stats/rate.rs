@@ -24,7 +24,7 @@ pub struct Rate {
     pub count: u64,
     /// `count / n`, in 0..=1. `None` if `n` is 0.
     pub share: Option<f64>,
-    /// The 95 % interval of `share`, by Wilson's method unless `set_interval` was called with another method.
+    /// The 95 % interval of `share`: Wilson's, unless `set_interval` chose another method.
     pub ci95: Option<[f64; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! Samples for the bootstrap: quantities summed by unit, where a unit is an observation or a cluster of observations.
+//! Samples for the bootstrap. The unit of resampling is an observation, or a cluster of observations.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::bootstrap::{QuantitySums, bootstrap_p, percentile_interval_95, resampled_means};
 
-/// Smallest number of units for an interval of a quantity. With fewer units the interval would be too narrow.
+/// A quantity has no interval if fewer units have it. With too few units, the interval would be too narrow.
 pub const MIN_UNITS: usize = 10;
 /// Largest number of units in a sample. A larger sample is not resampled, because its sampling error is negligible.
 pub const MAX_UNITS: usize = 100_000;
@@ -31,9 +31,7 @@ impl ResamplingUnit {
     }
 }
 
-/// The quantities of a sample, summed by unit.
-///
-/// Observations of one cluster are not independent, so a cluster is one unit.
+/// The quantities of a sample, summed by unit. Dependent observations form a cluster, which is one unit.
 #[derive(Debug, Clone)]
 pub struct ClusterSample {
     width: usize,
@@ -53,10 +51,9 @@ impl ClusterSample {
         }
     }
 
-    /// Returns the sums of the unit to which an observation belongs. Adds a unit if the observation has no cluster or a
-    /// new one.
+    /// Returns the sums of an observation's unit. Adds a unit if the observation has no cluster, or its cluster is new.
     ///
-    /// Returns `None`, and marks the sample as full, if there would be more than [`MAX_UNITS`] units.
+    /// Returns `None`, and marks the sample as full, if a unit would have to be added beyond [`MAX_UNITS`].
     pub fn unit(&mut self, cluster: Option<&str>) -> Option<&mut QuantitySums> {
         let known = cluster.and_then(|cluster| self.clusters.get(cluster).copied());
         let index = known.unwrap_or(self.units.len());
@@ -78,7 +75,7 @@ impl ClusterSample {
         self.units.len()
     }
 
-    /// Returns whether observations were left out because there would be more than [`MAX_UNITS`] units.
+    /// Returns whether an observation was left out because the sample has [`MAX_UNITS`] units.
     pub const fn is_full(&self) -> bool {
         self.is_full
     }
