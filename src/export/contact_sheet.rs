@@ -14,10 +14,10 @@ use crate::store::Project;
 /// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;
 
-/// The order of pairs on a contact sheet. Failed pairs come first, except in the order `Name`.
+/// The order of pairs on a contact sheet. In every order but `Name`, pairs without a result come first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactSheetOrder {
-    /// Largest error against ground truth first, or lowest `IoU` first without ground truth.
+    /// Pairs with ground truth first, by largest error. Then the other pairs, by lowest `IoU`.
     Worst,
     /// Lowest `IoU` on the canvas.
     Score,
@@ -83,10 +83,10 @@ struct SheetCandidate {
 
 /// Draws the contact sheet of a project from the current state of its catalog, without unfinished pairs.
 ///
-/// An image that cannot be drawn is left blank, and its cell states the reason.
+/// An image that cannot be drawn is left blank. If the depth map cannot be read, the cell states the reason.
 ///
 /// # Errors
-/// Returns an error if the catalog cannot be read.
+/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_contact_sheet(
     catalog: &Catalog,
     project: &Project,
@@ -122,8 +122,7 @@ async fn choose(
             let rank = rank(&pair, truth.as_ref(), options);
             chosen.push(SheetCandidate { rank, pair, truth });
         }
-        // The sort is stable and the pairs are read in the order of their names, so pairs of equal rank are sorted by
-        // name.
+        // Pairs are read in the order of their names, and the sort is stable. Pairs of equal rank stay sorted by name.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
         chosen.truncate(options.limit);
     }
@@ -170,7 +169,7 @@ fn cell(
     }
 }
 
-/// Returns the id of a pair, followed by its confidence and its verdict if there are any.
+/// Returns the id of a pair, with its confidence and its verdict if they exist.
 fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
     let mut title = pair.attributes.name.to_string();
     if let Some(record) = pair.metric(metric) {

@@ -18,7 +18,7 @@ pub(super) const MANUAL_ALIGNMENTS: &str = "manual_alignments.jsonl";
 /// Every entry of an export folder.
 const KNOWN: [&str; 5] = [LINES, PAIRS, VERDICTS, ATTENTION_CHECKS, MANUAL_ALIGNMENTS];
 
-/// A folder that is filled next to its target and then replaces the target. It is removed if it is dropped unfinished.
+/// A new folder next to its target. `finish` replaces the target with it. If it is dropped before, it is removed.
 #[derive(Debug)]
 pub(super) struct Folder {
     target: PathBuf,
@@ -87,7 +87,8 @@ impl Folder {
     /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be synced or renamed. An earlier export is then kept.
+    /// Returns an error if the folder cannot be synced or renamed; an earlier export is then kept. Also returns an
+    /// error if the replaced export cannot be removed; the target is then the new export.
     pub(super) fn finish(mut self) -> Result<(), FolderError> {
         sync(&self.partial).map_err(at(&self.partial))?;
         if self.target.exists() && exchange(&self.partial, &self.target) {
@@ -132,7 +133,7 @@ fn sync(folder: &Path) -> io::Result<()> {
     fs::File::open(folder)?.sync_all()
 }
 
-/// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
+/// Swaps two folders atomically. Returns `false` on failure, for example if the file system does not support it.
 #[cfg(target_os = "linux")]
 fn exchange(one: &Path, other: &Path) -> bool {
     use rustix::fs::{CWD, RenameFlags, renameat_with};

@@ -61,11 +61,11 @@ pub struct ExportLine {
 /// Threshold, pose and scores.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Height above the fitted surface, in mesh units, from which the depth map counts as stroke.
+    /// Depth threshold: pixels at or above this height over the fitted surface, in mesh units, count as stroke.
     pub threshold_depth: Option<f64>,
     /// Grey level 0..=65535 that separates ink from background.
     pub threshold_print: Option<f64>,
-    /// Clockwise rotation of the depth map on the screen, in degrees in (-180, 180].
+    /// Clockwise rotation on the screen from depth map to print, in degrees in (-180, 180].
     pub angle_deg: Option<f64>,
     /// Print pixels per depth-map pixel.
     pub scale: Option<f64>,
@@ -124,9 +124,9 @@ pub struct LineManualAlignment {
     pub at: UnixMillis,
     /// 3x4: mesh point to print pixel and height.
     pub print_from_mesh: PrintFromMesh,
-    /// 3x3: depth-map pixel to print pixel; null if the depth map has changed since the manual alignment.
+    /// 3x3: depth-map pixel to print pixel. Null if the depth map has changed since the manual alignment.
     pub print_from_depth: Option<[[f64; 3]; 3]>,
-    /// Intersection over union of the masks, on the same canvas as the line's scores.
+    /// Intersection over union of the masks, on the canvas used for the scores of this line.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,
@@ -150,7 +150,7 @@ impl LineManualAlignment {
     }
 }
 
-/// Returns the newest manual alignment of each pair, without undone and outdated ones.
+/// Returns the newest manual alignment of each pair. Alignments that were undone or are outdated are skipped.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read.

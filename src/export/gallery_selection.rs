@@ -1,5 +1,4 @@
-//! The images of the HTML report: results that reviewers failed or disagree on, results that miss the ground truth, and
-//! a random sample.
+//! Selects the images of the HTML report: bad or disputed results, and a random sample.
 
 use rayon::prelude::*;
 
@@ -51,14 +50,15 @@ pub struct GallerySelection {
 struct SelectedResults {
     /// Number of such results in the project.
     total: u64,
-    /// The results to draw, each with a sort key. The key is random for the random sample and 0 for other reasons.
+    /// The results to draw, each with a sort key. The key is random in the random sample and 0 elsewhere.
     subjects: Vec<(f64, GallerySubject)>,
 }
 
-/// Draws the images of a project's report. An image that cannot be drawn is left out, and the reason is given.
+/// Draws the images of a project's report. An image that cannot be drawn is left out. If the depth map cannot be read,
+/// the gallery states the reason.
 ///
 /// # Errors
-/// Returns an error if the catalog cannot be read.
+/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_gallery(
     mut selection: GallerySelection,
     catalog: &Catalog,
@@ -81,7 +81,7 @@ impl GallerySelection {
         }
     }
 
-    /// Adds the results of a pair that are to be drawn. Callers add the pairs in the order of their names.
+    /// Selects results of a pair to be drawn. Pairs must be added in the order of their names.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         for records in group_identical(&pair.metrics) {
             for (group, reason) in self.groups.iter_mut().zip(GalleryReason::ALL) {
@@ -193,7 +193,7 @@ impl GallerySubject {
         }
     }
 
-    /// Returns scores, confidence and errors against ground truth, if they exist.
+    /// Returns a text with the scores, confidence and errors against ground truth, as far as they exist.
     fn numbers(&self) -> String {
         let Some(record) = self.record() else {
             return String::new();

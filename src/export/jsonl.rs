@@ -26,7 +26,7 @@ const PAGE: usize = 64;
 /// What to export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct JsonlOptions {
-    /// Metrics of the current method. A pair without a result has one line for each metric.
+    /// Metrics of the current method. A pair without a result still has one line for each of these metrics.
     pub metrics: &'static [ThresholdMetric],
     /// Whether to write computing times, which make the bytes differ from run to run.
     pub with_times: bool,
@@ -43,7 +43,7 @@ pub struct ExportSummary {
     pub without_result: u64,
     /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
-    /// Whether an earlier export was kept because the new one lacks files of finished pairs.
+    /// Whether the new export was discarded because it lacks files of finished pairs. The earlier export was kept.
     pub kept_earlier: bool,
 }
 
@@ -64,11 +64,12 @@ pub enum ExportError {
 /// Exports every pair of a project to a folder, which must be new, empty or an earlier export. Replaces an earlier
 /// export.
 ///
-/// A pair whose files cannot be read is reported in its lines and in the summary, and the other pairs are exported. An
-/// export that lacks such files never replaces an earlier export: the new one is discarded.
+/// If the files of a pair cannot be read, its lines and the summary state so, and the other pairs are exported. Such an
+/// incomplete export never replaces an earlier export: the new one is discarded.
 ///
 /// # Errors
-/// Returns an error if the folder cannot be written or the catalog cannot be read. An earlier export is then kept.
+/// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. An earlier
+/// export is then kept, unless the error is that it cannot be removed after its replacement.
 pub async fn to_jsonl(
     catalog: &Catalog,
     project: &Project,

@@ -16,7 +16,7 @@ use crate::raster::{
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
-/// Paths of one line's files below the export folder. Masks are 8-bit PNG files in which 255 is stroke.
+/// Paths of the files of one line, relative to the export folder. Masks are 8-bit PNG images in which 255 is stroke.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Files {
     /// The print image as given.
@@ -91,7 +91,8 @@ pub(super) struct PairFiles<'a> {
     depth: DepthMap,
 }
 
-/// The PNG images that depend only on the alignment: depth mask, aligned depth, aligned mask and overlay.
+/// PNG images that metrics with the same threshold and alignment share: depth mask, aligned depth, aligned mask,
+/// overlay.
 pub(super) type EncodedImages = [Vec<u8>; 4];
 
 impl<'a> PairFiles<'a> {
@@ -140,7 +141,7 @@ impl<'a> PairFiles<'a> {
         ]
     }
 
-    /// Writes the files of one metric. Returns the paths of all files of the metric's line.
+    /// Writes the files of one metric. Returns the paths for the metric's line, including files that all metrics share.
     pub(super) fn write_metric(
         &self,
         root: &Path,

@@ -1,4 +1,4 @@
-//! Reads the print image of a pair, and draws the three images of a result.
+//! Reads the print image of a pair and draws the images of a result.
 
 use std::path::PathBuf;
 
@@ -78,9 +78,10 @@ impl SourcePrint {
     }
 }
 
-/// Draws the print, the aligned relief and the overlay of a metric's result, each at most `side` pixels wide and high.
+/// Draws the print, the aligned relief and the overlay of a metric's result. The longest side of each is `side` pixels.
 ///
-/// Also returns the reason if the depth map cannot be read. Returns no image and no reason if the print cannot be read.
+/// An image that cannot be drawn is `None`. The text is the reason if the depth map cannot be read, and otherwise
+/// `None`.
 pub(super) fn result_images(
     project: &Project,
     pair: &PairResults,

@@ -8,9 +8,9 @@ pub(super) const WIDTH: usize = 5;
 /// Height of a glyph, dots.
 pub(super) const HEIGHT: usize = 7;
 
-/// The rows of each glyph, top first; bit 4 is the leftmost dot.
+/// The rows of each glyph, from the top. Bit 4 of a row is the leftmost dot.
 ///
-/// In the file, a line with the letter in quotes precedes the rows of its glyph, in which `#` is a dot.
+/// In the font file, the letter in quotes stands on a line before the rows of its glyph. A `#` is a dot.
 static GLYPHS: LazyLock<BTreeMap<char, [u8; HEIGHT]>> = LazyLock::new(|| {
     let lines: Vec<&str> = include_str!("../../../assets/export/font.txt")
         .lines()
@@ -28,7 +28,7 @@ static GLYPHS: LazyLock<BTreeMap<char, [u8; HEIGHT]>> = LazyLock::new(|| {
         .collect()
 });
 
-/// Returns the rows of a glyph, top first; bit 4 is the leftmost dot. An unknown letter is an empty box.
+/// Returns the rows of a glyph, from the top. Bit 4 of a row is the leftmost dot. An unknown letter is an empty box.
 pub(super) fn glyph(letter: char) -> [u8; HEIGHT] {
     let known = GLYPHS.get(&letter);
     known.copied().unwrap_or([31, 17, 17, 17, 17, 17, 31])

@@ -1,11 +1,11 @@
-//! The print, the aligned relief, and the print with the edges of the aligned depth mask, in one frame.
+//! The images of a result in one frame: the print, the aligned relief, and the print with the relief's stroke edges.
 
 use super::paint::{Rgb, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
 use crate::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
-/// Vermillion of the palette of Okabe and Ito, which is distinct from ink and background for every colour vision.
+/// Vermillion from the palette of Okabe and Ito, which readers with colour blindness can distinguish from ink.
 const EDGE: [u8; 3] = [213, 94, 0];
 /// Blue of the same palette, for the edges of the true stroke tops.
 const TRUE_EDGE: [u8; 3] = [0, 114, 178];
@@ -31,14 +31,15 @@ impl PrintView {
         Self::new(scale, width, height)
     }
 
-    /// Returns the view enlarged by the smallest integer that makes its longest side at least `OVERLAY_SIDE`.
+    /// Returns a view enlarged by an integer. The factor is the smallest for a longest side of at least `OVERLAY_SIDE`.
     pub fn enlarged(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Creates a view. Pixels cover squares, so the image's corner at (-0.5, -0.5) is also the corner of the view.
+    /// Creates a view. The centre of the first pixel is (0, 0), so the outer corners of print and view match at (-0.5,
+    /// -0.5).
     fn new(scale: f64, width: usize, height: usize) -> Self {
         let shift = (scale - 1.0) / 2.0;
         Self {
@@ -68,8 +69,8 @@ impl PrintView {
         picture
     }
 
-    /// Draws the overlay with the edges of the true stroke tops below the edges of the depth mask. `tops` is a mask in
-    /// the print's frame.
+    /// Draws the print, then the edges of the true stroke tops, then those of the depth mask. `tops` is in the print's
+    /// frame.
     pub fn overlay_on_truth(
         &self,
         print: &PrintImage,
@@ -112,7 +113,8 @@ impl PrintView {
     }
 }
 
-/// Returns the set pixels with an unset pixel at most `width` away in their row or column. The border is no edge.
+/// Returns the set pixels with an unset pixel at most `width` away in their row or column. Pixels outside the image do
+/// not count as unset.
 fn edges(mask: &Mask, width: usize) -> Grid<bool> {
     let width = width as i64;
     Grid::from_fn(mask.width(), mask.height(), |x, y| {
@@ -165,7 +167,7 @@ mod tests {
         let picture = view.overlay(&blank_print(), &depth(), &outcome);
         assert_eq!((picture.width(), picture.height()), (480, 480));
         let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
-        // The bar covers print pixels 8..12. Enlarged 16 times, it covers the pixels 128..192 of the view.
+        // The bar covers print pixels 8 to 11. Enlarged 16 times, it covers view pixels 128 to 191.
         assert!(
             row[0].abs_diff(128) <= 1 && row[row.len() - 1].abs_diff(191) <= 1,
             "{row:?}"

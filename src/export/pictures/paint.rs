@@ -17,7 +17,7 @@ pub(super) fn eight_bits(print: &PrintImage) -> Rgb {
     print.rgb.map(|colour| colour.map(narrow))
 }
 
-/// Resizes an image. Shrinking averages the area that each pixel covers; enlarging takes the nearest pixel.
+/// Resizes an image. Each output pixel is the mean of the area it covers or, if enlarged, the nearest source pixel.
 pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();
@@ -27,7 +27,7 @@ pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     Rgb::from_fn(width, height, |x, y| mean(image, &columns[x], &rows[y]))
 }
 
-/// The source pixels that one output pixel covers along an axis, with their weights.
+/// The source pixels, with weights, that contribute to one output pixel along one axis.
 type Span = Vec<(usize, f64)>;
 
 fn spans(from: usize, to: usize) -> Vec<Span> {
@@ -59,7 +59,7 @@ fn mean(image: &Rgb, columns: &Span, rows: &Span) -> [u8; 3] {
     sum.map(|total| (total / weight).round() as u8)
 }
 
-/// Copies an image onto another with its top left corner at (x, y). Parts outside the target are cut off.
+/// Copies an image into another, with its top left corner at (x, y). Parts outside the target are cut off.
 pub(super) fn copy(onto: &mut Rgb, image: &Rgb, x: usize, y: usize) {
     for row in 0..image.height().min(onto.height().saturating_sub(y)) {
         for column in 0..image.width().min(onto.width().saturating_sub(x)) {
@@ -97,7 +97,7 @@ pub(super) fn truncated(text: &str, width: usize, dot: usize) -> String {
     kept + ".."
 }
 
-/// Draws a text with its top left corner at (x, y) and dots of `dot` pixels.
+/// Draws a text with its top left corner at (x, y). A dot of a letter is a square of `dot` pixels.
 pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize) {
     for (i, letter) in text.chars().enumerate() {
         let left = x + text_width(i, dot);

@@ -5,14 +5,14 @@ use crate::raster::Grid;
 
 /// Altitude of the light above the horizon, in radians. A low light shows shallow relief.
 const LIGHT_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
-/// Share of the grey value that depends on height, so that flat tops differ from flat background.
+/// Share of the grey value that depends on height. Without this share, flat tops and flat background would look alike.
 const HEIGHT_SHARE: f64 = 0.3;
 /// Red, green and blue in full light, 0..=1: the colour of wood.
 const WOOD: [f64; 3] = [1.0, 0.95, 0.86];
 /// Colour of pixels without data.
 const NO_DATA: [u8; 3] = [226, 232, 240];
 
-/// Returns a hill-shaded image of depth levels (0 = no data), lit from the upper left.
+/// Returns a hill-shaded image of depth levels, lit from the upper left. Level 0 marks missing data.
 ///
 /// `slope_per_level` is the height of one level divided by the side of a pixel, both in mesh units.
 pub fn shaded(levels: &Grid<u16>, slope_per_level: f64) -> Rgb {
@@ -32,7 +32,7 @@ pub fn shaded(levels: &Grid<u16>, slope_per_level: f64) -> Rgb {
     })
 }
 
-/// Returns Lambert's cosine, 0..=1, of a slope that is lit from the upper left.
+/// Returns the brightness, 0..=1, of a slope lit from the upper left (Lambert's cosine law).
 fn light(across: f64, down: f64) -> f64 {
     let (sin, cos) = LIGHT_ALTITUDE_RAD.sin_cos();
     let toward = cos * std::f64::consts::FRAC_1_SQRT_2;
@@ -40,7 +40,7 @@ fn light(across: f64, down: f64) -> f64 {
     ((toward * (across + down) + sin) / normal).max(0.0)
 }
 
-/// Returns 3 x 3 means over pixels with data. Without smoothing, scanner noise would hide the strokes.
+/// Returns each pixel's mean over 3 x 3 pixels, without missing data. Otherwise scanner noise would hide the strokes.
 fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     Grid::from_fn(levels.width(), levels.height(), |x, y| {
         if levels.at(x, y) == 0 {
@@ -56,8 +56,8 @@ fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     })
 }
 
-/// Returns the slope along a direction in levels per pixel, by central differences, or by one-sided ones next to
-/// missing data.
+/// Returns the slope in direction `[dx, dy]`, in levels per pixel. It is a central difference, or a one-sided
+/// difference next to missing data.
 fn slope(heights: &Grid<Option<f64>>, [x, y]: [usize; 2], [dx, dy]: [i64; 2]) -> f64 {
     let at = |step: i64| {
         heights

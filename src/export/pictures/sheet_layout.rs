@@ -30,7 +30,7 @@ pub struct ContactSheetCell {
     pub id: String,
     /// Its scores, or why it failed.
     pub note: String,
-    /// Whether the result is missing or known to be wrong, by reviewers or by the ground truth.
+    /// Whether the result is missing, failed by reviewers, or off the ground truth.
     pub wrong: bool,
     /// Print, aligned relief and overlay, where they exist.
     pub tiles: [Option<Rgb>; TILES],
@@ -61,12 +61,12 @@ impl SheetLayout {
     }
 }
 
-/// Returns the longest side, in pixels, of the images on a sheet with this many columns.
+/// Returns the side, in pixels, of the square space for one image on a sheet with this many columns.
 pub fn tile_side(columns: usize) -> usize {
     SheetLayout::new(columns).tile
 }
 
-/// Draws cells in 1 to 12 columns on a sheet [`SHEET_WIDTH`] pixels wide. Images too large for a cell are shrunk.
+/// Draws cells in 1 to 12 columns on a sheet [`SHEET_WIDTH`] pixels wide. Images larger than their space are shrunk.
 pub fn contact_sheet(cells: &[ContactSheetCell], columns: usize) -> Rgb {
     let layout = SheetLayout::new(columns);
     let height = cells.len().div_ceil(layout.columns).max(1) * layout.cell[1];

@@ -1,4 +1,4 @@
-//! Tables that compare metrics with each other, and the table of bootstrap intervals.
+//! Tables that compare metrics, and the table of bootstrap intervals.
 
 use super::table::Table;
 use crate::report::comparison::{Comparison, versus};
@@ -10,8 +10,7 @@ use crate::report::score_bootstrap::{BootstrapSettings, MeanIntervals};
 /// Reads one interval of a metric's means.
 type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 
-/// Returns the table that compares metrics by which results are right. The table has no conclusions. Returns `None` if
-/// there are no comparisons.
+/// Returns the table of comparisons by the number of right results. Returns `None` if there are no comparisons.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let table = Table::of(&report.comparisons)
@@ -36,8 +35,8 @@ pub(super) fn comparison_sentences(report: &Report) -> Vec<String> {
     report.comparisons.iter().map(sentence).collect()
 }
 
-/// Returns the bootstrap intervals of the means, and of Acc if whole blocks were resampled. Returns `None` if there is
-/// no interval.
+/// Returns the table of bootstrap intervals: of mean scores and, if whole blocks were resampled, of Acc. Returns `None`
+/// if there is no interval.
 pub(super) fn mean_intervals(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
     let fields: [(&'static str, MeanIntervalField); 4] = [
@@ -74,8 +73,8 @@ fn method(settings: &BootstrapSettings) -> String {
     )
 }
 
-/// Returns the table that compares metrics by score. Returns `None` if no comparison has an interval. In that case the
-/// report has a warning instead.
+/// Returns the table of comparisons by score. Returns `None` if no comparison has an interval; a warning in the report
+/// then gives the reason.
 pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
     let mut compared = report.score_comparisons.iter();

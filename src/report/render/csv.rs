@@ -7,7 +7,7 @@ use crate::report::comparison::Basis;
 use crate::report::model::{MetricRow, Report};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
 
-/// The columns. Each has a name and a JSON pointer to its values in [`document`].
+/// The columns. Each has a name, and a JSON pointer to its value in the JSON that [`document`] returns.
 #[derive(Default)]
 struct CsvColumns(Vec<[String; 2]>);
 
@@ -26,7 +26,7 @@ pub(super) fn render(report: &Report) -> String {
     text
 }
 
-/// Returns a row as JSON, together with the values of its metric from other parts of the report.
+/// Returns a row as JSON. Adds the values that other parts of the report hold on the same metric.
 fn document(report: &Report, row: &MetricRow) -> Value {
     let mut value = serde_json::to_value(row).expect("a row is JSON");
     let truth_ci95 = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
@@ -92,8 +92,9 @@ fn columns() -> CsvColumns {
 }
 
 impl CsvColumns {
-    /// Adds a column for each of the `fields` of the JSON object at `parent`. A field is written as `field` or as
-    /// `name=field`. A name that ends with `ci95` gets two columns, one for each bound.
+    /// Adds columns for fields of the JSON object at `parent`. `fields` is a list such as `n acc=share`: an item is the
+    /// field's name, or `column=field` if the column has another name. A column whose name ends with `ci95` is split in
+    /// two, one for each bound.
     fn add(&mut self, prefix: &str, parent: &str, fields: &str) {
         for field in fields.split_whitespace() {
             let (name, field) = field.split_once('=').unwrap_or((field, field));
@@ -108,7 +109,8 @@ impl CsvColumns {
         }
     }
 
-    /// Adds the columns of a risk-coverage curve, such as `acc_at_97`, the Acc of the 97 % most confident results.
+    /// Adds the columns of a risk-coverage curve. For example, `acc_at_97` is the Acc of the 97 % most confident
+    /// results.
     fn add_risk_coverage(&mut self, prefix: &str, parent: &str) {
         let least = format!("failures_in_least_{LEAST_CONFIDENT_PERCENT}=failures_in_least");
         let fields = format!("n failures {least}");
@@ -135,7 +137,7 @@ fn field(value: Option<&Value>) -> String {
     }
 }
 
-/// Returns a text field, in quotes if necessary. A text that a spreadsheet would take for a formula gets a leading `'`.
+/// Returns a text as a CSV field, quoted if necessary. A leading `'` keeps spreadsheets from running it as a formula.
 fn escape(text: &str) -> String {
     let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let guarded = if is_formula { "'" } else { "" }.to_owned() + text;

@@ -72,7 +72,7 @@ fn cell_text(cell: Option<&str>, column: TableColumn) -> String {
         (None, ColumnFormat::Number(_)) => "{--}".to_owned(),
         (Some(text), ColumnFormat::Interval) => escape(text).replace('-', "--"),
         (Some(text), ColumnFormat::Text) => escape(text),
-        // For siunitx a comma is a decimal marker. It adds the separators of thousands itself.
+        // `siunitx` adds the separators of thousands itself, and would read a comma as a decimal marker.
         (Some(text), ColumnFormat::Number(_)) => text.replace(',', ""),
     }
 }

@@ -10,7 +10,7 @@ use crate::report::number_format::{counted, format_count};
 use crate::report::stats::Rate;
 use crate::report::truth_summary::TruthSummary;
 
-/// Returns the tables of a report. The table of scores is always included, the other tables only if they have content.
+/// Returns the tables of a report. A table without content is left out, except the table of scores.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let tables = [
         Some(scores(report)),

@@ -30,7 +30,7 @@ pub(super) enum ColumnFormat {
     Text,
     /// The two bounds of a share, joined by a hyphen and aligned to the left.
     Interval,
-    /// Numbers with this many decimals, aligned at the decimal point. A comma separates thousands.
+    /// Numbers with this many decimals, aligned at the decimal point, with a comma between thousands.
     Number(usize),
 }
 

@@ -42,7 +42,7 @@ pub(super) fn with_caption(table: &Table) -> String {
     aligned(table) + &wrapped("", &table.caption)
 }
 
-/// Returns a table with padded columns. Text is aligned to the left, and numbers are aligned to the right.
+/// Returns a table with padded columns. Text is aligned to the left, numbers to the right.
 pub(super) fn aligned(table: &Table) -> String {
     let widths: Vec<usize> = (0..table.columns.len())
         .map(|i| {
@@ -106,7 +106,7 @@ fn failures(group: &FailureGroup) -> String {
     lines.concat()
 }
 
-/// Breaks a text into lines. The first line begins with `mark`, and the others are indented by the width of `mark`.
+/// Breaks a text into lines. The first line begins with `mark`; the others are indented to the same column.
 pub(super) fn wrapped(mark: &str, text: &str) -> String {
     let indent = mark.chars().count();
     let mut lines: Vec<String> = Vec::new();

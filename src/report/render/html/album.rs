@@ -65,7 +65,7 @@ impl<'a> Album<'a> {
     }
 }
 
-/// Returns a group's name in URL fragments, its title and its introduction.
+/// Returns three texts on a group: its name in URL fragments, its title and its introduction.
 const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static str) {
     match reason {
         GalleryReason::Failed => (
@@ -117,7 +117,7 @@ fn figure(item: &GalleryItem) -> Markup {
     }
 }
 
-/// Returns the code points of a character, such as `U+20041`, in case no installed font can show the character.
+/// Returns the code points of a character, such as `U+20041`, for readers whose fonts lack the character.
 fn code_points(character: &str) -> String {
     let points = character.chars().map(|c| format!("U+{:04X}", u32::from(c)));
     points.collect::<Vec<_>>().join(" ")

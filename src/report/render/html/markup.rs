@@ -1,4 +1,4 @@
-//! Tables as HTML, with a caption and with row and column headers. The first cell of a row is its header.
+//! Tables as HTML, with a caption, column headers, and the first cell of each row as its header.
 
 use maud::{Markup, html};
 

@@ -29,8 +29,7 @@ pub struct Cover {
     pub date: Option<String>,
 }
 
-/// Returns the page. Images that would make the page exceed [`MAX_PAGE_BYTES`] are left out, and the page states how
-/// many are shown.
+/// Returns the page. Images that do not fit into [`MAX_PAGE_BYTES`] are left out; the page states how many are shown.
 pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
     let without_images = document(report, &Album::new(gallery, 0), cover).into_string();
     let max_image_bytes = MAX_PAGE_BYTES.saturating_sub(without_images.len() + RESERVED_BYTES);

@@ -1,4 +1,4 @@
-//! SVG plots of the numbers in the tables of the page, in the colours of the page.
+//! SVG plots of numbers in the tables of the page. They use the page's colours.
 
 use maud::{Markup, html};
 
@@ -31,7 +31,7 @@ struct PlotRow {
     label: String,
 }
 
-/// Returns the plot of every metric's Acc with its interval. Empty if there is no Acc.
+/// Returns the plot of every metric's Acc with its interval. The plot is empty if no metric has an Acc.
 pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     let found = report.rows.iter().filter_map(|row| {
         let (acc, ends) = match (basis, &row.truth) {
@@ -48,7 +48,7 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     });
     let rows: Vec<PlotRow> = found.collect();
     let lowest = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
-    // The axis begins at a multiple of 0.1, at 0.9 or below, so that rows near 1 remain distinguishable.
+    // The axis begins at a multiple of 0.1 that is at most 0.9. Values near 1 then remain distinguishable.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
     let (by, interval) = (basis.name(), report.interval.title());
     let caption = format!("Acc by {by} with its {interval} interval");
@@ -75,7 +75,7 @@ fn round_up(number: f64) -> f64 {
     (number / unit).ceil() * unit
 }
 
-/// Returns rows of points on lines above an axis. Empty if there are no rows.
+/// Returns a plot with one line and one point for each row. The plot is empty if there are no rows.
 fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption: &str) -> Markup {
     let place = |value: f64| LEFT + (RIGHT - LEFT) * (value - from) / (to - from);
     let below = ROW * rows.len() as f64;
@@ -98,7 +98,7 @@ fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption:
     html! { @if !rows.is_empty() { (figure(below + SCALE, &alt, caption, &drawing)) } }
 }
 
-/// Returns the distributions of all metrics' thresholds, one below the other on a common axis.
+/// Returns a histogram of each metric's thresholds. All histograms share one axis.
 pub(super) fn thresholds(report: &Report) -> Markup {
     let found = &report.thresholds;
     let below = (BARS + 14.0) * found.len() as f64;

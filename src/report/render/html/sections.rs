@@ -140,7 +140,7 @@ fn p_values(found: &Comparison) -> Markup {
     }
 }
 
-/// Returns the risk-coverage curves, with the full tables in a collapsed element, or `None` if there are no curves.
+/// Returns the section on risk-coverage curves, whose full tables are collapsed. Returns `None` without curves.
 fn confidence(report: &Report) -> Option<Markup> {
     let short = short_tables(report);
     (!short.is_empty()).then(|| {
