@@ -1,9 +1,11 @@
 //! Decides which side of the plane is carved.
 //!
-//! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files and reversed in
-//! some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged. The manifest
-//! may give the direction of the scan. And the relief of the carved side agrees with the print. That weighs most,
-//! because only the print shows the character.
+//! Four kinds of evidence are combined as log-odds:
+//!
+//! - Winding: the faces are wound outward in most files.
+//! - Flatness: stroke tops are planed and have about the same height; the ground is gouged and rough.
+//! - Manifest: it may give the direction of the scan.
+//! - Print: the relief of the carved side resembles the print. This weighs most, as only the print shows the character.
 
 use super::surface::{HeightSamples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
@@ -13,22 +15,24 @@ use crate::stages::pose::{
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// A side with less than this share of the other side's relief is the back of the block.
+/// If the relief of one side is below this share of the opposite side's relief, it is the back of the block.
 const BACK: f64 = 0.35;
-/// Weights in the log-odds: winding from -1 (inward) to 1 (outward), logarithm of the ratio of the layers' widths,
-/// logarithm of the ratio of the agreements with the print, attribute of the manifest.
+/// Weight of the winding, from -1 (inward) to 1 (outward).
 const WINDING: f64 = 2.0;
+/// Weight of the logarithm of the ratio of the two layer widths.
 const SHARPNESS: f64 = 0.7;
+/// Weight of the logarithm of the ratio of the two agreements.
 const AGREEMENT: f64 = 14.0;
+/// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
-/// If the likelier side reaches this agreement, the other one is not measured: the highest agreement of 500 backs was
-/// 0.55, measured with walls and frame lines included.
+/// If the likelier side reaches this agreement with the print, the other side is not measured. The highest agreement of
+/// 500 backs was 0.55, with walls and frame lines included.
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;
 /// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;
-/// Limits of the search against the print: as in registration, but coarser.
+/// Limits of the pose search that compares a side with the print. The search is coarser than in registration.
 const LIMITS: SearchRange = SearchRange {
     max_scale: 1.6,
     beam_width: mirrored(5),
@@ -48,7 +52,7 @@ const PASSES: [RefinementPass; 2] = [
     },
 ];
 
-/// Returns a beam with mirrored poses only. A side is rendered from outside, so its character is in mirror writing.
+/// Returns a beam of mirrored poses only, because a block seen from outside shows mirror writing.
 const fn mirrored(count: usize) -> BeamWidth {
     BeamWidth {
         upright: 0,
@@ -58,8 +62,8 @@ const fn mirrored(count: usize) -> BeamWidth {
 
 /// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Nearness to the tops below which nothing prints. The pose search uses the slopes around strokes as well, but around
-/// thin strokes the slopes are too broad to measure the agreement.
+/// Nearness to the surface below which wood does not print. Without this limit, the slopes around thin strokes would
+/// count as strokes. Only the pose search uses the slopes.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
@@ -84,7 +88,7 @@ pub(super) struct SideInputs<'a> {
     pub(super) scanned_face_down: Option<bool>,
 }
 
-/// Returns the carved side with the evidence for it. Returns `None` if neither side shows a surface.
+/// Chooses the carved side. Returns the side with the evidence for it, or `None` if neither side shows a surface.
 pub(super) fn choose(
     sides: [Option<FittedSide>; 2],
     inputs: SideInputs<'_>,
@@ -147,8 +151,8 @@ fn log_odds(
     mesh_only + AGREEMENT * agreement
 }
 
-/// Returns the logarithm of the likelier side's agreement with the print divided by the other's, which is measured only
-/// if the likelier one is not certain; 0 when the print shows no ink.
+/// Returns `ln(a / b)` for the agreement a of the likelier side with the print and the agreement b of the other side.
+/// If a is at least `CERTAIN`, b is not measured. Returns 0 if the print shows no ink.
 fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     let Ok(hypotheses) = print.hypotheses() else {
         return 0.0;
@@ -172,8 +176,8 @@ fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     (first / second).ln()
 }
 
-/// Returns the agreement of the mirrored rendering of a side with the ink: correlation times the share of the tops
-/// that printed.
+/// Returns the best agreement of a side with the ink among the poses found: the correlation times the share of the
+/// stroke tops that printed.
 fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;
@@ -190,8 +194,8 @@ fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     scores.fold(0.0, f64::max)
 }
 
-/// Returns the width of the layer of heights at the tops: the interquartile range of the upper part of the relief, as a
-/// share of the relief.
+/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief. Heights far below the
+/// surface are left out.
 fn layer_width(side: &FittedSide) -> f64 {
     let mut upper = side.samples.residuals(&side.surface);
     upper.retain(|r| *r > -0.4 * side.relief);

@@ -1,6 +1,6 @@
 //! Points of a height map, and weighted least squares over them.
 //!
-//! A surface is fitted in about thirty passes, so points are stored in blocks of lanes that are summed together.
+//! Fitting a surface takes about thirty passes over the points, which are stored in blocks for SIMD instructions.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -61,8 +61,8 @@ impl Points {
         residuals
     }
 
-    /// Solves the weighted least squares for the first `TERMS` (3 or 6) coefficients. `weight` returns the weight of a
-    /// point, given its height over the surface `from`.
+    /// Computes the first `TERMS` coefficients by weighted least squares: 3 for a plane, 6 for a curved surface.
+    /// `weight` maps the height of a point over the surface `from` to the weight of the point.
     pub(super) fn solve<const TERMS: usize>(
         &self,
         from: &Coefficients,
@@ -70,7 +70,7 @@ impl Points {
         priors: &[Prior; 6],
     ) -> Coefficients {
         let (blocks, whole) = (&self.blocks, self.count / LANES);
-        // Local sums and copied points: possible aliasing would prevent vectorization.
+        // The sums are local and each block is copied, because possible aliasing would prevent vectorization.
         let mut sums = dispatch!({
             let mut sums = MomentSums::default();
             for block in &blocks[..whole] {
@@ -103,7 +103,7 @@ pub(super) fn value(c: &Coefficients, [u, v]: [f64; 2]) -> f64 {
     c[0] + c[1] * u + c[2] * v + c[3] * (u * u) + c[4] * (u * v) + c[5] * (v * v)
 }
 
-/// Returns the heights of points over a surface of which only the first `TERMS` coefficients count.
+/// Returns the heights of points over the surface given by the first `TERMS` coefficients.
 #[inline(always)]
 fn over<const TERMS: usize>([u, v, z]: &[PointLanes; 3], c: &Coefficients) -> PointLanes {
     let mut over = [0.0; LANES];
@@ -117,7 +117,7 @@ fn over<const TERMS: usize>([u, v, z]: &[PointLanes; 3], c: &Coefficients) -> Po
     over
 }
 
-/// Multiplies lane by lane; a loop, because only inlined code uses the wide instructions.
+/// Multiplies lane by lane, in a loop that is inlined and vectorized.
 #[inline(always)]
 fn times(a: &PointLanes, b: &PointLanes) -> PointLanes {
     let mut products = [0.0; LANES];
@@ -127,14 +127,17 @@ fn times(a: &PointLanes, b: &PointLanes) -> PointLanes {
     products
 }
 
-/// Number of monomials of u and v up to the second and up to the fourth degree.
+/// Number of monomials of u and v up to the second degree.
 const SECOND: usize = 6;
+/// Number of monomials of u and v up to the fourth degree.
 const FOURTH: usize = 15;
 
-/// Weighted sums over points of `u^i v^j`, by degree, and of the first six of them times z.
+/// Weighted sums over points, one sum per lane.
 #[derive(Default)]
 struct MomentSums {
+    /// Sums of the monomials `u^i v^j` in the order of degree.
     powers: [PointLanes; FOURTH],
+    /// Sums of z times the first six monomials.
     heights: [PointLanes; SECOND],
 }
 
@@ -149,8 +152,8 @@ impl MomentSums {
                 }
             }
         };
-        // Each degree from the one before: all times u, then the last one times v. Written out, because a loop over the
-        // degrees takes four times as long.
+        // Each product of one degree times u, and the last one also times v, gives the next degree. A loop over the
+        // degrees would take four times as long.
         let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
         let second = [
             times(&first[0], u),
@@ -184,8 +187,7 @@ impl MomentSums {
         }
     }
 
-    /// Solves the normal equations for the first `terms` coefficients. Returns all zeros if the equations are
-    /// singular.
+    /// Solves the normal equations for the first `terms` coefficients. Returns zeros if the equations are singular.
     fn solve(&self, terms: usize, priors: &[Prior; 6]) -> Coefficients {
         let total = |lanes: &PointLanes| lanes.iter().sum::<f64>();
         let mut normal = Matrix6::<f64>::identity();
@@ -204,7 +206,7 @@ impl MomentSums {
     }
 }
 
-/// Returns the index among the monomials of the product of two of the first six.
+/// Returns the index of the product of the monomials `i` and `j`, which are among the first six.
 fn product(i: usize, j: usize) -> usize {
     // Degree and exponent of v of each monomial 1, u, v, uu, uv, vv.
     let of = |k: usize| [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)][k];

@@ -1,8 +1,8 @@
-//! Mesh to character plane (paper III-A): a one-sided robust surface over the highest parts, and the carved side.
+//! The fit stage (paper III-A): finds the plane of the stroke tops and the carved side of a mesh.
 //!
-//! The mesh is rendered from both sides and a surface is fitted to the tops of each. The plane depends on the mesh
-//! only. The side depends on the print as well: `src/lib.rs` explains why it is decided here. The paper's fit is in
-//! `paper_method::fit`.
+//! Both sides of the mesh are rendered, and a surface is fitted to the stroke tops of each rendering. The plane depends
+//! on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the side is chosen in
+//! this stage. The paper's own fit is in `paper_method::fit`.
 
 mod carved_side;
 mod least_squares;
@@ -16,7 +16,7 @@ pub(super) use pca::{Axes, frame};
 pub(super) use surface::quantile;
 pub use upper_surface::fit;
 
-/// Raised whenever the same inputs and settings may give another result than before.
+/// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 10;
 
 #[cfg(test)]

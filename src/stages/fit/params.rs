@@ -14,13 +14,13 @@ pub struct FitParams {
     pub seed: u64,
     /// Paper's method: number of points of the spaced selection, 3 or more.
     pub spaced_points: u32,
-    /// Paper's method: spacing of that selection as a share of the mesh's extent, above 0.
+    /// Paper's method: least distance between selected points, as a share of the mesh's extent, above 0.
     pub spacing: f64,
     /// Paper's method: RANSAC draws, 1 or more.
     pub ransac_draws: u32,
-    /// Paper's method: inlier distance of that RANSAC as a share of the mesh's extent, above 0.
+    /// Paper's method: largest distance of a RANSAC inlier from the plane, as a share of the mesh's extent, above 0.
     pub ransac_distance: f64,
-    /// Smallest relief as a share of the mesh's extent; below it there is no carving to align.
+    /// Smallest depth of the carving, as a share of the mesh's extent. The fit fails below this.
     pub min_relief: f64,
 }
 

@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::stages::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
-/// Least number of points of a surface without faces: 25 along a side show one or two strokes.
+/// A mesh without faces needs at least this many points. 25 points along a side show one or two strokes.
 const LEAST_POINTS: usize = 600;
 
 /// Centre and principal axes, longest first, with the variance along each.
@@ -37,8 +37,8 @@ impl Axes {
         Self::from_moments(centre, spread / total)
     }
 
-    /// Computes the axes of a surface by area, or of the vertices where there is no area. Specks far from the bulk are
-    /// left out.
+    /// Computes the axes of a surface, weighted by area, without distant specks. If there is no area, uses the
+    /// vertices.
     pub(crate) fn of_surface(mesh: &Mesh, indexed: &IndexedSurface) -> Self {
         if let Some(moments) = Moments::of(indexed) {
             return Self::from_moments(moments.centre, moments.covariance);
@@ -75,14 +75,14 @@ impl Axes {
         Ok(())
     }
 
-    /// Returns the normal of the plane through the centre with the least variance.
+    /// Returns the direction with the least variance, the normal of the best-fitting plane.
     pub(crate) fn normal(&self) -> Vector3<f64> {
         self.directions[2]
     }
 }
 
-/// Returns a right-handed plane frame with this normal whose x axis is as close as possible to the mesh's x, so that an
-/// upright scan stays upright; to the mesh's y where the normal runs along x.
+/// Returns a right-handed plane frame with this normal. The x axis is as close as possible to the mesh's x, so an
+/// upright scan stays upright. If the normal is close to the mesh's x, the mesh's y is used instead.
 pub(crate) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
     let along = if normal.normalize().x.abs() < 0.9 {
         Vector3::x()
@@ -92,7 +92,7 @@ pub(crate) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
     frame_along(normal, along, origin)
 }
 
-/// Returns a right-handed plane frame with this normal whose x axis is as close as possible to `along`.
+/// Returns a right-handed plane frame with this normal. Its x axis is as close as possible to `along`.
 pub(crate) fn frame_along(
     normal: Vector3<f64>,
     along: Vector3<f64>,

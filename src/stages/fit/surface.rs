@@ -1,7 +1,7 @@
 //! A one-sided robust surface over the highest parts of a height map.
 //!
 //! Stroke tops are the original face of the block: much of the block lies below them and nothing above. Therefore a
-//! point above the surface has a high cost, and a point far below the surface has none.
+//! point above the surface has a high weight, and a point far below the surface has none.
 
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
@@ -10,41 +10,44 @@ use crate::stages::components::ConnectedComponents;
 use crate::stages::pose::SoftMask;
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
-/// Weight of points above the surface in the first, convex passes. Points below weigh one minus this, so the surface
-/// is this expectile of the heights.
+/// Weight of points above the surface in the first, convex passes. Points below weigh `1 - ENVELOPE`. The surface is
+/// then the 0.97 expectile of the heights.
 const ENVELOPE: f64 = 0.97;
 /// Weight of a point above the surface in the passes that follow.
 const ABOVE: f64 = 3.0;
-/// For each pass, the distance below the surface from which a point has no weight, as a share of the height range.
+/// Distances below the surface at which the weight of a point falls to 0, as shares of the height range. Each distance
+/// is used for `NARROW_PASSES` passes.
 const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
-/// Number of convex passes, and of passes for each window.
+/// Number of convex passes.
 const ENVELOPE_PASSES: usize = 8;
+/// Number of passes for each window.
 const NARROW_PASSES: usize = 2;
 /// Number of wide windows, for which a quarter of the points is enough.
 const WIDE_WINDOWS: usize = 3;
-/// Tops within this distance of the cut of the mesh, in pixels of the rendering, belong to neighbouring characters.
+/// Connected tops this close to the edge of the mesh, in rendering pixels, belong to a neighbouring character.
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
 const OFF_TOP_WEIGHT: f64 = 1e-6;
-/// Least share of the tops that must remain without the tops at the cut.
+/// Least share of the tops that must remain without the tops at the edge.
 const LEAST_OWN: f64 = 0.4;
-/// Margin of the view, as a share of each side, that is left out when the depth of the carving is measured.
+/// Share of the view's width and height left out at each border when the depth of the carving is measured.
 const MARGIN: f64 = 0.15;
-/// Number of neighbouring pixels of a top whose errors are correlated, so that they count as one.
+/// Number of neighbouring pixels that count as one observation, because their errors are correlated.
 const CORRELATED_PX: f64 = 40.0;
-/// Standard deviation of the tops' roughness, as a share of the height range.
+/// Standard deviation of the heights on rough stroke tops, as a share of the height range.
 const TOP_SIGMA: f64 = 0.05;
-/// Standard deviation of the slope between the tops' plane and the carved ground.
+/// Prior standard deviation of the slope between the tops' plane and the mean plane of all heights.
 const TILT_SIGMA: f64 = 0.05;
-/// Prior standard deviation of the second-degree coefficients, with lengths in units of the extent. For one square
-/// term it is a bow of about 4 % of the extent at the edge (u = 0.5).
+/// Prior standard deviation of the second-degree coefficients, with lengths in units of the extent. If c3 has this
+/// value, the surface rises by about 4 % of the extent from its middle to its edge (u = 0.5).
 const BOW_SIGMA: f64 = 0.15;
-/// The same about the ground's coefficients, where enough ground is visible.
+/// Prior standard deviation of the difference between the second-degree coefficients of tops and ground.
 const GROUND_BOW_SIGMA: f64 = 0.03;
-/// Ground: starting quantile of the heights over the mean plane, windows as shares of the height range, and least share
-/// of the visible area within the last window.
+/// Quantile of the heights over the mean plane at which the fit of the ground starts.
 const GROUND_START: f64 = 0.25;
+/// Distances from the ground at which the weight of a point falls to 0, as shares of the height range.
 const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
+/// Least share of the visible area that must be within the last window.
 const LEAST_GROUND: f64 = 0.3;
 /// A surface with less support rests on few strokes.
 const SPARSE: f64 = 0.2;
@@ -53,7 +56,7 @@ const SOFT_SPAN: f64 = 0.5;
 /// Ratio of supports by which a bow must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
-/// Heights of a view as points. Lengths are divided by the extent, so u and v are in about -0.5..=0.5.
+/// Heights of a view as points. Coordinates are divided by the view's longest side: u and v are about -0.5..=0.5.
 #[derive(Debug)]
 pub(super) struct HeightSamples {
     points: Points,
@@ -66,15 +69,15 @@ pub(super) struct HeightSamples {
     size: [usize; 2],
     centre: [f64; 2],
     extent: f64,
-    /// Range of heights over the mean plane without the extreme 3 % at either end.
+    /// Range of the heights over the mean plane, without the lowest and the highest 3 %.
     range: f64,
 }
 
-/// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it fits.
+/// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     pub(super) coefficients: Coefficients,
-    /// Share of the visible area that supports the surface, minus a penalty for points above the surface.
+    /// Points near the surface, weighted by nearness, minus a penalty for points above, as a share of all points.
     pub(super) support: f64,
     /// Share of the visible area within the last window.
     pub(super) tops: f64,
@@ -131,7 +134,7 @@ impl HeightSamples {
         }
     }
 
-    /// Transforms the points to another frame with a small rotation from this one.
+    /// Transforms the points to a frame that is only slightly rotated.
     pub(super) fn turned(&self, other_from_this: &Rigid3) -> Self {
         let at = |[u, v, z]: [f64; 3]| {
             let [u, v, z] = [u, v, z].map(|share| share * self.extent);
@@ -146,7 +149,7 @@ impl HeightSamples {
         Self::of(points, self.places.clone(), self.size, [x, y], self.extent)
     }
 
-    /// Fits the surface over the tops; second-degree only when allowed and when it fits better.
+    /// Fits a surface to the stroke tops. Returns a plane, unless `allow_bow` is set and a curved surface fits better.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
         let priors = self.priors(self.mean_plane, BOW_SIGMA);
@@ -190,7 +193,7 @@ impl HeightSamples {
         self.judge(c)
     }
 
-    /// Returns priors of the same weight relative to the subsampled points as the given ones to all points.
+    /// Scales the precision of priors to the number of subsampled points.
     fn priors_of_few(&self, priors: &[Prior; 6]) -> [Prior; 6] {
         let share = self.few.len() as f64 / self.points.len() as f64;
         priors.map(|prior| Prior {
@@ -221,8 +224,8 @@ impl HeightSamples {
         }
     }
 
-    /// Returns priors for the coefficients, which decide where few tops are visible: tilt and bend of `mean`, the
-    /// second degree within `bow_sigma`.
+    /// Returns priors with the coefficients `mean`. Second-degree coefficients have the standard deviation `bow_sigma`.
+    /// If few stroke tops are visible, the priors dominate.
     fn priors(&self, mean: Coefficients, bow_sigma: f64) -> [Prior; 6] {
         let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
         std::array::from_fn(|k| {
@@ -235,15 +238,15 @@ impl HeightSamples {
         })
     }
 
-    /// Returns priors from the ground where enough of it is visible: a block bends as a whole, so the tops bend as the
-    /// ground does. Without them few strokes would leave the bend undetermined.
+    /// Returns priors with the curvature of the ground, or `None` if too little ground is visible. A block bends as a
+    /// whole, so the ground shows how the tops bend, even if there are few strokes.
     fn priors_along_ground(&self) -> Option<[Prior; 6]> {
         let [a, b, c, ..] = self.mean_plane;
         let [_, _, _, p, q, r] = self.ground()?;
         Some(self.priors([a, b, c, p, q, r], GROUND_BOW_SIGMA))
     }
 
-    /// Fits a second-degree surface to the carved ground. Returns `None` if too little of it is visible.
+    /// Fits a second-degree surface to the carved ground. Returns `None` if too little ground is visible.
     fn ground(&self) -> Option<Coefficients> {
         let mut c = self.mean_plane;
         c[0] += quantile(&mut self.points.residuals(&c), GROUND_START);
@@ -269,8 +272,8 @@ impl HeightSamples {
         residuals
     }
 
-    /// Returns the residuals without a margin of the view: side walls and a protruding foot are neither tops nor
-    /// ground.
+    /// Returns the residuals without the border of the view. Side walls and a protruding foot of the block may be
+    /// visible at the border, and are neither tops nor ground.
     pub(super) fn inner_residuals(&self, surface: &Surface) -> Vec<f64> {
         let [width, height] = self.size;
         let inside = |i: usize, side: usize| {
@@ -286,7 +289,8 @@ impl HeightSamples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Returns the nearness to the surface as an image: 1 on it, 0 from half the relief down.
+    /// Returns an image of the nearness to the surface: 1 on or above the surface, 0 if half the relief or more below
+    /// it.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {
@@ -301,10 +305,10 @@ impl HeightSamples {
         soft
     }
 
-    /// Returns the plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.
+    /// Returns the plane `z = a + b x + c y` through the stroke tops, in plane coordinates and mesh units.
     ///
-    /// Tops that reach the cut belong to neighbours: they help to fit the surface, but do not mark the character's
-    /// place on it.
+    /// Tops at the edge of the mesh belong to neighbouring characters. If the surface is curved, they help to fit the
+    /// surface but hardly influence the plane.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
         let is_bent = c[3..].iter().any(|c| *c != 0.0);
@@ -312,7 +316,7 @@ impl HeightSamples {
         [a, b, c]
     }
 
-    /// Returns the plane that fits a bent surface best at the tops of the character; other points have a tiny weight.
+    /// Fits a plane to a curved surface at the character's own tops. Other points have a tiny weight.
     fn plane_in(&self, c: &Coefficients) -> Coefficients {
         let own = self.own_tops(c);
         let (mut all, mut tops) = (Points::default(), Points::default());
@@ -329,7 +333,7 @@ impl HeightSamples {
         plane_of(&tops, &priors)
     }
 
-    /// Returns the mask of the character's own tops; all tops if too few remain without the tops at the cut.
+    /// Returns the mask of the tops away from the edge of the mesh, or of all tops if too few remain.
     fn own_tops(&self, c: &Coefficients) -> Mask {
         let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let [width, height] = self.size;
@@ -348,7 +352,7 @@ impl HeightSamples {
         }
     }
 
-    /// Returns a surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
+    /// Converts a surface to mesh units. Returns the coefficients of 1, x, y, x^2, xy and y^2 in the plane.
     pub(super) fn in_plane_units(&self, c: Coefficients) -> [f64; 6] {
         let e = self.extent;
         let [p, q] = self.centre;
@@ -365,14 +369,14 @@ impl HeightSamples {
     }
 }
 
-/// Returns the value below which a share of the values lies; reorders them.
+/// Returns the quantile `share` (0..=1) of the values. Reorders the values.
 pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
     let k = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
-/// Weight of a residual: 1 just below the surface, falling to 0 at `window` below; higher above it, but 0 for spikes of
-/// more than three windows. Plain comparisons, so that the loop is vectorized.
+/// Returns the weight of a residual. Above the surface, the weight is `ABOVE`, or 0 for spikes higher than three
+/// windows. Below the surface, the weight falls from 1 to 0 at a depth of `window`. Plain comparisons are vectorized.
 #[inline(always)]
 fn one_sided_weight(r: f64, window: f64) -> f64 {
     let below = smooth_weight(r, window);
@@ -380,7 +384,7 @@ fn one_sided_weight(r: f64, window: f64) -> f64 {
     if r > 3.0 * window { 0.0 } else { near }
 }
 
-/// Weight of a residual: 1 on the surface, falling to 0 at `window` on both sides.
+/// Returns the weight of a residual: 1 on the surface, falling to 0 at a distance of `window` on both sides.
 #[inline(always)]
 fn smooth_weight(r: f64, window: f64) -> f64 {
     let t = r / window;

@@ -1,5 +1,5 @@
-//! Fits the upper surface: renders the mesh from both sides, fits a one-sided robust surface to the tops of each, and
-//! refines the surface of the carved side.
+//! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
+//! carved side is then fitted again at a finer one.
 
 use nalgebra::Vector3;
 
@@ -16,24 +16,24 @@ use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// If more than this share of the visible area lies on one smooth surface, nothing is carved, because strokes never
+/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved. Strokes never
 /// cover so much of a block.
 const MAX_TOPS: f64 = 0.85;
-/// If less than this share of the visible area lies on the surface, the surface rests on a rim of walls or on specks,
-/// not on strokes.
+/// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
+/// then rests on walls or specks, not on strokes.
 const MIN_TOPS: f64 = 0.05;
-/// The depth of the carving is measured without the lowest and the highest one in this many pixels.
+/// One in this many heights is left out at either end before the depth of the carving is measured.
 const TRIMMED_ONE_IN: usize = 100;
 
-/// Fits the surface on which the tops of the strokes lie and finds the carved side.
+/// Fits the surface on which the stroke tops lie, and finds the carved side.
 ///
-/// `scan` is in its own frame and unit. `scanned_face_down` is the direction of the carved face along the mesh's z, if
-/// known; it is weak evidence for the side. `print` distinguishes the carved side from the back of an open sheet,
-/// whose winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the mesh's x
-/// direction as far as possible, so an upright scan stays upright; lengths are in mesh units.
+/// `scanned_face_down` is whether the block lay face down in the scan, with the carved face towards -z of the mesh.
+/// This is weak evidence for the carved side. `print` is stronger evidence, and does not influence the plane of a side.
+/// In the outcome, lengths are in mesh units. The plane's x axis is as close as possible to the mesh's x, so an upright
+/// scan stays upright.
 ///
 /// # Errors
-/// Returns an error if the vertices span no surface, nothing is carved, or no plane is found.
+/// Returns an error if the vertices span no surface, neither side shows a surface, or nothing is carved.
 pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
@@ -83,10 +83,10 @@ pub fn fit(
 struct FitEffort {
     /// Longest side of a rendering, in pixels.
     px: usize,
-    /// The view is aligned with the plane of the tops until the plane's slope in the view is below this.
+    /// Slope of the stroke tops in a view below which the view is not rotated further.
     slope: f64,
-    /// Up to this angle (radians) the rendered heights are rotated; beyond it walls hide too much, and the mesh is
-    /// rendered again.
+    /// Largest angle, in radians, by which rendered heights are rotated. Beyond this angle, walls hide too much of the
+    /// surface, and the mesh is rendered again.
     max_rotation: f64,
     max_renderings: usize,
 }
@@ -138,7 +138,8 @@ fn fit_view(
     )
 }
 
-/// Fits the tops of a rendering and rotates the view until it is perpendicular to them.
+/// Fits the stroke tops of a rendering. Rotates the view and fits again until the view is perpendicular to the tops, or
+/// until a limit of `effort` is reached.
 fn fit_heights(
     indexed: &IndexedSurface,
     frame: &Rigid3,
@@ -181,7 +182,7 @@ impl FittedView {
         }
     }
 
-    /// Rotates the heights until the view is perpendicular to the tops, or as far as allowed.
+    /// Rotates the heights until the view is perpendicular to the stroke tops, or until a limit is reached.
     fn leveled(mut self, bow: bool, effort: FitEffort) -> Self {
         let seen_from = self.frame.inverse();
         for _ in 0..MAX_ROTATIONS {
@@ -240,9 +241,8 @@ impl FittedView {
     }
 }
 
-/// Returns the frame rotated and translated so that the plane `z = a + b x + c y` of the old frame is `z = 0` in the
-/// new one. The new x axis stays as close as possible to the old one, so to first order in the slope the bow's
-/// coefficients in the old x and y also hold in the new frame.
+/// Returns a frame in which the plane `z = a + b x + c y` of the old frame is `z = 0`. The new x axis is as close as
+/// possible to the old one. To first order in the slope, a bow therefore has the same coefficients in both frames.
 fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     let mesh_from_plane = plane_from_mesh.inverse();
     let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
@@ -252,7 +252,7 @@ fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     frame_along(normal, along, origin)
 }
 
-/// Returns the largest minus the smallest height of the bow over the view, in mesh units.
+/// Returns the height difference between the highest and the lowest point of the bow in the view, in mesh units.
 fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
     let Some(back) = view.px_from_plane.inverse() else {
         return 0.0;
@@ -268,7 +268,7 @@ fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
     high - low
 }
 
-/// Returns the depth of the carving: the distance between the medians of tops and ground without the extreme values.
+/// Returns the depth of the carving: the median of the tops minus the median of the ground, without extreme heights.
 fn relief(residuals: &[f64]) -> f64 {
     let mut residuals: Vec<f32> = residuals.iter().map(|r| *r as f32).collect();
     binarize::split_inner(&mut residuals, TRIMMED_ONE_IN)
