@@ -16,13 +16,13 @@ pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     gaussian_blur_transposed(values.transposed(), sigma)
 }
 
-/// Blurs a transposed input like [`gaussian_blur`] and returns it untransposed.
+/// Blurs a transposed image like [`gaussian_blur`]. Returns the blurred image untransposed.
 pub(super) fn gaussian_blur_transposed(transposed: Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < MIN_SIGMA {
         return transposed.transposed();
     }
-    // Three boxes of radius r have the variance r (r + 1) of one Gaussian; the mean of the three whole radii is as
-    // close to that as possible.
+    // If r (r + 1) = sigma^2, three boxes of radius r have the variance of the Gaussian. The mean of the three whole
+    // radii is as close as possible to this r.
     let half = ((1.0 + 4.0 * sigma * sigma).sqrt() - 1.0) / 2.0;
     let rounded = |pass: u32| (half * f64::from(pass)).round() as usize;
     let radii = [0, 1, 2].map(|pass| rounded(pass + 1) - rounded(pass));

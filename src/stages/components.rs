@@ -2,7 +2,7 @@
 
 use crate::raster::{Grid, Mask};
 
-/// Components below this share of an image are specks. The value is from the program of the paper's authors.
+/// Components smaller than this share of an image are specks. The value is from the program of the paper's authors.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// Components of pixels connected by edges, with their areas.
@@ -70,8 +70,8 @@ impl ConnectedComponents {
             .map(|label| *label != u32::MAX && wanted(*label as usize))
     }
 
-    /// Returns the pixels of components that come within `distance` pixels, along either axis, of a pixel of another
-    /// mask or of the border.
+    /// Returns the pixels of components near `other` or the border. From a pixel of such a component, a step of
+    /// `distance` pixels along an axis ends in `other` or outside the grid.
     pub(super) fn touching(&self, other: &Mask, distance: i64) -> Mask {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {
@@ -118,7 +118,7 @@ fn row_runs(row: &[bool]) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Returns the first run of a run's component and shortens the path to it.
+/// Returns the first run of the component of run `k`. Shortens the path to the first run.
 fn find_root(runs: &mut [Run], mut k: usize) -> usize {
     while runs[k].root != k {
         runs[k].root = runs[runs[k].root].root;
@@ -133,7 +133,7 @@ fn union(runs: &mut [Run], one: usize, other: usize) {
     runs[one.max(other)].root = one.min(other);
 }
 
-/// Removes specks and pinholes whose area is below [`SPECK_SHARE`] of `area` pixels.
+/// Removes specks and fills pinholes that are smaller than [`SPECK_SHARE`] of `area`, a number of pixels.
 pub(super) fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = ConnectedComponents::label(mask).with_area_at_least(size);

@@ -1,4 +1,4 @@
-//! Mesh and plane to depth map (paper III-B): parallel rays along the plane's normal, nearest surface wins.
+//! The depth stage (paper III-B): renders the mesh along the plane's normal. Each pixel gets the nearest surface.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,7 @@ use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
 use crate::simd::{max_f32, min_f32};
 
-/// Raised whenever the same inputs and settings may give another result than before.
+/// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 5;
 
 /// Limit for the longest side of a depth map, in pixels. A square map of this size has 268 million pixels.
@@ -69,11 +69,11 @@ impl DepthError {
 
 /// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
 ///
-/// Each pixel whose centre ray meets the mesh gets the level of the highest surface. Level 0 is "no data"; levels
-/// 1..=65535 are linear in height, see [`DepthScale`]. `unit` is the unit of the mesh, if it is known.
+/// A pixel gets level 0 ("no data") if the ray through its centre misses the mesh. Other levels, 1..=65535, are linear
+/// in the height of the highest hit, see [`DepthScale`]. `unit` is the unit of the mesh, if known.
 ///
 /// # Errors
-/// Returns an error if the resolution cannot be reached, or no ray meets the mesh.
+/// Returns an error if the resolution needs an unknown unit or too many pixels, or if no ray meets the mesh.
 pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,
@@ -113,7 +113,7 @@ pub fn depth(
     })
 }
 
-/// Returns the longest side in pixels for bounds in the plane, in mesh units.
+/// Returns the longest side of the map in pixels. The bounds are in mesh units.
 fn longest_px(
     [low, high]: [[f64; 2]; 2],
     unit: Option<LengthUnit>,
@@ -132,7 +132,8 @@ fn longest_px(
     Ok((longest_px.round() as usize).max(8))
 }
 
-/// Quantizes heights to levels 1..=65535 over their range. Returns `None` if no pixel holds data.
+/// Quantizes heights to levels 1..=65535. Returns the levels, the height of level 1 and the height per level. Returns
+/// `None` if no pixel holds data.
 fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     let [low, high] = range(heights)?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
@@ -148,8 +149,7 @@ fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
 
 /// Returns the lowest and the highest height. Returns `None` if no pixel holds data.
 fn range(heights: &Grid<f32>) -> Option<[f32; 2]> {
-    // The extremes of each column come first, because this loop is vectorized and a single minimum over all pixels is
-    // not.
+    // Computes the extremes of each column first. This loop is vectorized; one minimum over all pixels would not be.
     let width = heights.width();
     let (mut lows, mut highs) = (vec![f32::INFINITY; width], vec![NO_HIT; width]);
     for row in heights.data().chunks_exact(width) {

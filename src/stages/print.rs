@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use super::binarize::{BinarizeError, InkMask, hypotheses};
 use crate::raster::PrintImage;
 
-/// An image of a print as decoded, and its binarizations, which are computed on first use.
+/// A decoded image of a print, and its binarizations, which are computed on first use.
 #[derive(Debug, Clone)]
 pub struct Print {
     picture: PrintImage,
@@ -18,7 +18,7 @@ impl Print {
         &self.picture
     }
 
-    /// Returns the ink under every interpretation that the image leaves possible, the likeliest first; at least one.
+    /// Returns all possible interpretations as ink and background, the likeliest first. There is at least one.
     pub(super) fn hypotheses(&self) -> Result<&[InkMask], BinarizeError> {
         let read = self.hypotheses.get_or_init(|| hypotheses(&self.picture));
         read.as_deref().map_err(|error| *error)

@@ -1,17 +1,16 @@
-//! Bounds of a scan without distant specks, which would otherwise shrink the rest of the scan in every rendering.
+//! Bounds of a scan without distant specks. With specks, the rest of the scan would be tiny in every rendering.
 
 /// Approximate number of points that are sampled to find the bulk.
 const SAMPLES: usize = 4_000;
 /// Share of the samples at either end of an axis that may be specks.
 const SPECK_SHARE: f64 = 0.002;
-/// Share of its length by which the range of the samples without specks is widened at either end. The result is called
-/// the bulk.
+/// The range without specks is widened by this share of its length at either end. The result is called the bulk.
 const WIDENED: f64 = 0.25;
 
 /// A box along the axes, `[low, high]`.
 pub(super) type Bounds<const N: usize> = [[f64; N]; 2];
 
-/// Returns the first and the last value of the bulk; a scan without specks keeps its exact bounds.
+/// Returns the lowest and the highest value of the bulk. If there are no specks, these are the exact bounds.
 pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
     let mut bulk = BulkRange::new(values.len(), |k| values[k]);
     for lanes in values.chunks(LANES) {
@@ -63,7 +62,7 @@ impl BulkRange {
         (self.least..=self.most).contains(&value)
     }
 
-    /// Returns the first and the last of the added values that belong to the bulk.
+    /// Returns the lowest and the highest of the added values that belong to the bulk.
     pub(super) fn range(&self) -> [f32; 2] {
         [
             self.low.into_iter().fold(f32::INFINITY, f32::min),
@@ -72,7 +71,7 @@ impl BulkRange {
     }
 }
 
-/// Returns a box somewhat wider than the bulk: points outside it along an axis are specks.
+/// Returns the bulk along each axis as a box. Points outside the box are specks.
 pub(super) fn bulk_box<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
     let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis].into()));
     [0, 1].map(|end| along.map(|limits| limits[end]))
@@ -93,7 +92,7 @@ fn limits(count: usize, value: impl Fn(usize) -> f64) -> [f64; 2] {
     [low - slack, high + slack]
 }
 
-/// Returns the value that `rank` of the values lie below; fast for a small `rank`. There are more than `rank` values.
+/// Returns the value at index `rank` after sorting. Fast for a small `rank`. There must be more than `rank` values.
 fn smallest(values: impl Iterator<Item = f64>, rank: usize) -> f64 {
     let mut kept = Vec::with_capacity(4 * (rank + 1));
     let mut limit = f64::INFINITY;

@@ -1,27 +1,28 @@
-//! Brightness of the background at each pixel, estimated by a grey-scale closing: narrow dark areas are ink, wide dark
-//! areas are stains.
+//! Estimates the brightness of the background by a grey-scale closing. The closing removes narrow dark areas, which are
+//! ink, and keeps wide dark areas, which are stains.
 
 use crate::raster::{Grid, Mask, resample};
 use crate::stages::blur::gaussian_blur;
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
-/// Half widths of the closing, as shares of the longest side. `NARROW` is wider than most strokes.
+/// Usual half width of the closing, as a share of the longest side.
 pub(super) const NARROW: f64 = 0.12;
+/// Half width for stained prints: dark areas wider than most strokes are stains.
 pub(super) const STROKE: f64 = 0.05;
 /// Least share of a cell that must be known for it to count.
 const LEAST_KNOWN: f32 = 0.3;
 /// Value of a cell without data: `f32::max` and `f32::min` ignore it.
 const EMPTY: f32 = f32::NAN;
 
-/// Returns the brightness of the background under and around each pixel, 0..=1: the grey closed by a square of half
-/// width `narrow`, a share of the longest side.
+/// Returns the brightness of the background at each pixel, 0..=1: the grey after closing by a square, smoothed.
+/// `narrow` is half the side of the square, as a share of the longest side of the known area.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
     };
-    // Cells are centred on the middle of the known area, so that a print rotated by a right angle or with a wider white
-    // margin gives the same cells.
+    // The grid of cells is centred on the known area. Prints that differ by a right angle or by a wider white margin
+    // then have the same cells.
     let lengths = [bounds.width(), bounds.height()];
     let longest = lengths[0].max(lengths[1]) as f64;
     let scale = (CELLS / longest).min(1.0);
@@ -50,7 +51,7 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     resample(&smooth, 1.0 / scale, back, size).map(|value| value + mean)
 }
 
-/// Returns the extreme value of the square around each cell; `pick` ignores cells without data.
+/// Returns the extreme value in a square around each cell. `pick` ignores cells without data.
 fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Grid<f32> {
     // Transposes the result, so that two calls cover both axes.
     let along_rows = |cells: &Grid<f32>| {
@@ -61,11 +62,11 @@ fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> G
     along_rows(&along_rows(cells))
 }
 
-/// Returns, for each cell of a row, the extreme value within `reach` cells on either side. The values are built up
-/// from windows of doubling width.
+/// Returns the extreme value within `reach` cells on either side of each cell of a row. Windows double in width until
+/// they are wide enough.
 fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
     let (len, window) = (row.len(), 2 * reach + 1);
-    // The row is padded so that the window that starts at an index is centred on the cell with that index.
+    // Padded by `reach` cells, so that the window that starts at index k is centred on cell k.
     let mut spans = vec![EMPTY; reach];
     spans.extend_from_slice(row);
     spans.resize(len + 2 * reach, EMPTY);

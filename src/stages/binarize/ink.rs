@@ -1,4 +1,4 @@
-//! Ink of the print: the known part of the image, the side of the threshold that is ink, and the ink of each pixel.
+//! Finds the ink of a print: which pixels the print covers, whether ink is dark or light, and which pixels are ink.
 
 use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
@@ -7,23 +7,22 @@ use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::components::{ConnectedComponents, remove_specks};
 use crate::stages::pose::SoftMask;
 
-/// A pixel is white outside the cut when its darkest channel is above this share of full white.
+/// A pixel is white if its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
-/// Background darker than this can be distinguished from the white outside the cut.
+/// A background darker than this share of full white can be distinguished from the white around the print.
 const DISTINCT_BACKGROUND: f64 = 0.945;
-/// Least share of the image that a coloured background covers. A smaller area is only the soft edge of ink on a white
-/// sheet.
+/// A coloured background covers at least this share of the image. A smaller area is only the soft edge of ink on white.
 const LEAST_BACKGROUND: f64 = 0.2;
-/// Least share of the image that the white outside the cut covers.
+/// Least share of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
-/// Position between the darkest grey and the background below which a pixel is pale; least share of pale pixels among
-/// the dark ones where stains are possible.
+/// Dark pixels above this position between the darkest grey and the background are pale.
 const PALE: f64 = 0.35;
+/// Stains are possible if more than this share of the dark pixels are pale.
 const LEAST_PALE: f64 = 0.15;
-/// Least difference between ink and background, as a share of the lighter of the two. It is relative because scanners
-/// that use only part of their 16 bits produce dark images.
+/// Least difference between the greys of ink and background, as a share of the lighter grey. It is relative, because
+/// scans that use only part of 16 bits are dark.
 const LEAST_CONTRAST: f64 = 0.08;
-/// Least difference between ink and background as a share of full white. A smaller difference is noise.
+/// Least difference between the greys of ink and background, as a share of full white. A smaller difference is noise.
 const NOISE: f64 = 0.012;
 /// Least share of ink in a print.
 const LEAST_INK: f64 = 0.002;
@@ -87,7 +86,7 @@ fn luminance(c: [u16; 3]) -> f32 {
     (0.299 * f32::from(c[0]) + 0.587 * f32::from(c[1]) + 0.114 * f32::from(c[2])) / 65_535.0
 }
 
-/// Binarizes as the paper does: pixels darker than a fixed grey are ink, the whole image is known.
+/// Binarizes as the paper does: pixels darker than `grey` are ink, without specks. The whole image is known.
 pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
@@ -105,9 +104,9 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
     })
 }
 
-/// Binarizes adaptively: white outside the cut is left out, the background is divided out, and Otsu's method finds the
-/// threshold. Returns one interpretation for each polarity that the image leaves possible, the likelier first, and one
-/// that ignores small stains where there may be some.
+/// Binarizes adaptively: leaves out the white around the print, divides by the background, and applies Otsu's
+/// threshold. Returns one interpretation for each possible polarity, the likelier first. If the print may be stained,
+/// adds an interpretation that treats wide dark areas as stains.
 pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
@@ -149,7 +148,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
     Ok(inks.into_iter().flatten().collect())
 }
 
-/// Returns whether many of the dark values are so pale that they may be stains. `sorted` is in ascending order.
+/// Returns whether so many dark values are pale that the print may be stained. `sorted` is in ascending order.
 fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     let Some(split) = split else { return false };
     let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);
@@ -159,7 +158,8 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     pale as f64 > LEAST_PALE * dark as f64
 }
 
-/// Binarizes `dark_ink`, the grey or its inverse: dark areas at most twice `narrow` wide are ink.
+/// Binarizes `dark_ink`, which is the grey, or its inverse if ink is light. `narrow` is half the largest width of ink,
+/// as a share of the longest side.
 fn binarize_narrow(
     grey: &Grid<f32>,
     dark_ink: &Grid<f32>,
@@ -204,8 +204,7 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
     pairs.filter(|(_, k)| **k).map(|(g, _)| *g).collect()
 }
 
-/// Returns where the image is ink or background: everything but the white at the border, unless the background is as
-/// white.
+/// Returns the mask of ink and background. White areas at the border are left out, unless the background is white too.
 fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture
         .rgb
@@ -237,8 +236,8 @@ fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     grey.zip_map(&level, |grey, level| (grey / level.max(0.01)).min(1.5))
 }
 
-/// Returns the amount of ink, from 0 at the median of the background to 1 at the median of the ink; 0 away from the
-/// cleaned mask and its rim.
+/// Returns the amount of ink: 0 at the median of the background, 1 at the median of the ink, linear between. Pixels
+/// more than one pixel away from the ink mask get 0.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
     let span = (split.high - split.low).max(1e-6);
     let share = |even: f32| ((split.high - f64::from(even)) / span).clamp(0.0, 1.0) as f32;

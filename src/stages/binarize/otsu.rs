@@ -50,8 +50,9 @@ fn split_sorted(values: &[f32]) -> Option<Split> {
     })
 }
 
-/// Shifts of the digits of a key, lowest first, and number of values of a digit.
+/// Bit positions of the digits of a key, lowest first.
 const DIGITS: [u32; 3] = [0, 11, 22];
+/// Number of values of a digit.
 const DIGIT_VALUES: usize = 1 << 11;
 
 /// Sorts in the order of `total_cmp`: radix sort with three digits.
@@ -64,7 +65,7 @@ fn sort(values: &mut [f32]) {
     let mut sorted = vec![0; keys.len()];
     for shift in DIGITS {
         let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
-        // Counts of the digit's values, then the place of the next key with each value.
+        // First the number of keys with each digit value, then the index of the next such key in `sorted`.
         let mut places = [0_u32; DIGIT_VALUES];
         for key in &keys {
             places[digit(*key)] += 1;
@@ -87,8 +88,8 @@ fn sort(values: &mut [f32]) {
 
 const SIGN: u32 = 1 << 31;
 
-/// Returns an integer key with the order of the values: the bits of negative values are inverted, those of others are
-/// offset above them.
+/// Returns an integer key that sorts like the value. All bits of negative values are inverted. For other values, the
+/// sign bit is set.
 fn key(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }

@@ -3,15 +3,15 @@
 use super::otsu::Split;
 use crate::raster::{Grid, Mask};
 
-/// Least sum of the evidence at which the polarity is clear. The limit is larger for ink that is lighter than the
-/// background, as in rubbings, because heavy ink inside a frame looks like a dark background.
+/// Ink is clearly darker than the background if the sum of the evidence is below the negative of this.
 const CLEAR: f64 = 0.8;
+/// Ink is clearly lighter, as in rubbings, above this sum: heavy ink in a frame also looks like a dark background.
 const CLEAR_LIGHT: f64 = 1.6;
-/// Width of the rim of the image that is compared with the inner part, as a share of the shorter side.
+/// Width of the rim that counts as evidence for the background, as a share of the image's shorter side.
 const RIM: f64 = 0.06;
 
-/// Returns whether ink is probably lighter than the background, and whether that is clear. Stains and frame lines
-/// mislead: where the image and its version with the background divided out disagree, both polarities stay possible.
+/// Returns whether ink is probably lighter than the background, and whether the polarity is clear. It is unclear if the
+/// evidence is weak, or if the image and `even`, the image divided by its background, disagree.
 pub(super) fn polarity(
     even: &Grid<f32>,
     levelled: Option<Split>,
@@ -27,9 +27,9 @@ pub(super) fn polarity(
     (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
-/// Returns the evidence that the dark class is the background; negative for ink. Ink is usually the smaller class, and
-/// background reaches the rim. Heavy ink breaks the first rule and border lines the second, so both count, the first
-/// twice.
+/// Returns the evidence that the dark class is the background, or ink if negative. The evidence is that background is
+/// the larger class, with weight 2, and that background covers most of the rim. Heavy ink breaks the first rule, and
+/// border lines break the second.
 fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());
