@@ -1,6 +1,6 @@
-//! The four stages as pure functions: values in, values out.
+//! The four stages as pure functions.
 //!
-//! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
+//! They use no files, no SQL, no async and no clock. Each stage has its own settings, errors and entry function.
 
 mod binarize;
 mod blur;

@@ -1,13 +1,14 @@
-//! The two pipelines, stage by stage and side by side; one setting, `pipeline.method`, chooses.
+//! The two pipelines, stage by stage. The setting `pipeline.method` chooses between them.
 //!
 //! | stage | `default` | `paper` (arXiv 2411.05524) |
 //! |---|---|---|
-//! | fit | one-sided robust surface over the tops, both sides of the mesh; the print helps to find the carved side | PCA, upper set, spaced selection, RANSAC, PCA (III-A) |
+//! | fit | one-sided robust surface over the stroke tops on both sides of the mesh; the print helps to find the carved side | PCA, upper set, spaced selection, RANSAC, PCA (III-A) |
 //! | depth | z-buffer along the normal, heights over the surface (III-B) | the same |
-//! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, wrap by box and centroid, density and structure thresholds (III-C) |
-//! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations at equal steps, shifts climbed on IoU, scores (III-D) |
+//! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, both images scaled by bounding box and centred by centroid, density and structure thresholds (III-C) |
+//! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations in equal steps, shifts by hill climbing on the IoU, scores (III-D) |
 //!
-//! The carved side is decided in fit, which therefore reads the print; the code map in `src/lib.rs` gives the reason.
+//! The fit stage reads the print, because the carved side is decided there. The code map in `src/lib.rs` gives the
+//! reason.
 
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
@@ -56,7 +57,7 @@ impl Settings {
     }
 }
 
-/// Finds the character plane and the carved side of a mesh. `scanned_face_down` is the manifest's attribute.
+/// Finds the character plane and the carved side of a mesh. `scanned_face_down` is the attribute in the manifest.
 ///
 /// # Errors
 /// Returns an error if no plane is found or nothing is carved.
@@ -120,10 +121,10 @@ pub struct AlignedPair {
 }
 
 impl AlignedPair {
-    /// Runs the four stages without a known unit or side.
+    /// Runs the four stages. The unit of the mesh and the direction of its carved face count as unknown.
     ///
     /// # Errors
-    /// The error of the first stage that finds no result.
+    /// Returns the error of the first stage that finds no result.
     ///
     /// # Examples
     /// ```

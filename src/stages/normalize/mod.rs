@@ -1,7 +1,7 @@
-//! Prepares print and relief for registration: ink of the print, heights of tops and ground of the depth map.
+//! Prepares registration: finds the ink of the print, and the heights of tops and ground in the depth map.
 //!
-//! Neither a pose nor a threshold is chosen here: the pose is found from soft strokes, which need no threshold, and
-//! thresholds are chosen in the aligned frame. The paper's order is in `paper_method::normalize`.
+//! This stage chooses neither a pose nor a threshold. Registration finds the pose from soft strokes, which need no
+//! threshold, and then chooses thresholds in the aligned frame. The paper's order is in `paper_method::normalize`.
 
 mod height_histogram;
 mod normalized;
@@ -16,16 +16,16 @@ pub(super) use relief::{relative_depths, soft_stroke, stroke_growth};
 use super::print::Print;
 use crate::raster::DepthMap;
 
-/// Raised whenever the same inputs and settings may give another result than before.
+/// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 10;
 
-/// Finds the print's ink under every interpretation that the image leaves possible, and the heights of tops and ground.
+/// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///
-/// `depth` reads like the print; `print` is the whole image as given. Masks are in the print image's frame, heights in
-/// mesh units over the fitted surface.
+/// `depth` must read like the print. Masks are in the pixels of the print image. Heights are in mesh units over the
+/// fitted surface.
 ///
 /// # Errors
-/// Returns an error if the print shows no ink or the depth map only one height.
+/// Returns an error if the print shows no ink, or if the depth map has fewer than two distinct heights.
 pub fn normalize(
     depth: &DepthMap,
     print: &Print,

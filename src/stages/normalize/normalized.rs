@@ -1,4 +1,4 @@
-//! Result of the normalize stage and the canvas on which a pair's masks are compared.
+//! Result of the normalize stage, and the map from an image to the canvas on which masks are compared.
 
 use super::params::{NormalizeError, NormalizeParams};
 use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
@@ -11,8 +11,7 @@ use crate::stages::pose::SoftMask;
 pub struct PrintMasks {
     /// Pixels that are ink.
     pub ink: Mask,
-    /// Pixels that are ink or background. Nothing is known about the other pixels, which are white beyond the cut of
-    /// the image.
+    /// Pixels that are ink or background. The other pixels are the white around the print.
     pub known: Mask,
 }
 
@@ -31,13 +30,12 @@ impl PrintMasks {
 pub struct Normalized {
     /// The numbers.
     pub outcome: NormalizeOutcome,
-    /// The masks of the print, one for each interpretation of the outcome and in the same order. There is at least
-    /// one.
+    /// The masks of each interpretation of the print, in the order of `outcome.inks`. There is at least one.
     pub prints: Vec<PrintMasks>,
 }
 
 impl Normalized {
-    /// Gathers the interpretations of a print, each with its canvas.
+    /// Collects the interpretations of a print, each with its map to the canvas.
     ///
     /// # Errors
     /// Returns an error if no interpretation has ink.
@@ -74,9 +72,9 @@ impl Normalized {
     }
 }
 
-/// Returns the paper's wrap W(I) (III-C), image pixels to canvas pixels: the longest side of the mask's bounding box
-/// becomes `character_px` and its centroid the middle of a canvas of `canvas_px` pixels. Returns `None` for an empty
-/// mask.
+/// Returns the paper's wrap W(I) (III-C), which maps image pixels to canvas pixels. The wrap scales the longest side of
+/// the mask's bounding box to `character_px`, and moves the mask's centroid to the middle of the canvas. Returns `None`
+/// if the mask is empty.
 pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2> {
     let bounds = mask.bounding_box()?;
     let [x, y] = mask.centroid()?;

@@ -12,7 +12,7 @@ use crate::stages::score::SsimWindow;
 pub struct NormalizeParams {
     /// Side of the square canvas in pixels, 64..=2048.
     pub canvas_px: u32,
-    /// Longest side of the print character on the canvas in pixels, below `canvas_px`.
+    /// Longest side of the character on the canvas, in pixels. Must be below `canvas_px`.
     pub character_px: u32,
     /// Paper's method: grey 0..=255 below which a pixel of the print is ink.
     pub print_grey: u8,

@@ -1,4 +1,4 @@
-//! Heights of tops and ground in a depth map, and soft strokes computed from them without a threshold.
+//! Measures the heights of tops and ground in a depth map, and computes soft strokes from depths.
 
 use super::height_histogram::HeightHistogram;
 use crate::domain::ReliefHeights;
@@ -9,20 +9,21 @@ use crate::stages::pose::SoftMask;
 
 /// Pixel step at which heights are sampled.
 const STRIDE: usize = 3;
-/// Margin of the valid box, as a share of each side, that is left out when tops and ground are separated: side walls
-/// and a protruding foot are neither.
+/// Share of the map's width and height left out at each border when tops and ground are separated. Side walls and a
+/// protruding foot of the block may lie there, and are neither.
 const MARGIN: f64 = 0.15;
-/// Tops within this share of the relief from the fitted surface are taken to lie on it.
+/// Tops closer to the fitted surface than this share of the relief are first assumed to lie on the surface.
 const ANCHORED: f64 = 0.5;
 
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
 const LOWERED_BY: f64 = 0.03;
 
-/// Measures the heights of tops and ground over the fitted surface. Returns `None` if the map holds fewer than two
-/// heights or only one distinct height.
+/// Measures the heights of tops and ground over the fitted surface. Returns `None` if the samples of the map hold fewer
+/// than two distinct heights.
 ///
-/// Otsu's threshold splits the heights into an upper and a lower class. The tops are where most heights lie near the
-/// upper class's median: worn rims and walls are in that class too and lower its median.
+/// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The tops are the
+/// most frequent height near the upper class: its median would be too low, because the class also holds worn rims and
+/// walls.
 pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
     let heights = |margin| heights(depth, bounds, margin);
@@ -50,8 +51,8 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     })
 }
 
-/// Returns how much the strokes of a level grow when the level is lowered by [`LOWERED_BY`] of the relief: the
-/// logarithm of the ratio of their areas.
+/// Returns the growth of the strokes' area if the threshold `level` is lowered by [`LOWERED_BY`] of the relief, as the
+/// logarithm of the ratio of the two areas.
 ///
 /// Walls are steep, so strong growth means that the threshold cuts through worn or tilted tops.
 pub(crate) fn stroke_growth(depth: &DepthMap, relief: &ReliefHeights, level: u16) -> f64 {
@@ -73,8 +74,8 @@ pub(crate) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftM
     })
 }
 
-/// Returns the soft stroke value of a depth below the tops: 1 well above the threshold `cut`, 0 well below, linear over
-/// `softness` in between. All are shares of the relief.
+/// Returns how surely a point belongs to a stroke, given its depth below the tops: 1 well above the threshold `cut`, 0
+/// well below, linear over `softness` in between. All arguments are shares of the relief.
 #[inline(always)]
 pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
@@ -84,7 +85,7 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
 fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
-        // The samples have the same distance from both ends, so that a map rotated by 180 degrees gives the same
+        // Both ends have the same distance to the nearest sample, so a map rotated by 180 degrees gives the same
         // heights.
         let rest = 2 * (high - low - 2 * cut) % STRIDE;
         (low + cut + rest..=high - cut).step_by(STRIDE)
@@ -108,7 +109,7 @@ mod tests {
 
     const SIDE: usize = 80;
 
-    /// A bar on the ground whose top falls by `tilt` levels to the right; the relief is 50,000 levels.
+    /// Returns the map of a bar on flat ground. The bar is 50,000 levels high and falls by `tilt` levels to the right.
     fn bar(tilt: f64) -> DepthMap {
         let on_bar = |x, y| (20..60).contains(&x) && (30..50).contains(&y);
         let top = |x: usize| 51_000.0 - tilt * (x as f64 - 40.0) / 40.0;
