@@ -119,7 +119,7 @@ fn at(i: usize) -> f64 {
     (i as f64 / (SIDE - 1) as f64 - 0.5) * SHEET_MM
 }
 
-/// Heights of every sheet in millimetres: 0 on strokes, with walls that fall to an uneven ground.
+/// Heights of every synthetic sheet in millimetres: 0 on strokes, falling along walls to an uneven ground.
 static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
     const FINE: usize = 3 * SIDE;
     let fine = |k: usize| (k as f64 / (FINE - 1) as f64 - 0.5) * SHEET_MM;
@@ -144,8 +144,8 @@ static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
     })
 });
 
-/// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`. Also returns the true
-/// `print_from_sheet`.
+/// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`. Also returns the true map
+/// from the sheet to the print.
 pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     let size = (SHEET_MM * px_per_mm) as usize;
     let middle = (size - 1) as f64 / 2.0;

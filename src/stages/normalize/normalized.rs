@@ -11,7 +11,7 @@ use crate::stages::pose::SoftMask;
 pub struct PrintMasks {
     /// Pixels that are ink.
     pub ink: Mask,
-    /// Pixels that are ink or background. The other pixels are the white around the print.
+    /// Pixels that are ink or background. All other pixels are the white around the print.
     pub known: Mask,
 }
 

@@ -18,11 +18,10 @@ const ANCHORED: f64 = 0.5;
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
 const LOWERED_BY: f64 = 0.03;
 
-/// Measures the heights of tops and ground over the fitted surface. Returns `None` if the samples of the map hold fewer
-/// than two distinct heights.
+/// Measures the heights of tops and ground over the fitted surface. Returns `None` if no two sampled heights differ.
 ///
-/// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The tops are the
-/// most frequent height near the upper class: its median would be too low, because the class also holds worn rims and
+/// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The top is the
+/// most frequent height near the upper class. The median of that class would be too low, because of worn rims and
 /// walls.
 pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
@@ -85,8 +84,7 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
 fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
-        // Both ends have the same distance to the nearest sample, so a map rotated by 180 degrees gives the same
-        // heights.
+        // Both ends are equally far from a sample, so a map rotated by 180 degrees gives the same heights.
         let rest = 2 * (high - low - 2 * cut) % STRIDE;
         (low + cut + rest..=high - cut).step_by(STRIDE)
     };

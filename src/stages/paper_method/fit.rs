@@ -11,7 +11,7 @@ use crate::mesh::Vertices;
 use crate::stages::fit::{Axes, FitError, FitParams, frame, quantile};
 use crate::stages::scan::Scan;
 
-/// Fits the plane of the upper set (III-A). The plane frame is in mesh units.
+/// Fits a plane to the highest points on the carved side (III-A). The plane frame is in mesh units.
 ///
 /// # Errors
 /// Returns an error if the vertices span no surface, nothing is carved, or RANSAC finds no plane.
@@ -74,8 +74,9 @@ fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
     points
 }
 
-/// Returns the upper set T: the side of the PCA plane whose points are closer to their own centroid on average. Ground
-/// reaches the rim of the cut on all sides, while strokes stay near the middle.
+/// Splits the points at the PCA plane. Returns the carved side (the upper set T), its outward normal, and the
+/// confidence, 0..=1. On the carved side, points are closer to their own centroid on average: ground reaches the rim
+/// all around, while strokes stay near the middle.
 fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
     let normal = all.normal();
     let (above, below): (Vec<_>, Vec<_>) = points
@@ -98,7 +99,7 @@ fn mean_distance(points: &[[f64; 3]]) -> f64 {
     vectors().map(|p| (p - centroid).norm()).sum::<f64>() / n
 }
 
-/// Selects points from the farthest from the plane down, each farther than `spacing` from all selected ones.
+/// Selects up to `wanted` points, the farthest from the plane first. Skips points within `spacing` of a selected point.
 fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -> Vec<[f64; 3]> {
     let normal = all.normal();
     let height = |p: &[f64; 3]| (Vector3::from(*p) - all.centre).dot(&normal).abs();
@@ -125,7 +126,7 @@ fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -
     taken
 }
 
-/// Draws planes through three of the points, and returns the inliers of the plane with the most inliers.
+/// Draws planes through three random points. Returns the inliers of the plane with the most inliers.
 fn ransac(
     taken: &[[f64; 3]],
     distance: f64,

@@ -1,8 +1,8 @@
-//! The paper's normalization (III-C): both images cropped to their box and scaled to one size before the rotation is
-//! known, then a grey threshold searched on the wrapped images.
+//! The paper's normalization (III-C): scales both images to one size by their bounding boxes, before the rotation is
+//! known. Then searches a grey threshold on the scaled images.
 //!
-//! Where the text leaves a choice open, the authors' program decides: greys are stretched so that the 1st percentile of
-//! nearness is 49 and the 95th 201, dark is near, and each threshold is tried at four rotations by 90 degrees.
+//! Where the text leaves a choice open, the authors' program decides. Near is dark: the nearest 1 % of the pixels have
+//! greys up to 49, the nearest 95 % up to 201. Each threshold is tried at four rotations by 90 degrees.
 
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
@@ -58,8 +58,8 @@ struct Tried {
     density_gap: f64,
 }
 
-/// Binarizes the print at a fixed grey and chooses the density and the structure threshold on both pictures wrapped by
-/// box and centroid.
+/// Binarizes the print at a fixed grey. Chooses the density threshold and the structure threshold on the wrapped
+/// images, which are scaled and centred.
 ///
 /// # Errors
 /// Returns an error if the print shows no ink or no threshold leaves strokes.
@@ -75,8 +75,8 @@ pub(crate) fn normalize(
     Ok(normalized)
 }
 
-/// Chooses the density and the structure threshold on the wrapped images. The ensemble keeps the better of the two
-/// after registration.
+/// Chooses the density threshold and the structure threshold on the wrapped images. The ensemble has no threshold of
+/// its own: registration chooses one of the two results.
 fn choose(
     depth: &DepthMap,
     print: &InkMask,
@@ -125,7 +125,7 @@ fn choose(
     ])
 }
 
-/// Scores one threshold at four rotations by 90 degrees. Returns `None` if it leaves no strokes.
+/// Scores one threshold at the best of four rotations by 90 degrees. Returns `None` if the threshold leaves no strokes.
 fn attempt(
     depth: &DepthMap,
     canvas: &SsimReference,

@@ -1,9 +1,9 @@
-//! The paper's registration (III-D) as its authors' program does it: the depth mask is rotated through a full circle
-//! and wrapped at each angle, then in finer steps about the best angle; at each angle the shift is climbed pixel by
-//! pixel on the masks' IoU.
+//! The paper's registration (III-D) as its authors' program does it.
 //!
-//! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles and
-//! 60 more about the best.
+//! The depth mask is rotated through a full circle, then in finer steps about the best angle. At each angle the mask is
+//! scaled and centred on the canvas, then shifted pixel by pixel as long as its IoU with the print rises. The program
+//! tries 60 angles, and 60 more about the best. The text of the paper has only one angle in each of six sectors, which
+//! is wrong by up to half a sector.
 
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
@@ -28,8 +28,8 @@ struct Turn {
     iou: f64,
 }
 
-/// Registers the density and the structure mask, keeps the better of the two by IoU as the ensemble, and scores all
-/// three.
+/// Registers the structure mask and the density mask. Uses the alignment with the higher IoU for the ensemble, and
+/// scores all three alignments.
 ///
 /// # Errors
 /// Returns an error if normalization chose no threshold or a mask is empty.
@@ -109,11 +109,11 @@ fn longest_side(mask: &Mask) -> Option<f64> {
     Some(mask.bounding_box()?.longest_side() as f64)
 }
 
-/// A mask that is wrapped again after each rotation, because the rotation changes its bounding box.
+/// A depth mask that is wrapped again after each rotation, because a rotation changes the bounding box.
 struct Turner {
     /// Set pixels of the depth mask.
     points: Vec<[f64; 2]>,
-    /// The mask at about the canvas's size, so that a rotation need not average again.
+    /// The mask at about the size of the canvas. Rotating it needs no further averaging of pixels.
     small: Mask,
     small_from_depth: Affine2,
     side: usize,
@@ -139,8 +139,8 @@ impl Turner {
         })
     }
 
-    /// Returns the rotation followed by the wrap W: longest side of the rotated box to the character's, centroid to
-    /// the middle.
+    /// Returns the rotation followed by the paper's wrap W. The wrap scales the longest side of the rotated mask to
+    /// `character_px`, and moves the centroid to the middle of the canvas.
     fn canvas_from_depth(&self, angle_deg: f64) -> Affine2 {
         let turn = Affine2::similarity(1.0, angle_deg.to_radians(), [0.0, 0.0]);
         let (mut low, mut high, mut sum) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], [0.0; 2]);
@@ -176,7 +176,7 @@ fn best_of(turns: &[Turn]) -> Option<Turn> {
         .reduce(|a, b| if b.iou > a.iou { b } else { a })
 }
 
-/// Returns the best IoU among the rotations farther than `apart_deg` from an angle. Returns 0 if there is none.
+/// Returns the best IoU among the rotations more than `apart_deg` away from `angle_deg`, or 0 if there are none.
 fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
     let apart = |turn: &&Turn| {
         let d = (turn.angle_deg - angle_deg).rem_euclid(360.0);
@@ -189,7 +189,7 @@ fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Starts without a shift and moves to the best of the four neighbouring shifts as long as the IoU rises.
+/// Finds a shift by hill climbing: moves one pixel in the best of four directions as long as the IoU rises.
 fn climb(target: &Packed, moving: &Packed, angle_deg: f64) -> Turn {
     let mut best = Turn {
         angle_deg,
@@ -239,8 +239,7 @@ impl Packed {
         }
     }
 
-    /// Returns the IoU with another mask of the same size shifted by whole pixels; pixels outside the canvas do not
-    /// count.
+    /// Returns the IoU with `moving` shifted by whole pixels. Pixels that leave the canvas count in the union only.
     fn iou(&self, moving: &Self, [dx, dy]: [i64; 2]) -> f64 {
         let mut both = 0;
         for y in 0..self.rows as i64 {

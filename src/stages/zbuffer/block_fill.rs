@@ -1,13 +1,13 @@
-//! Rasterises a block of triangles: rejects triangles without a pixel centre, fills small triangles in parallel lanes
-//! and large triangles one at a time.
+//! Rasterises a block of triangles. Triangles without a pixel centre are skipped. Small triangles are filled in
+//! parallel lanes, large triangles one at a time.
 
 use super::small_triangles::SmallTriangles;
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use super::triangle_fill::fill_triangle;
 use crate::simd::{floor_f32, max_f32, min_f32};
 
-/// Fills the triangles that contain a pixel centre. `u`, `v` and `z` give the column, the row and the height of a
-/// corner. `emit` is called in the same way as by [`fill_triangle`].
+/// Fills the triangles that contain a pixel centre. `u`, `v` and `z` compute the column, row and height of a corner.
+/// Calls `emit` in the same way as [`fill_triangle`].
 #[inline(always)]
 pub(super) fn fill_block(
     block: &TriangleBlock,
@@ -15,7 +15,7 @@ pub(super) fn fill_block(
     size: [usize; 2],
     emit: &mut impl FnMut(usize, f32),
 ) {
-    // Works on a copy, because reads of memory that may alias what `emit` writes are not vectorised.
+    // A local copy cannot alias memory that `emit` writes. Reads from it are therefore vectorised.
     let block = *block;
     let [a, b, c] = &block;
     let (across, down) = (
@@ -50,7 +50,7 @@ fn range_of([a, b, c]: &[LaneArray; 3]) -> [LaneArray; 2] {
     [low, high]
 }
 
-/// Returns which lanes may contain a pixel centre, given the range of columns and the range of rows of each lane.
+/// Returns which lanes may contain a pixel centre. `across` and `down` are each lane's range of columns and of rows.
 #[inline(always)]
 pub(super) fn may_cover_centre(
     [across, down]: [&[LaneArray; 2]; 2],

@@ -1,4 +1,4 @@
-//! Centroid and covariance of a surface, weighted by area, so that the choice of triangulation has no effect.
+//! Centroid and covariance of a surface, weighted by area, so that they do not depend on the triangulation.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -20,8 +20,8 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Computes the moments of the triangles within the bulk, the range of a scan without its specks. Returns `None`
-    /// without faces or if their area is zero.
+    /// Computes the moments of the triangles inside the bulk (the range of the scan without specks). Returns `None` if
+    /// there are no faces, or if the area is zero.
     pub(crate) fn of(surface: &IndexedSurface) -> Option<Self> {
         if !surface.has_faces {
             return None;
@@ -76,7 +76,7 @@ impl BulkBox {
         }
     }
 
-    /// Adds the first `count` triangles of a block, except triangles that leave the bulk.
+    /// Adds the first `count` triangles of a block. Skips triangles that leave the bulk.
     #[inline(always)]
     fn add(&self, block: &TriangleBlock, count: usize, sums: &mut [[f32; LANES]; SUM_COUNT]) {
         let per_extent = (1.0 / self.extent) as f32;
@@ -134,7 +134,7 @@ mod tests {
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// Computes the moments from the centroids of many small triangles, weighted by area, for comparison.
+    /// Computes the moments for comparison: cuts each triangle into small triangles, and sums their centroids by area.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {

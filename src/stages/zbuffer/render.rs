@@ -13,10 +13,10 @@ use crate::stages::robust_bounds::bulk_along;
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
-/// Number of triangles per pixel above which few blocks contain a pixel centre.
+/// If there are more triangles per pixel than this, few blocks contain a pixel centre.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
-/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. The squares leave no holes.
+/// Each point is drawn as a square. Its side is this multiple of the mean point spacing, so the squares leave no holes.
 const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {
@@ -31,8 +31,8 @@ impl IndexedSurface {
         heights
     }
 
-    /// Renders the surface twice: the highest z, and the highest -z as seen from the back. For the back,
-    /// `plane_from_mesh` is rotated by 180 degrees about its x axis.
+    /// Renders the highest z, and the highest -z as seen from the back. The frame of the back is `plane_from_mesh`
+    /// rotated by 180 degrees about its x axis.
     pub(crate) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
@@ -61,8 +61,8 @@ impl IndexedSurface {
         [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| AffineForm(row.map(|v| v as f32)))
     }
 
-    /// Calls `emit` with the index and the height of every tested pixel. The height is NaN if the pixel is outside the
-    /// triangle.
+    /// Calls `emit` with the index and the height of every pixel that is tested against a triangle. The height is NaN
+    /// if the pixel's centre is outside that triangle.
     fn rasterize(&self, plane_from_mesh: &Rigid3, view: &Viewport, emit: impl FnMut(usize, f32)) {
         let rows = self.view_rows(plane_from_mesh, view);
         let size = [view.width, view.height];
@@ -96,8 +96,8 @@ impl IndexedSurface {
         });
     }
 
-    /// Fills the same blocks as [`Self::fill_every_block`], faster if few blocks contain a pixel centre. Such blocks
-    /// are too far apart for the hardware prefetcher, so a group of blocks is read before it is filled.
+    /// Fills the same blocks as [`Self::fill_every_block`]. This is faster if few blocks contain a pixel centre: such
+    /// blocks are too far apart for the hardware prefetcher, so a group of blocks is read before it is filled.
     fn fill_sparse_blocks(
         &self,
         rows: &[AffineForm; 3],
@@ -179,7 +179,7 @@ mod tests {
     ]);
 
     /// Tests one ray against every triangle, as a reference implementation. Returns the height, the tolerance for
-    /// single precision (larger on slivers), and whether the ray is too close to an edge to decide.
+    /// single precision (larger for slivers), and whether the ray is too close to an edge to decide.
     fn cast(mesh: &Mesh, view: &Viewport, x: usize, y: usize) -> (Option<f64>, f64, bool) {
         let mut best: Option<f64> = None;
         let (mut tolerance, mut near_edge) = (1e-5_f64, false);

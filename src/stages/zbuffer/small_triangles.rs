@@ -1,8 +1,8 @@
 //! Fills small triangles in parallel, one per lane. Each step tests the same pixel offset in every lane.
 //!
-//! Most triangles of a scan contain a pixel or two. Each lane computes the same bits as
-//! [`fill_triangle`](super::triangle_fill::fill_triangle). The order of the triangles differs, so the sign of a zero
-//! may differ at pixels that two triangles share.
+//! Most triangles of a scan contain one or two pixels. Each lane computes the same bits as
+//! [`fill_triangle`](super::triangle_fill::fill_triangle). The order of the triangles differs, so heights of 0.0 and
+//! -0.0 may be swapped at pixels that two triangles share.
 
 use super::triangle_block::{LANES, LaneArray};
 use crate::simd::{ceil_f32, floor_f32, index_from_f32, max_f32, min_f32};
@@ -20,7 +20,7 @@ pub(super) struct SmallTriangles {
 }
 
 impl SmallTriangles {
-    /// Selects the small triangles among the `candidates`, given each lane's range of columns and range of rows.
+    /// Selects the small triangles among the `candidates`. `ranges` holds each lane's range of columns and of rows.
     #[inline(always)]
     pub(super) fn new(
         ranges: &[[LaneArray; 2]; 2],
@@ -98,7 +98,7 @@ impl SmallTriangles {
     }
 }
 
-/// Returns the first pixel of each lane along an axis of `side` pixels, and the number of pixels in the lane's range.
+/// Returns the first pixel of each lane along an axis of `side` pixels, and the number of pixels of each lane.
 #[inline(always)]
 fn pixel_span([low, high]: &[LaneArray; 2], side: usize) -> [LaneArray; 2] {
     let last = side as f32 - 1.0;

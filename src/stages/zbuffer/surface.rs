@@ -1,4 +1,4 @@
-//! A mesh packed into blocks of triangles with bounds, for fast evaluation along any direction.
+//! A mesh packed into blocks of triangles with bounding boxes, for fast rendering along any direction.
 
 use super::block_bounds::BlockBounds;
 use super::triangle_block::{AffineForm, Coordinate, LANES, LaneArray, TriangleBlock, pack_block};
@@ -70,7 +70,7 @@ impl IndexedSurface {
         }
     }
 
-    /// Returns three rows of coefficients that compute x, y and z in `frame` from a vertex's offset from the origin.
+    /// Returns the rows of coefficients that map a vertex's offset from the origin to x, y and z in `frame`.
     pub(super) fn frame_rows(&self, frame: &Rigid3) -> [[f64; 4]; 3] {
         let moved = frame.apply(self.origin);
         std::array::from_fn(|k| {
@@ -116,7 +116,7 @@ impl IndexedSurface {
         [low, high].map(f64::from)
     }
 
-    /// Returns the indices of the blocks whose boxes reach lowest and highest along `row`. Ignores boxes that leave the
+    /// Returns the indices of the blocks with the lowest and the highest box along `row`. Ignores ends outside the
     /// bulk.
     fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
@@ -136,8 +136,8 @@ impl IndexedSurface {
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
-    /// Returns the share of the projected area whose winding faces up, 0..=1. The area is projected along z of the
-    /// frame. Returns `None` if there are no faces or if the area is zero.
+    /// Returns the share of the projected area whose winding faces +z of the frame, 0..=1. The area is projected along
+    /// z. Returns `None` if there are no faces, or if the area is zero.
     pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;
@@ -158,7 +158,7 @@ impl IndexedSurface {
     }
 }
 
-/// Returns twice the projected area of each triangle along the normal. It is negative if the triangle faces away.
+/// Returns twice the signed area of each triangle, projected along the normal: negative if it faces away.
 fn facing(
     [x, y, z]: [f32; 3],
     a: &[LaneArray; 3],

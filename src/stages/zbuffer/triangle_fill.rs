@@ -1,16 +1,16 @@
-//! Scan conversion of one triangle: finds the pixel centres in the triangle and the height of the triangle there.
+//! Scan conversion of one triangle: finds the pixel centres in the triangle, and the triangle's height at each centre.
 
 use crate::simd::{max_f32, min_f32};
 
-/// All columns of a row are tested in triangles of up to this many columns. Rows of wider triangles are clipped first.
+/// If a triangle spans more columns than this, its rows are clipped before their pixels are tested.
 const MAX_UNCLIPPED_COLUMNS: usize = 12;
 
-/// Calls `emit` with the index of each tested pixel and the height of the triangle's plane at its centre, or NaN if the
-/// triangle does not contain the centre. Edges belong to the triangle.
+/// Calls `emit` for each tested pixel, with the pixel's index and the height of the triangle at the pixel's centre. The
+/// height is NaN if the centre is outside the triangle. Edges belong to the triangle.
 ///
 /// Edge functions are computed relative to the pixel centre. Swapping the ends of an edge then negates the value
-/// exactly, so two triangles that share an edge leave no gap (watertight). Pixels are not rejected early, because most
-/// triangles of a scan contain a pixel or two, and a mispredicted branch costs more than the arithmetic.
+/// exactly, so two triangles that share an edge leave no gap (watertight). Pixels are not rejected early: most
+/// triangles of a scan contain one or two pixels, and a mispredicted branch costs more than the arithmetic.
 #[inline(always)]
 pub(super) fn fill_triangle(
     corners: [[f32; 3]; 3],
@@ -50,8 +50,7 @@ pub(super) fn fill_triangle(
     }
 }
 
-/// Returns the columns of a row to test. If there are many, returns only the columns between the edges and one more on
-/// each side.
+/// Returns the columns of a row to test: in a wide triangle, the columns between the edges and one more at each end.
 #[inline(always)]
 fn clip_columns(
     columns: &std::ops::Range<usize>,
