@@ -54,8 +54,7 @@ impl Default for SyntheticSheet {
     }
 }
 
-/// Returns whether a point is on a stroke of the character as it reads in print. x points right and y points down, both
-/// in millimetres from the middle.
+/// Returns whether a point is on a stroke, as read in print. x points right and y down, in millimetres from the middle.
 fn stroke(x: f64, y: f64) -> bool {
     let bar = |x0: f64, x1: f64, y0: f64, y1: f64| (x0..x1).contains(&x) && (y0..y1).contains(&y);
     bar(-4.0, 4.2, -4.2, -3.2)

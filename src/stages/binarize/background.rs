@@ -21,8 +21,7 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
     };
-    // The grid of cells is centred on the known area. Prints that differ by a right angle or by a wider white margin
-    // then have the same cells.
+    // The grid of cells is centred on the known area, so a rotation by a right angle or a wider margin keeps the cells.
     let lengths = [bounds.width(), bounds.height()];
     let longest = lengths[0].max(lengths[1]) as f64;
     let scale = (CELLS / longest).min(1.0);
@@ -62,8 +61,7 @@ fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> G
     along_rows(&along_rows(cells))
 }
 
-/// Returns the extreme value within `reach` cells on either side of each cell of a row. Windows double in width until
-/// they are wide enough.
+/// Returns the extreme value within `reach` cells on either side of each cell, from windows that double in width.
 fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
     let (len, window) = (row.len(), 2 * reach + 1);
     // Padded by `reach` cells, so that the window that starts at index k is centred on cell k.

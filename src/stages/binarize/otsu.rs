@@ -11,14 +11,13 @@ pub(crate) struct Split {
     pub(crate) high: f64,
 }
 
-/// Splits values where the variance between the classes is largest. Returns `None` for fewer than two values. Sorts
-/// the values.
+/// Sorts values, and splits them at the largest variance between the classes. Returns `None` for fewer than two values.
 pub(crate) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)
 }
 
-/// Splits values after leaving out the lowest and the highest `1 / one_in` of them. Sorts the values.
+/// Sorts values, and splits them without the lowest and the highest `1 / one_in` of the values.
 pub(crate) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
     sort(values);
     let cut = values.len() / one_in;
@@ -88,8 +87,7 @@ fn sort(values: &mut [f32]) {
 
 const SIGN: u32 = 1 << 31;
 
-/// Returns an integer key that sorts like the value. All bits of negative values are inverted. For other values, the
-/// sign bit is set.
+/// Returns a key that sorts like the value: inverts all bits of a negative value, and the sign bit of any other value.
 fn key(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }

@@ -176,8 +176,7 @@ fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     (first / second).ln()
 }
 
-/// Returns the best agreement of a side with the ink among the poses found: the correlation times the share of the
-/// stroke tops that printed.
+/// Returns the best agreement of a side with the ink: the correlation times the share of the stroke tops that printed.
 fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;

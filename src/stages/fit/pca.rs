@@ -37,8 +37,7 @@ impl Axes {
         Self::from_moments(centre, spread / total)
     }
 
-    /// Computes the axes of a surface, weighted by area, without distant specks. If there is no area, uses the
-    /// vertices.
+    /// Computes the axes of a surface, weighted by area, without distant specks. Uses the vertices if the area is zero.
     pub(crate) fn of_surface(mesh: &Mesh, indexed: &IndexedSurface) -> Self {
         if let Some(moments) = Moments::of(indexed) {
             return Self::from_moments(moments.centre, moments.covariance);

@@ -289,8 +289,7 @@ impl HeightSamples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Returns an image of the nearness to the surface: 1 on or above the surface, 0 if half the relief or more below
-    /// it.
+    /// Returns an image of the nearness to the surface: 1 on or above the surface, 0 from half the relief below.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {

@@ -16,8 +16,7 @@ use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved. Strokes never
-/// cover so much of a block.
+/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved.
 const MAX_TOPS: f64 = 0.85;
 /// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
 /// then rests on walls or specks, not on strokes.

@@ -28,8 +28,8 @@ struct Turn {
     iou: f64,
 }
 
-/// Registers the structure mask and the density mask. Uses the alignment with the higher IoU for the ensemble, and
-/// scores all three alignments.
+/// Registers the structure and the density mask. Uses the alignment with the higher IoU for the ensemble. Scores all
+/// three alignments.
 ///
 /// # Errors
 /// Returns an error if normalization chose no threshold or a mask is empty.

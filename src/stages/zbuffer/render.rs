@@ -20,8 +20,7 @@ const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {
-    /// Renders the highest z of a plane frame under each pixel centre, in mesh units. The value is [`NO_HIT`] if the
-    /// ray hits nothing.
+    /// Renders the highest z of a plane frame at each pixel centre, in mesh units. Rays without a hit give [`NO_HIT`].
     pub(crate) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
         let mut heights = Grid::new(view.width, view.height, NO_HIT);
         self.rasterize(plane_from_mesh, view, |place, z| {

@@ -116,8 +116,7 @@ impl IndexedSurface {
         [low, high].map(f64::from)
     }
 
-    /// Returns the indices of the blocks with the lowest and the highest box along `row`. Ignores ends outside the
-    /// bulk.
+    /// Returns the indices of the blocks with the lowest and the highest bound along `row` inside the bulk.
     fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
         dispatch!({
