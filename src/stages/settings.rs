@@ -13,9 +13,9 @@ use crate::domain::{Stage, ThresholdMetric};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentMethod {
-    /// The recommended method: the pose first, then thresholds in the aligned frame.
+    /// The recommended method: finds the pose first, then chooses thresholds in the aligned frame.
     Default,
-    /// The paper's method (arXiv 2411.05524): thresholds first, then an exhaustive search over rotations.
+    /// The paper's method (arXiv 2411.05524): chooses thresholds first, then searches all rotations.
     Paper,
 }
 

@@ -148,7 +148,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
     Ok(inks.into_iter().flatten().collect())
 }
 
-/// Returns whether so many dark values are pale that the print may be stained. `sorted` is in ascending order.
+/// Returns whether enough of the dark values are pale to suggest stains. `sorted` is in ascending order.
 fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     let Some(split) = split else { return false };
     let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);

@@ -15,7 +15,7 @@ use crate::stages::pose::{
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// If the relief of one side is below this share of the opposite side's relief, it is the back of the block.
+/// If the relief of one side is below this share of the opposite relief, that side is the back of the block.
 const BACK: f64 = 0.35;
 /// Weight of the winding, from -1 (inward) to 1 (outward).
 const WINDING: f64 = 2.0;

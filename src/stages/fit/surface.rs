@@ -77,7 +77,7 @@ pub(super) struct HeightSamples {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     pub(super) coefficients: Coefficients,
-    /// Points near the surface, weighted by nearness, minus a penalty for points above, as a share of all points.
+    /// Share of the points that lie near the surface, weighted by nearness. Points above the surface count negatively.
     pub(super) support: f64,
     /// Share of the visible area within the last window.
     pub(super) tops: f64,

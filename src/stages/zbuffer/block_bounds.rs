@@ -3,8 +3,8 @@
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use crate::simd::{max_f32, min_f32};
 
-/// Half the side of a box grows by this share of the sum of the surface's extent, half the side, and the distance from
-/// the origin. The growth exceeds rounding errors, so no corner is outside its box.
+/// Boxes are enlarged by this share of a length: the extent of the surface, plus half the side of the box, plus its
+/// distance from the origin. This exceeds rounding errors, so no corner is outside its box.
 const MARGIN: f32 = 2e-6;
 
 /// Boxes of [`LANES`] blocks, one per lane. Each box is stored as its centre and half its sides, in x, y and z.
