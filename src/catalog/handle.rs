@@ -30,7 +30,7 @@ impl Catalog {
     /// Opens the catalog, or creates it.
     ///
     /// # Errors
-    /// If the file is not a catalog or is on a network file system, or the database returns an error.
+    /// Returns an error if the file is not a catalog or is on a network file system, or if a database operation fails.
     pub async fn create(path: &Path) -> Result<Self> {
         Self::with_writer(path, true, CommitDelay::new()).await
     }
@@ -38,12 +38,13 @@ impl Catalog {
     /// Opens an existing catalog for reading and writing.
     ///
     /// # Errors
-    /// If the file does not exist, is not a catalog or is on a network file system, or the database returns an error.
+    /// Returns an error if the file does not exist, is not a catalog or is on a network file system, or if a database
+    /// operation fails.
     pub async fn open(path: &Path) -> Result<Self> {
         Self::with_writer(path, false, CommitDelay::new()).await
     }
 
-    /// Opens an existing catalog for reading, which works even while a run is active.
+    /// Opens an existing catalog read-only. This works even while a run is active.
     ///
     /// # Errors
     /// If the file does not exist or is not a catalog, or the database returns an error.
@@ -75,7 +76,8 @@ impl Catalog {
         })
     }
 
-    /// Waits until all requests sent so far are stored, checkpoints the write-ahead log and closes the connections.
+    /// Closes all connections. The writer task first handles the requests sent so far and checkpoints the write-ahead
+    /// log.
     pub async fn close(self) {
         // Readers first: an open reader prevents a complete checkpoint.
         self.reader_pool.close().await;
@@ -106,12 +108,12 @@ impl Catalog {
         Ok(self.reader_pool.acquire().await?)
     }
 
-    /// Begins a read transaction: a consistent view of one moment.
+    /// Begins a read transaction, which sees the catalog as of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Transaction<'static, Sqlite>> {
         Ok(self.reader_pool.begin().await?)
     }
 
-    /// Runs `work` in its own write transaction on the writer task.
+    /// Runs `work` in a separate write transaction on the writer task.
     pub(crate) async fn in_transaction<T: Send + 'static>(
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,

@@ -1,8 +1,8 @@
-//! The catalog: a SQLite database with the data of every pair and the job queue. The only module with SQL.
+//! The catalog: a SQLite database with the data of every pair and the job queue. No other module contains SQL.
 //!
-//! `db` holds the connections, the writer task and the errors; `queue` the jobs; `records` the reads and writes of the
-//! pairs' data; `audit` the checks and repairs. One writer task owns the only write connection and commits requests in
-//! groups. Reads use connections of their own and work during a run. Callers pass the current time as an argument.
+//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs, and
+//! `audit` the checks and repairs. One writer task owns the only write connection and commits requests in groups. Reads
+//! use separate connections, also during a run. Callers pass the current time as an argument.
 
 mod audit;
 mod db;

@@ -1,5 +1,4 @@
-//! Checks the catalog: runs SQLite's own checks, and compares the schema, counters and dirty marks with what they must
-//! be.
+//! Checks the catalog with SQLite's own checks. Compares its schema, counters and dirty marks with the expected ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,15 +16,15 @@ use crate::catalog::records::stage_results;
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
 
-/// Most lines of each check.
+/// Largest number of broken references that a check lists.
 const LINES: usize = 50;
 
-/// Derived values that do not agree with the rows; empty when all do.
+/// Derived values that disagree with the rows they are derived from.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Drift {
     /// Wrong counters.
     pub counters: Vec<CounterDrift>,
-    /// Numbers of jobs whose fingerprint or dirty mark disagrees with their results, as text.
+    /// Messages, each with the number of jobs whose fingerprint or dirty mark is wrong.
     pub marks: Vec<String>,
 }
 
@@ -36,20 +35,20 @@ pub struct CounterDrift {
     pub cursor: i64,
     /// The status.
     pub status: JobStatus,
-    /// The counter's value; `None` when its row is missing.
+    /// Value of the counter. `None` if its row is missing.
     pub kept: Option<u64>,
     /// The number of jobs.
     pub counted: u64,
 }
 
-/// A pair with everything stored of it, unparsed.
+/// A pair as stored, with unparsed results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditedPair {
     /// The user's id.
     pub name: PairName,
-    /// Its id, and paths and content of its files as last read.
+    /// Id of the pair, with the paths and hashes of its input files as last read.
     pub inputs: KnownInputs,
-    /// Status and cursor of its job; `None` when it has no job.
+    /// Status and cursor of the pair's job. `None` if there is no job.
     pub job: Option<(JobStatus, i64)>,
     /// Whether a failure is stored.
     pub has_failure: bool,
@@ -59,14 +58,14 @@ pub struct AuditedPair {
     pub metrics: BTreeSet<ThresholdMetric>,
 }
 
-/// A stored result, unparsed, because a check must read damaged ones too.
+/// A stored result, left unparsed so that a check can also read invalid values.
 #[derive(Debug, Clone, PartialEq, Eq, sqlx::FromRow)]
 pub struct AuditedResult {
     /// The outcome as JSON text.
     pub outcome: String,
     /// The artifacts as JSON text.
     pub files: String,
-    /// Hash over both.
+    /// Stored hash of the outcome and the artifacts.
     pub result_hash: ContentHash,
 }
 
@@ -80,7 +79,7 @@ WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations'
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
-/// Each fingerprint with the cursor of a job whose last result has it.
+/// Selects each fingerprint, with the cursor of jobs whose last result has this fingerprint.
 const FINGERPRINTS: &str =
     "SELECT 0 AS cursor, 0 AS id UNION ALL SELECT stage + 1, id FROM fingerprint";
 
@@ -105,11 +104,11 @@ SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
 
 impl Catalog {
-    /// Runs SQLite's integrity check. Returns at most 50 lines, and no line if the file is sound. With `quick`, indexes
-    /// are not compared with their tables.
+    /// Runs SQLite's integrity check. Returns at most 50 faults, or none if the file is sound. With `quick`, does not
+    /// compare indexes with their tables.
     ///
     /// # Errors
-    /// If part of the file cannot be read, or SQLite returns an error that does not mean damage.
+    /// Returns an error if the disk fails to read part of the file, or if SQLite reports an error other than damage.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         match integrity(&mut conn, quick).await {
@@ -126,7 +125,7 @@ impl Catalog {
         }
     }
 
-    /// Describes rows that reference a missing row, at most 50 of them.
+    /// Describes at most 50 rows that reference a missing row.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -136,7 +135,7 @@ impl Catalog {
         Ok(lines.fetch_all(&mut *conn).await?)
     }
 
-    /// Compares tables, indexes and triggers with this program's schema. Returns one line for each difference.
+    /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -158,13 +157,13 @@ impl Catalog {
         Ok(gone.chain(other).collect())
     }
 
-    /// Compares counters, and the fingerprints and dirty marks of jobs, with the rows. With `quick`, only the counters
-    /// are compared, because the rest needs every pair's results.
+    /// Compares the counters, and the fingerprint and dirty mark of each job, with the rows they are derived from. With
+    /// `quick`, checks only the counters, because the other checks read all results.
     ///
     /// # Errors
     /// If the database returns an error.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
-        // Reads in one transaction, so that a concurrent run does not look like drift.
+        // One transaction, so that the writes of a concurrent run do not look like drift.
         let mut conn = self.snapshot().await?;
         let counters = counter_drift(&mut conn).await?;
         let mut marks = Vec::new();
@@ -187,10 +186,10 @@ impl Catalog {
         Ok(Drift { counters, marks })
     }
 
-    /// Returns at most `limit` pairs with ids above `after`, in the order of ids. Returns no pairs at the end.
+    /// Returns up to `limit` pairs whose ids follow `after`, sorted by id. Returns an empty list after the last pair.
     ///
     /// # Errors
-    /// If the database returns an error, or a stored value is invalid.
+    /// Returns an error if a database operation fails, or if a stored value is invalid.
     pub async fn audit_page(
         &self,
         after: Option<PairId>,
@@ -253,7 +252,7 @@ pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Resul
     Ok(lines)
 }
 
-/// Returns whether a line of SQLite's check reports an I/O error, which does not mean that the page is damaged.
+/// Returns whether a line of SQLite's check reports an I/O error rather than damage.
 fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());

@@ -1,4 +1,4 @@
-//! The catalog checked against itself, and repairs.
+//! Checks and repairs of the catalog.
 
 pub(crate) mod integrity;
 pub(crate) mod repair;

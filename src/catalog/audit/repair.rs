@@ -1,4 +1,4 @@
-//! Repairs the damage that a check found, while no run is active. Verdicts and past results are never changed.
+//! Repairs damage that a check found, while no run is active. Never changes verdicts or stored results.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
@@ -20,8 +20,8 @@ const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
 
-/// Sends jobs back to a stage, never forward, even if they are leased. A repair runs only while no other process works
-/// on the project, so nobody should use the lease. If a process does, the new token makes its writes fail.
+/// Sends jobs back to a stage, never forward. Voids leases too: because the token increases, later writes under an old
+/// lease fail.
 pub(crate) const RESTORE: &str = concat!(
     "
 UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
@@ -33,7 +33,7 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
-/// Every counter that the catalog needs, at 0.
+/// Recreates every counter with the value 0.
 const RESET_COUNTERS: [&str; 3] = [
     "DELETE FROM counter",
     "INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]')",
@@ -55,17 +55,18 @@ const MARK_DIRTY: &str = concat!(
 );
 
 impl Catalog {
-    /// Sends each pair back to its stage, and adds a job to a pair without one. The counters must be right already: see
+    /// Sends each pair back to the given stage, and adds missing jobs. The counters must be correct: see
     /// [`Catalog::rebuild_counters`].
     ///
     /// # Errors
-    /// If the database returns an error. In that case nothing is changed.
+    /// Returns an error if a database operation fails. In that case nothing is changed.
     pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
         self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
             .await
     }
 
-    /// Sets each job's fingerprint from its results, marks inconsistent jobs dirty, and corrects every counter.
+    /// Sets each job's fingerprint to that of its last result, marks jobs with inconsistent results dirty, and recounts
+    /// all counters.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -86,7 +87,7 @@ impl Catalog {
         .await
     }
 
-    /// Rebuilds every index from its table. Returns the faults that SQLite finds afterwards.
+    /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -1,4 +1,4 @@
-//! Statements that store a failed stage, fenced by the lease.
+//! Statements that store a failed stage if the lease is still valid.
 
 use serde_json::{Value, json};
 
@@ -10,10 +10,10 @@ use crate::catalog::queue::fragments::fingerprint_before;
 use crate::catalog::queue::lease::{FailureAction, Lease, StageFailure};
 use crate::domain::JobStatus;
 
-/// Attempts kept per pair.
+/// Number of attempts kept per pair. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;
 
-/// Sets the new state of failed jobs whose lease still holds and whose worker is alive.
+/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead.
 pub(crate) const FAIL: &str = concat!(
     "
 UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
@@ -49,7 +49,7 @@ DELETE FROM attempt WHERE id IN (
     SELECT old.id FROM jsonb_each(?) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
     WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?))";
 
-/// A row of [`FAIL`]: the fenced job and its new position.
+/// A row of [`FAIL`]: a job with its token and new counter key.
 #[derive(sqlx::FromRow)]
 pub(crate) struct FailedRow {
     pub(crate) pair: i64,
@@ -58,14 +58,13 @@ pub(crate) struct FailedRow {
     key: CounterKey,
 }
 
-/// Returns the row of the job that was leased, or `None` if the lease was lost.
+/// Returns the row for a lease, or `None` if the lease was lost.
 pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r FailedRow> {
     rows.iter()
         .find(|row| (row.pair, row.token) == (lease.pair.0, lease.token))
 }
 
-/// Adds to a script the statement that sets the new states of failed jobs. The statement returns the jobs whose lease
-/// still held.
+/// Adds the statement `FAIL` to a script. Its rows are the jobs whose lease was not lost.
 pub(crate) fn add_failures<'i>(
     script: &mut Script,
     failures: impl Iterator<Item = &'i (Lease, StageFailure)>,
@@ -73,7 +72,7 @@ pub(crate) fn add_failures<'i>(
     script.add_over(FAIL, failures.map(json_of))
 }
 
-/// Adds failures that counted, and their attempts, to a script.
+/// Adds the statements that store failures and attempts to a script.
 pub(crate) fn add_failure_records(
     script: &mut Script,
     failed: &[(&(Lease, StageFailure), &FailedRow)],

@@ -1,4 +1,4 @@
-//! What a run would do: counted over all pairs, or inspected for some.
+//! Plans of runs: which pairs a run would process, from which stage, and why.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairName, Stage};
 
 impl Catalog {
-    /// Returns what a run with these settings would do with the named pairs, or with all pairs if `names` is `None`.
+    /// Plans a run with these settings for the named pairs. If `names` is `None`, plans a run for all pairs.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -34,7 +34,7 @@ impl Catalog {
         plan(&mut conn, fingerprints, among.as_ref(), policy).await
     }
 
-    /// Counts the pairs with a result whose settings or inputs differ from the current ones.
+    /// Counts the pairs that have a result with outdated settings or inputs.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -44,10 +44,10 @@ impl Catalog {
         count_stale(&mut conn, &current).await
     }
 
-    /// Returns why a pair would run and from which stage, or `None` if the pair has nothing left to run.
+    /// Returns from which stage a run would process a pair, and why. Returns `None` if the run would skip the pair.
     ///
     /// # Errors
-    /// If there is no such pair, or the database returns an error.
+    /// Returns an error if there is no such pair, or if a database operation fails.
     pub async fn why(
         &self,
         pair: &PairName,

@@ -15,35 +15,36 @@ pub struct WorkerInfo {
     pub host: String,
     /// Process id.
     pub pid: u32,
-    /// Boot id of the machine, where known.
+    /// Boot id of the machine, if known.
     pub boot_id: Option<String>,
 }
 
-/// Open work among some pairs or all.
+/// Numbers of pairs that have a stage to run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, sqlx::FromRow)]
 pub struct Outstanding {
-    /// Ready pairs with a stage to run.
+    /// Pairs that are ready.
     pub ready: u64,
-    /// Pairs leased by anybody, with such a stage.
+    /// Pairs leased by any worker.
     pub leased: u64,
-    /// Pairs that back off from such a stage.
+    /// Pairs that back off.
     pub backoff: u64,
-    /// Time of the first due back-off.
+    /// Time at which the first back-off ends.
     pub next_due: Option<UnixMillis>,
 }
 
-/// Open stages among some pairs or all.
+/// Numbers of stages that are still to run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WorkLeft {
-    /// Pairs with open stages that are not quarantined.
+    /// Pairs with stages to run, without quarantined pairs.
     pub pairs: u64,
-    /// Open stages by stage.
+    /// Number of pairs that have yet to run each stage.
     pub by_stage: [u64; 4],
     /// Quarantined pairs.
     pub quarantined: u64,
 }
 
-/// Makes jobs ready if their back-off is due, or ends so far in the future that the clock must have jumped.
+/// Ends the back-offs that are due at `?1`. Also ends back-offs until later than `?2`, which only a clock jump can
+/// cause.
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
@@ -67,7 +68,8 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Registers a worker process and the fingerprints of its settings. Returns the worker's id; ids are never reused.
+    /// Registers a worker process with the fingerprints of its settings. Returns a worker id that was never used
+    /// before.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -99,8 +101,8 @@ impl Catalog {
         .await
     }
 
-    /// Makes pairs ready whose back-off is due. Back-offs due more than `longest` milliseconds ahead end too, because
-    /// only a clock jump can cause them. Returns the number of pairs made ready.
+    /// Ends the back-offs that are due, and returns the number of pairs made ready. Also ends back-offs with more than
+    /// `longest` milliseconds left, which only a clock jump can cause.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -120,7 +122,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns the open work up to a stage, among some pairs or all. Among all pairs, `ready` is at most 1000.
+    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. If `among` is `None`,
+    /// counts all pairs, but at most 1000 ready ones.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -139,8 +142,8 @@ impl Catalog {
         Ok(query.fetch_one(&mut *conn).await?)
     }
 
-    /// Returns the open stages up to a stage. They are read from the counters, or, if pairs are given, counted from the
-    /// jobs of these pairs.
+    /// Counts the stages up to `until` that pairs have yet to run. If `among` is `None`, reads the counters, not the
+    /// jobs.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -1,4 +1,4 @@
-//! Ground truth of a dataset, if it has any. It is stored as given, for the report to read.
+//! Ground truth: the true alignments that a dataset gives for its pairs, stored unchanged.
 
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
@@ -30,7 +30,7 @@ impl Catalog {
     }
 }
 
-/// Stores true alignments as given, replacing earlier ones, in the open transaction. Returns their number.
+/// Stores true alignments unchanged, replacing earlier ones. Returns their number. The caller begins the transaction.
 pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {

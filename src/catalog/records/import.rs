@@ -34,7 +34,7 @@ pub enum ImportChunk {
 pub struct ImportSummary {
     /// Number of new pairs.
     pub added: u64,
-    /// Existing pairs with other values and the fields that differ, by name.
+    /// Existing pairs with other values, and the columns that differ.
     pub changed: Vec<PairChange>,
     /// Number of existing pairs with the same values.
     pub unchanged: u64,
@@ -45,7 +45,7 @@ pub struct ImportSummary {
 pub struct PairChange {
     /// The pair.
     pub name: PairName,
-    /// Names of the columns that differ, in the order of the manifest's columns.
+    /// Names of the columns that differ.
     pub fields: Vec<&'static str>,
 }
 
@@ -53,8 +53,8 @@ const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
 FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
 
-/// Adds new pairs and updates existing ones. A changed path clears the stored file state, so that the next run reads
-/// the file.
+/// Adds new pairs and updates existing ones. If a path changed, clears the `stat` of that file, so that the next run
+/// reads the file again.
 const UPSERT: &str = "
 INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
 SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
@@ -72,12 +72,12 @@ SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
     AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
 
 impl Catalog {
-    /// Imports streamed rows and true alignments in one transaction. New pairs are added, existing pairs are updated.
-    /// Of two rows with the same name, the later is used. Returns the summary and the number of true alignments.
+    /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
+    /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// If the channel closes before `ImportChunk::End`, a true alignment names an unknown pair, or the database
-    /// returns an error. In that case nothing is imported.
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a true alignment names an unknown pair, or
+    /// if a database operation fails. In that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
@@ -119,7 +119,7 @@ impl Catalog {
         Ok(names.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns the names that no pair has, in the order given.
+    /// Returns the unknown names among `names`, in the given order.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -174,7 +174,7 @@ fn item(row: &ImportRow) -> Value {
     })
 }
 
-/// Returns the manifest attributes that results depend on, as the JSON text that the catalog compares.
+/// Returns the manifest attributes that results depend on, as JSON. If this text changes, the results are stale.
 fn result_attributes(row: &ImportRow) -> String {
     json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
 }

@@ -1,4 +1,5 @@
-//! Manual alignments: an append-only log beside the automatic results. Each is bound to the files on which it was made.
+//! Manual alignments, in an append-only log. Each entry has the hashes of the mesh, print and depth map it was made
+//! for.
 
 use std::collections::BTreeMap;
 
@@ -17,19 +18,20 @@ pub struct ManualAlignment {
     pub pair: PairName,
     /// Who made it.
     pub reviewer: String,
-    /// Depth-map pixels to print pixels, for the depth map of `depth_hash`.
+    /// Map from depth-map pixels to print pixels, for the depth map of `depth_hash`.
     pub print_from_depth: Affine2,
-    /// Maps mesh points to print pixels and heights. It remains valid if the depth map changes.
+    /// Map from mesh points to print pixels and heights. It remains valid if the depth map changes.
     pub print_from_mesh: PrintFromMesh,
     /// Content of the mesh.
     pub mesh_hash: ContentHash,
     /// Content of the print.
     pub print_hash: ContentHash,
-    /// Result of the depth stage on which it was made.
+    /// Result hash of the depth stage on which the alignment was made.
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the two masks at the manual pose, on the same canvas as the pair's scores.
+    /// Intersection over union of the masks of relief and print at the manual pose. Uses the canvas of the pair's
+    /// scores.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,
@@ -48,9 +50,9 @@ pub struct StoredAlignment {
     pub at: UnixMillis,
     /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
-    /// Whether the mesh and the print are unchanged, which makes `print_from_mesh` valid.
+    /// Whether the current results use the same mesh and print. Only then is `print_from_mesh` valid.
     pub holds: bool,
-    /// Whether the depth map is unchanged, which makes `print_from_depth` valid.
+    /// Whether the current depth map has the hash `depth_hash`. Only then is `print_from_depth` valid.
     pub on_current_depth: bool,
 }
 
@@ -71,8 +73,7 @@ FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
 ORDER BY a.id";
 
 impl Catalog {
-    /// Appends a manual alignment, which is durable on return. Returns `false`, and stores nothing, if its event is
-    /// stored already.
+    /// Appends a manual alignment durably. Returns `false`, and stores nothing, if an alignment with this event exists.
     ///
     /// # Errors
     /// If there is no such pair, or the database returns an error.
@@ -106,7 +107,7 @@ impl Catalog {
         .await
     }
 
-    /// Returns every manual alignment, oldest first, including undone ones.
+    /// Returns all manual alignments, including undone ones, oldest first.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -115,14 +116,14 @@ impl Catalog {
         Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
     }
 
-    /// Returns for each pair its newest manual alignment that is valid (`holds`) and not undone.
+    /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
     ///
     /// # Errors
     /// If the database returns an error.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
-        // Oldest first, so that the newest stays.
+        // The alignments are sorted oldest first, so the newest one stays.
         Ok(valid
             .map(|stored| (stored.made.pair.clone(), stored))
             .collect())

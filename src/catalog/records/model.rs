@@ -1,4 +1,4 @@
-//! Read models of the catalog: plain values that queries return.
+//! Results of queries, as plain values.
 
 use std::collections::BTreeMap;
 
@@ -24,11 +24,11 @@ pub struct StatusCounts {
     pub jobs: BTreeMap<JobStatus, u64>,
     /// Number of pairs by stage, all stages included.
     pub stages: BTreeMap<Stage, StageCounts>,
-    /// Number of pairs with stale results, computed with settings or inputs other than the current ones.
+    /// Number of pairs with stale results. A result is stale if its settings or inputs have changed since.
     pub stale: u64,
-    /// Number of completed pairs with a metric whose confidence is below [`MetricOutcome::LOW_CONFIDENCE`].
+    /// Number of completed pairs with at least one confidence below [`MetricOutcome::LOW_CONFIDENCE`].
     pub low_confidence: u64,
-    /// Number of verdicts on current results, the newest of each reviewer.
+    /// Number of verdicts on current results. Only the newest verdict of each reviewer counts.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
 
@@ -37,7 +37,7 @@ pub struct StatusCounts {
 pub struct StageCounts {
     /// Pairs that completed the stage.
     pub done: u64,
-    /// Pairs that have not reached or completed it.
+    /// Pairs that have neither completed the stage nor failed at it.
     pub pending: u64,
     /// Pairs that failed at it.
     pub failed: u64,
@@ -78,25 +78,25 @@ pub struct StageRecord {
     /// Its artifacts by role.
     #[sqlx(try_from = "Json<ArtifactSet>")]
     pub files: ArtifactSet,
-    /// Hash over outcome and files; the same bytes give the same hash.
+    /// Hash of the outcome and the artifacts. Equal bytes give equal hashes.
     pub result_hash: ContentHash,
-    /// Hash of the settings it was computed with, earlier stages' included.
+    /// Hash of the settings of this stage and of all earlier stages.
     pub fingerprint_hash: ContentHash,
-    /// These settings: revision and settings of this stage.
+    /// Revision and settings of this stage.
     #[sqlx(try_from = "Json<Value>")]
     pub fingerprint_fields: Value,
-    /// Content of the mesh it was computed from.
+    /// Hash of the mesh that the result was computed from.
     pub mesh_hash: ContentHash,
     /// Hash of the print that the result was computed from. `None` if the stage does not read the print.
     pub print_hash: Option<ContentHash>,
     /// Computing time in milliseconds.
     pub ms: u64,
-    /// When it was stored.
+    /// When the result was stored.
     pub at: UnixMillis,
 }
 
 impl StageRecord {
-    /// Parses the outcome into its type in `domain`, such as `FitOutcome`.
+    /// Parses the outcome as a type of `domain`, such as `FitOutcome` for the stage `Fit`.
     ///
     /// # Errors
     /// If the stored JSON does not match the type, for example after an upgrade.
@@ -111,11 +111,11 @@ pub struct MetricRecord {
     /// The numbers.
     #[serde(flatten)]
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the images that reviewers see. Verdicts are bound to this hash.
+    /// Hash of the numbers and of the images that reviewers see. A verdict refers to a result by this hash.
     pub result_hash: ContentHash,
     /// Verdicts on this result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
-    /// Verdicts on older results of this pair and metric; not counted.
+    /// Number of verdicts on older results of this pair and metric. They have no effect.
     pub older_verdicts: u64,
 }
 
@@ -151,12 +151,11 @@ pub struct PairResults {
     pub status: JobStatus,
     /// Next stage. `None` if the pair is done.
     pub next_stage: Option<Stage>,
-    /// The failure, if it is quarantined or backing off.
+    /// The failure, if the pair is quarantined or backing off.
     pub failure: Option<StoredFailure>,
     /// Results of the completed stages, in order.
     pub stages: Vec<StageRecord>,
-    /// Results of the metrics that the method computes, in the order of [`ThresholdMetric::ALL`]. Empty if the pair is
-    /// not done.
+    /// Results of the computed metrics, in the order of [`ThresholdMetric::ALL`]. Empty if the pair is not done.
     pub metrics: Vec<MetricRecord>,
     /// The true alignment as given, if any.
     pub truth: Option<Value>,
@@ -186,7 +185,7 @@ impl PairResults {
 pub struct AttemptRecord {
     /// The stage.
     pub stage: Stage,
-    /// The failure; `None` if it succeeded.
+    /// The failure. `None` if the attempt succeeded.
     pub failure: Option<Failure>,
     /// Computing time in milliseconds, if known.
     pub ms: Option<u64>,
@@ -197,7 +196,7 @@ pub struct AttemptRecord {
 /// Everything about one pair, for `show`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairDetail {
-    /// Attributes, status, results, failure, and each metric with the reviewers' newest verdicts.
+    /// Attributes, status, failure and current results, with each reviewer's newest verdicts.
     #[serde(flatten)]
     pub results: PairResults,
     /// Content of the mesh as last read.
@@ -206,7 +205,7 @@ pub struct PairDetail {
     pub print_hash: Option<ContentHash>,
     /// Number of attempts at the current stage.
     pub attempt: u32,
-    /// Number of worker deaths and overdue leases blamed on the pair since its last completed stage.
+    /// Number of worker deaths and overdue leases blamed on the pair since its last stored stage or requeue.
     pub crashes: u32,
     /// When the back-off ends.
     pub run_at: Option<UnixMillis>,

@@ -1,4 +1,4 @@
-//! Builds read models from several tables: pages of results, one pair, failures.
+//! Reads pairs with data from several tables: pages of results, the details of one pair, and failures.
 
 use std::collections::BTreeMap;
 
@@ -51,7 +51,8 @@ const ATTEMPTS: &str =
     "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id";
 
 impl Catalog {
-    /// Returns up to `limit` pairs whose names follow `after`, in the order of names. Returns no pairs at the end.
+    /// Returns the results of up to `limit` pairs whose names follow `after`, sorted by name. Returns an empty list
+    /// after the last pair.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -60,7 +61,7 @@ impl Catalog {
         after: Option<&PairName>,
         limit: usize,
     ) -> Result<Vec<PairResults>> {
-        // Reads in one transaction, so that job, results and verdicts are of one moment even during a run.
+        // One transaction gives a consistent view of jobs, results and verdicts, even while a run writes.
         let mut conn = self.snapshot().await?;
         let found = sqlx::query(PAGE)
             .bind(after.map_or("", PairName::as_str))
@@ -70,7 +71,7 @@ impl Catalog {
         assemble(&mut conn, &found).await
     }
 
-    /// Returns everything about one pair, or `None` if it does not exist.
+    /// Returns the details of a pair, or `None` if the pair does not exist.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -96,7 +97,7 @@ impl Catalog {
         }))
     }
 
-    /// Returns up to `limit` quarantined pairs, in the order of names.
+    /// Returns up to `limit` quarantined pairs, sorted by name.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -115,7 +116,7 @@ impl Catalog {
         failed.collect()
     }
 
-    /// Returns the number of quarantined pairs for each failure class that occurs.
+    /// Counts the quarantined pairs by failure class. Leaves out classes without pairs.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -165,7 +166,7 @@ fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
     }))
 }
 
-/// Returns the metrics of a completed pair, each with the verdicts on its current result.
+/// Returns the metrics of a pair, each with the verdicts on its current result. Returns none if the pair is not done.
 fn metrics(
     pair: i64,
     stages: &[StageRecord],
@@ -228,7 +229,7 @@ async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptR
     Ok(records.collect())
 }
 
-/// Reads pairs in the order of names, one page at a time, so that memory does not grow with their number.
+/// Reads the results of all pairs page by page, sorted by name. Only one page is read into memory at a time.
 #[derive(Debug)]
 pub struct ResultPages<'a> {
     catalog: &'a Catalog,
@@ -248,7 +249,7 @@ impl Catalog {
 }
 
 impl ResultPages<'_> {
-    /// Returns the next page, or `None` at the end. A page is never empty.
+    /// Returns the next page, which is never empty, or `None` after the last page.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -1,4 +1,4 @@
-//! Data that a worker needs of a leased pair and its inputs.
+//! Data of a leased pair that a worker needs, and the versions of input files.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct PairWork {
     /// Attributes as imported.
     #[sqlx(flatten)]
     pub attributes: PairAttributes,
-    /// Manifest attributes that results depend on; stored with each result.
+    /// Manifest attributes that results depend on. They are stored with each result.
     #[sqlx(rename = "attributes")]
     pub attributes_json: String,
     /// Results of all completed stages, in order.
@@ -58,10 +58,10 @@ SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
 FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
 
 impl Catalog {
-    /// Returns the leased pairs with their results, in the order of the leases.
+    /// Returns the leased pairs with their results, in the same order as the leases.
     ///
     /// # Errors
-    /// If the database returns an error or holds invalid values.
+    /// Returns an error if a database operation fails, or if a stored value is invalid.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
@@ -89,7 +89,8 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns the input files of pairs as last read, in pages by pair id. Returns no pairs at the end.
+    /// Returns up to `limit` pairs whose ids follow `after`, with their input files as last read. Returns an empty list
+    /// after the last pair.
     ///
     /// # Errors
     /// If the database returns an error.

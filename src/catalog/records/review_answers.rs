@@ -1,4 +1,4 @@
-//! Answers of the review page: verdicts on results, and answers to attention checks.
+//! Answers on the review page: verdicts on results, and answers to attention checks.
 
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
@@ -14,15 +14,15 @@ use crate::domain::{
 /// Item shown to a reviewer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
-    /// The result of one metric, or equal results of several metrics, each with its hash.
+    /// Results of one or several metrics that look the same to the reviewer, each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
     /// An attention check made from a metric's result.
     Check {
         /// The kind of check.
         check: AttentionCheck,
-        /// The metric it was made from.
+        /// The metric whose result the check was made from.
         metric: ThresholdMetric,
-        /// The result it was made from.
+        /// Hash of that metric's result.
         result_hash: ContentHash,
     },
 }
@@ -73,9 +73,9 @@ impl FromRow<'_, SqliteRow> for AnsweredOn {
 pub struct AttentionCheckAnswer {
     /// The pair.
     pub pair: PairName,
-    /// The metric whose result it was made from.
+    /// The metric whose result the check was made from.
     pub metric: ThresholdMetric,
-    /// That result.
+    /// Hash of that metric's result.
     pub result_hash: ContentHash,
     /// The kind of check.
     pub check: AttentionCheck,
@@ -123,7 +123,7 @@ SELECT c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "c
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
 ORDER BY c.id"#;
 
-/// Undo what a reviewer did with an event, once.
+/// Statements that undo what a reviewer stored under an event id. A second undo has no effect.
 const UNDO: [&str; 3] = [
     "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
@@ -133,18 +133,18 @@ const UNDO: [&str; 3] = [
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
 ];
 
-/// Whether a reviewer did anything with an event, undone or not.
+/// Whether a reviewer stored anything under an event id, undone or not.
 const EXISTS: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2)
     OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1 AND reviewer = ?2)
     OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer = ?2)";
 
 impl Catalog {
-    /// Appends an answer to the item that was shown, which is durable on return. The shown result may be outdated by
-    /// now. Returns `false`, and stores nothing, if an answer with this `look.event` is stored already.
+    /// Appends an answer to a shown item durably, even if the shown result is outdated. Returns `false`, and stores
+    /// nothing, if an answer with the same `look.event` exists.
     ///
     /// # Errors
-    /// If there is no such pair, `shown` lists no result, or the database returns an error.
+    /// Returns an error if there is no such pair, if `shown` lists no result, or if a database operation fails.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -182,11 +182,11 @@ impl Catalog {
         .await
     }
 
-    /// Undoes the verdict, the answer to an attention check or the manual alignment that a reviewer gave with an event.
-    /// A second call changes nothing. The log keeps the answer and the undo.
+    /// Undoes what a reviewer stored under an event id: a verdict, an answer to an attention check, or a manual
+    /// alignment. A second call changes nothing. The log keeps the answer and records the undo.
     ///
     /// # Errors
-    /// If the reviewer gave nothing with this event, or the database returns an error.
+    /// Returns an error if the reviewer stored nothing under this event id, or if a database operation fails.
     pub async fn undo_event(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         self.in_transaction(move |conn| {
@@ -213,8 +213,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns a reviewer's answers that were not undone, oldest first. An answer on several results appears once for
-    /// each result.
+    /// Returns the answers of a reviewer that are not undone, oldest first. An answer on several results appears once
+    /// for each of these results.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -224,7 +224,7 @@ impl Catalog {
         Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns every answer to an attention check, oldest first, without verdicts on results.
+    /// Returns all answers to attention checks, including undone ones, oldest first.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -234,7 +234,7 @@ impl Catalog {
         Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns the key from which the review page derives the ids of its items. It stays the same after a restart.
+    /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
     ///
     /// # Errors
     /// If the database returns an error.

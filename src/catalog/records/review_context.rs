@@ -7,13 +7,13 @@ use crate::domain::{ContentHash, ReviewOrder};
 /// Context of a verdict. All fields are `None` if the context is unknown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, sqlx::FromRow)]
 pub struct ReviewContext {
-    /// Idempotency key of the client: a verdict sent twice is stored once.
+    /// Idempotency key of the client. A verdict that is sent twice is stored once.
     pub event: Option<String>,
     /// Hash of everything that the shown image was made from.
     pub seen: Option<ContentHash>,
     /// How long the image was shown, in milliseconds.
     pub shown_ms: Option<u64>,
-    /// Rotation, in degrees clockwise, that the relief still needs to match the print, as read by the reviewer.
+    /// Reviewer's estimate of how far the relief must still be rotated to match the print, in degrees clockwise.
     pub angle_read_deg: Option<f64>,
     /// Order of the review queue.
     pub review_order: Option<ReviewOrder>,

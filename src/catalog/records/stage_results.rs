@@ -34,7 +34,7 @@ pub(crate) async fn of_pairs(
     Ok(records)
 }
 
-/// Returns the hash of each metric's current result, by pair and metric. Verdicts are bound to these hashes.
+/// Returns the hash of each metric's current result, by pair and metric. A verdict refers to a result by this hash.
 pub(crate) async fn metric_hashes(
     conn: &mut SqliteConnection,
     pairs: &[i64],

@@ -11,7 +11,7 @@ use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, Stage, Verdict};
 
-/// Newest verdict of each reviewer on each current result, by verdict.
+/// Counts verdicts on current results by verdict. Only the newest verdict of each reviewer on a result counts.
 const VERDICTS: &str = "
 SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
@@ -26,7 +26,8 @@ pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Returns the counts that `status` shows. Results that differ from the current `fingerprints` count as stale.
+    /// Returns the counts that the `status` command shows. Results with other settings than `fingerprints`, or with
+    /// changed inputs, count as stale.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -48,7 +49,7 @@ impl Catalog {
     }
 }
 
-/// Adds up numbers of jobs by status; every status is there.
+/// Adds up the numbers of jobs by status. Statuses without jobs are included.
 fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
     let mut jobs: BTreeMap<_, _> = JobStatus::ALL.map(|status| (status, 0)).into();
     for ((_, status), n) in counts {
@@ -57,7 +58,7 @@ fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
     jobs
 }
 
-/// Returns the numbers of pairs by stage. A pair that failed at a stage counts as pending at the later stages.
+/// Counts the done, pending and failed pairs of each stage. A pair that failed is pending at the later stages.
 fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
     let mut stages: BTreeMap<_, _> = Stage::ALL
         .map(|stage| (stage, StageCounts::default()))

@@ -1,4 +1,4 @@
-//! Verdicts: an append-only log. For each result, the newest verdict of each reviewer counts.
+//! Verdicts, in an append-only log. Of a reviewer's verdicts on one result, only the newest counts.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::domain::{
 pub struct NewVerdict {
     /// The pair.
     pub pair: PairName,
-    /// The metric that is judged; `None` for all metrics.
+    /// The judged metric. `None` for all metrics.
     pub metric: Option<ThresholdMetric>,
     /// The judgement.
     pub verdict: Verdict,
@@ -30,7 +30,7 @@ pub struct NewVerdict {
     /// Context in which it was given, if known.
     #[serde(flatten)]
     pub look: ReviewContext,
-    /// When it was given, if that was before it is stored.
+    /// When the verdict was given, if not at the time of storing.
     pub at: Option<UnixMillis>,
 }
 
@@ -39,7 +39,8 @@ pub struct NewVerdict {
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
-    /// Number of the action: the id of its first row. One action judges one or all metrics of a pair.
+    /// Number of the reviewer's action, which is the id of its first row. One action can judge several metrics of a
+    /// pair.
     pub act: i64,
     /// The pair.
     pub pair: PairName,
@@ -76,7 +77,7 @@ pub struct ReviewerVerdict {
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// Order in which the reviewer saw the results. [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
+    /// Order of the review queue. [`ReviewOrder::Adjudicate`] marks a decision between conflicting verdicts.
     pub review_order: Option<ReviewOrder>,
 }
 
@@ -90,7 +91,7 @@ pub(crate) struct ResultVerdict {
     pub(crate) verdict: ReviewerVerdict,
 }
 
-/// Selects the current results of a pair. If the pair is not done, it selects one row whose metric is NULL.
+/// Selects the current results of a pair. If the pair is not done, selects one row whose metric is NULL.
 const JUDGED: &str = "
 SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
     JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
@@ -103,7 +104,7 @@ SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4,
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING act";
 
-/// Lines of the log of one act, or of one pair, or all.
+/// Selects the verdict log. If not NULL, `?1` limits it to one action and `?2` to one pair.
 const LOG: &str = "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
     v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
@@ -118,11 +119,11 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results, all or none. Returns the number of verdicts that are new. A verdict
-    /// whose `event` is stored already is skipped.
+    /// Appends verdicts on the current results in one transaction. Skips each verdict whose `event` is already stored.
+    /// Returns the number of appended verdicts.
     ///
     /// # Errors
-    /// If a pair does not exist or has no result for a verdict to judge, or the database returns an error. In that case
+    /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
     /// nothing is stored.
     pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.in_transaction(move |conn| {
@@ -137,11 +138,11 @@ impl Catalog {
         .await
     }
 
-    /// Undoes the newest action that is not undone yet, of one reviewer or of anyone, and returns its verdicts. The log
-    /// keeps the action and the undo.
+    /// Undoes the newest action that is not undone yet, and returns its verdicts. If `reviewer` is given, only actions
+    /// of this reviewer count. The log keeps the action and records the undo.
     ///
     /// # Errors
-    /// If no action is left to undo, or the database returns an error.
+    /// Returns an error if there is no action to undo, or if a database operation fails.
     pub async fn verdict_undo(
         &self,
         reviewer: Option<&str>,
@@ -182,7 +183,7 @@ impl Catalog {
     }
 }
 
-/// Appends a verdict. Returns `false` if all its rows were stored before.
+/// Appends a verdict. Returns `false` if all its rows are already stored.
 async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
     let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = sqlx::query_as(JUDGED)
         .bind(new.pair.as_str())
@@ -209,9 +210,8 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
 }
 
-/// Appends one verdict row for a result of a pair. Returns the number of the action that the row belongs to, which is
-/// the id of the action's first row. Returns `None`, and appends nothing, if a row with the same event and metric
-/// exists.
+/// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row
+/// with the same event and metric exists. If `act` is `None`, the row begins a new action.
 pub(crate) async fn insert(
     conn: &mut SqliteConnection,
     new: &NewVerdict,
@@ -250,8 +250,8 @@ pub(crate) async fn log(
     Ok(query.fetch_all(conn).await?)
 }
 
-/// Returns each reviewer's newest verdict on each result of some pairs, without undone verdicts, in the order of
-/// reviewers.
+/// Returns each reviewer's newest verdict on each result of the given pairs, sorted by reviewer. Ignores undone
+/// verdicts.
 pub(crate) async fn of_pairs(
     conn: &mut SqliteConnection,
     pairs: &[i64],
@@ -261,7 +261,7 @@ pub(crate) async fn of_pairs(
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
     for newest in found {
         let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
-        // Rows come oldest first, so a later verdict of the same reviewer on the same result replaces the earlier.
+        // Each reviewer's verdicts come oldest first, so a later verdict on a result replaces the earlier one.
         of_metric.retain(|old| {
             old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
         });
