@@ -1,4 +1,4 @@
-//! The queue's requests to the writer task, and its counters.
+//! Requests of the queue to the writer task, and its counters.
 
 use crate::catalog::db::commit_delay::Waiting;
 use crate::catalog::db::request::{Message, Reply, Request};
@@ -10,15 +10,15 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{UnixMillis, WorkerId};
 
 impl Catalog {
-    /// Leases pairs to work on. Returns fewer leases than requested, or none, if fewer pairs are ready.
+    /// Leases up to `slots` ready pairs. Returns no lease if the worker has ended or counts as dead by `alive_since`.
     ///
     /// # Errors
-    /// If the database returns an error. In that case nothing is leased.
+    /// Returns an error if a database operation fails. In that case nothing is leased.
     pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
         self.grouped(|reply| Request::Claim(request, reply)).await
     }
 
-    /// Gives a lease back as if it had never been taken. Returns `false` if the lease was already lost.
+    /// Gives a lease back. The attempt does not count. Returns `false` if the lease was already lost.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -27,7 +27,7 @@ impl Catalog {
     }
 
     /// Stores a worker's heartbeat. Returns `false`, and stores nothing, if the worker has ended or its previous
-    /// heartbeat is older than `alive_since`. In that case its leases are void and it must register again.
+    /// heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must register again.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -46,12 +46,13 @@ impl Catalog {
             .await
     }
 
-    /// Stores finished stages, in the order they were computed, in one transaction and advances the job. The artifacts
-    /// must be on disk already. The commit may be delayed so that other requests share it; [`Catalog::waiting`]
-    /// prevents the delay.
+    /// Stores finished stages in one transaction and advances the job. The stages must be in the order they were
+    /// computed, and their artifacts must be on disk already. The commit may be delayed so that later requests can
+    /// share it. [`Catalog::waiting`] prevents the delay.
     ///
     /// # Errors
-    /// If the database returns an error. In that case nothing is stored, and the lease remains until it is recovered.
+    /// Returns an error if a database operation fails. In that case nothing is stored, and the lease remains until it
+    /// is recovered.
     pub async fn checkpoint(
         &self,
         lease: Lease,
@@ -96,8 +97,8 @@ impl Catalog {
         Ok(by_status(counters(&mut conn).await?))
     }
 
-    /// Counts all jobs from their rows. Unless the catalog is damaged, the result equals [`Catalog::counters`] at the
-    /// same moment.
+    /// Counts all jobs from their rows. Equals [`Catalog::counters`] unless the catalog is damaged or changes in
+    /// between.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -106,11 +107,10 @@ impl Catalog {
         Ok(by_status(count_jobs(&mut conn).await?))
     }
 
-    /// Commits all pending requests without delay, and does the same with later requests until the returned value is
-    /// dropped.
+    /// Commits all pending requests at once. Prevents delays of later commits until the returned value is dropped.
     ///
     /// # Errors
-    /// If the catalog is closed.
+    /// Returns an error if the catalog is closed or read-only.
     pub async fn waiting(&self) -> Result<Waiting> {
         let waiting = Waiting::new(&self.delay);
         self.send(Message::Flush).await?;

@@ -1,4 +1,4 @@
-//! Statements that store finished stages, fenced by the lease.
+//! Statements that store finished stages if the lease is still valid.
 
 use serde_json::{Value, json};
 
@@ -11,11 +11,11 @@ use crate::catalog::queue::lease::{
 use crate::domain::{JobStatus, PairId, Stage};
 use crate::failpoint::{self, Point};
 
-/// A lease, and the stages to store under that lease in the order they were computed.
+/// A lease, and the finished stages to store under it, in the order they were computed.
 pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
 
-/// Advances jobs whose lease still holds and whose worker is alive. A stored stage resets the count of crashes blamed
-/// on the pair. A job becomes dirty if its new results do not continue the stored ones: see `advanced_job`.
+/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the pair's crash count. Marks
+/// a job dirty if the new results do not build on the stored ones: see `advanced_job`.
 pub(crate) const ADVANCE: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
@@ -42,7 +42,7 @@ ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
-/// Removes old metrics first: another method may return fewer.
+/// Removes the old metrics, because the new method may compute fewer.
 const CLEAR_METRICS: &str = "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
@@ -89,7 +89,7 @@ pub(crate) const ROWS: [&str; 6] = [
     CLEAR_FAILURE,
 ];
 
-/// Adds to a script the statement that advances jobs. The statement returns the jobs whose lease still held.
+/// Adds the statement `ADVANCE` to a script. Its rows are the jobs whose lease was not lost.
 pub(crate) fn add_advance<'i>(
     script: &mut Script,
     checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
@@ -97,7 +97,7 @@ pub(crate) fn add_advance<'i>(
     script.add_over(ADVANCE, checkpoints.filter_map(advanced_job))
 }
 
-/// Adds the results of jobs that advanced to a script.
+/// Adds the statements that store the results of advanced jobs to a script.
 pub(crate) fn add_results<'i>(
     script: &mut Script,
     advanced: &[&'i LeasedCheckpoints],
@@ -133,14 +133,14 @@ pub(crate) fn add_results<'i>(
     script.execute_over(CLEAR_METRICS, metrics().map(|(pair, ..)| [pair]))?;
     script.execute_over(METRICS, metrics())?;
     let inputs = advanced.iter().filter_map(|(lease, stages)| {
-        // The last stage that names inputs names all that earlier ones did.
+        // The last stage with inputs also lists the inputs of all earlier stages.
         let mut inputs = stages.iter().rev().map(|one| &one.inputs);
         Some((lease.pair, inputs.find(|inputs| !inputs.is_empty())?))
     });
     add_inputs(script, inputs)
 }
 
-/// Returns where a job is counted when a stage is stored.
+/// Returns the counter key of a job after a stage is stored.
 fn key_after(stage: &StageCheckpoint) -> CounterKey {
     let (cursor, status) = match stage.stage.next() {
         Some(next) => (cursor(next), JobStatus::Leased),
@@ -149,9 +149,9 @@ fn key_after(stage: &StageCheckpoint) -> CounterKey {
     CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
-/// Builds the item of [`ADVANCE`] for a job's stages. Returns `None` if there are no stages. `first` is the fingerprint
-/// from `chain`, and `mixed` is 1 if the stages are not consecutive. The job becomes dirty if `mixed` is 1, or the
-/// upstream of `first` is not the job's fingerprint.
+/// Builds the item of [`ADVANCE`] for a job, or returns `None` if there are no stages. The job becomes dirty if the
+/// stages are not consecutive (`mixed` is 1), or if the upstream of the fingerprint `first` is not the job's
+/// fingerprint.
 fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     let last = stages.last()?;
     let after = key_after(last);
@@ -167,8 +167,8 @@ fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     }))
 }
 
-/// Considers the stages from the last `Stage::Fit` on, or all stages if `Fit` is not among them. Returns the
-/// fingerprint of the first (`None` if it is `Fit`), and whether each stage is the direct successor of the one before.
+/// Returns the fingerprint of the first stage, and whether the stages are consecutive. Ignores the stages before the
+/// last `Stage::Fit`, which begins a new chain. If the first stage is `Fit`, its fingerprint is returned as `None`.
 fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
     let restart = stages.iter().rposition(|one| one.stage == Stage::Fit);
     let chain = &stages[restart.unwrap_or(0)..];
@@ -180,7 +180,7 @@ fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
     )
 }
 
-/// Adds the input files of pairs as they were read to a script.
+/// Adds the statement that stores the input files of pairs to a script.
 pub(crate) fn add_inputs<'a>(
     script: &mut Script,
     inputs: impl Iterator<Item = (PairId, &'a InputVersions)>,

@@ -15,22 +15,23 @@ use crate::failpoint::{self, Point};
 pub struct ClaimRequest {
     /// The worker.
     pub worker: WorkerId,
-    /// Most pairs to lease.
+    /// Largest number of pairs to lease.
     pub slots: usize,
-    /// Only pairs whose next stage is this one or an earlier one.
+    /// Lease only pairs whose next stage is this one or an earlier one.
     pub until: Stage,
-    /// Only pairs that must run exclusively, or only the others.
+    /// Whether to lease pairs that must run exclusively, or pairs that need not.
     pub exclusive: bool,
-    /// Only these pairs; `None` for all.
+    /// Lease only these pairs. `None` for all pairs.
     pub among: Option<PairSelection>,
     /// Deadline of the first stage.
     pub deadline: UnixMillis,
-    /// Oldest heartbeat of the worker, by its own clock, with which it may still lease.
+    /// If the worker's last heartbeat is before this time, nothing is leased. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
 }
 
 impl ClaimRequest {
-    /// Requests pairs that need not run exclusively, with any next stage, however old the worker's last heartbeat is.
+    /// Requests pairs that need not run exclusively, with any next stage. The worker's last heartbeat may be of any
+    /// age.
     pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
         Self {
             worker,
@@ -52,8 +53,8 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. The limit is `+?`: with a bare `?`, SQLite would
-/// prepare the statement again each time, because its planner reads the value of the limit.
+/// Leases the first ready jobs in the order of the index `job_ready`. The limit is written `+?` to hide its value from
+/// SQLite's query planner. With a plain `?`, SQLite would prepare the statement again each time.
 pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
@@ -62,7 +63,7 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
-/// Like [`CLAIM`], among some pairs.
+/// Like [`CLAIM`], but leases only selected pairs.
 pub(crate) const CLAIM_AMONG: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
@@ -72,7 +73,7 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
-/// Gives leases back as if they had never been taken.
+/// Gives leases back. Their attempts do not count.
 pub(crate) const RELEASE: &str = "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
 FROM jsonb_each(?) AS item
@@ -80,11 +81,12 @@ WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.toke
     AND job.status = 1
 RETURNING pair, token";
 
-/// Stores a heartbeat, unless the worker has ended or its last heartbeat is so old that others may consider it dead.
+/// Stores a heartbeat. Skips it if the worker has ended, or if its last heartbeat is so old that others may consider it
+/// dead.
 pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
-/// Adds a heartbeat to a script. The statement returns the worker's id if the heartbeat is stored.
+/// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.
 pub(crate) fn add_heartbeat(
     script: &mut Script,
     heartbeat: Heartbeat,
@@ -115,7 +117,7 @@ pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<S
     Ok(statement)
 }
 
-/// Counts claimed leases; returns them in the order of the claim.
+/// Counts claimed leases, and returns them in the order of the claim.
 pub(crate) fn count_claimed(mut leases: Vec<Lease>, deltas: &mut Deltas) -> Vec<Lease> {
     // RETURNING promises no order.
     leases.sort_by_key(|lease| (std::cmp::Reverse(lease.cursor), lease.pair));

@@ -16,7 +16,7 @@ WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1 AND count
 /// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
 
-/// Position of a job: the index of its next stage, or 4 when it is done.
+/// Position of a job: the index of its next stage, or 4 if the job is done.
 pub(crate) type Cursor = i64;
 
 /// Position of a job that is done.
@@ -27,13 +27,13 @@ pub(crate) const fn cursor(stage: Stage) -> Cursor {
     stage.index() as Cursor
 }
 
-/// What jobs are counted by.
+/// Key of a counter. Jobs with the same key are counted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, sqlx::FromRow)]
 pub(crate) struct CounterKey {
     #[sqlx(rename = "stage")]
     pub(crate) cursor: Cursor,
     pub(crate) status: JobStatus,
-    /// Fingerprint of the result before the cursor; 0 where there is none.
+    /// Fingerprint of the result before the cursor, or 0 if there is none.
     pub(crate) fingerprint: i64,
 }
 
@@ -67,7 +67,7 @@ impl CounterKey {
     }
 }
 
-/// A job with what it is counted by.
+/// A job with its counter key.
 #[derive(Debug, Clone, Copy, sqlx::FromRow)]
 pub(crate) struct KeyedJob {
     pub(crate) pair: i64,
@@ -88,13 +88,13 @@ pub(crate) struct JobGroup {
 pub(crate) struct Deltas(BTreeMap<CounterKey, i64>);
 
 impl Deltas {
-    /// Counts a job out of one place and into another.
+    /// Moves a job from one counter to another.
     pub(crate) fn move_job(&mut self, from: CounterKey, to: CounterKey) {
         self.add(from, -1);
         self.add(to, 1);
     }
 
-    /// Adds to the number of jobs at a place.
+    /// Adds to a counter.
     pub(crate) fn add(&mut self, key: CounterKey, n: i64) {
         *self.0.entry(key).or_default() += n;
     }
@@ -116,7 +116,7 @@ impl Deltas {
     }
 }
 
-/// Jobs by cursor and status; only numbers that are not 0.
+/// Numbers of jobs by cursor and status, without zeros.
 pub type JobCounts = BTreeMap<(i64, JobStatus), u64>;
 
 /// Reads the counters that are not 0.

@@ -25,8 +25,8 @@ pub struct Fingerprint {
 pub struct Fingerprints([Fingerprint; 4]);
 
 impl Fingerprints {
-    /// Computes the fingerprint of each stage from its fields. A stage's hash includes the previous stage's hash, so a
-    /// changed setting changes the fingerprints of its stage and of all later stages.
+    /// Computes the fingerprint of each stage from its fields. Each hash includes the previous stage's hash, so a
+    /// changed setting also changes the fingerprints of all later stages.
     pub fn new(fields: impl Fn(Stage) -> Value) -> Self {
         let mut upstream: Option<ContentHash> = None;
         Self(Stage::ALL.map(|stage| {
@@ -43,7 +43,7 @@ impl Fingerprints {
         &self.0[stage.index()]
     }
 
-    /// Returns the four hashes on one line, which another process can compare with [`Catalog::changes_from`].
+    /// Returns the four hashes on one line. Another process can pass the line to [`Catalog::changes_from`].
     pub fn hash_line(&self) -> String {
         let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
         hashes.map(ContentHash::to_hex).join(" ")
@@ -70,7 +70,7 @@ const INSERT: &str = "
 INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
-/// Adds the counters for jobs whose last result has a given fingerprint, one counter for each status.
+/// Adds the counters of a fingerprint, one for each job status, if they do not exist.
 pub(crate) const ADD_COUNTERS: &str = "
 INSERT INTO counter (stage, status, fingerprint, n) SELECT ?1, value, ?2, 0 FROM json_each('[0,1,2,3,4]') WHERE true
 ON CONFLICT DO NOTHING";
@@ -109,8 +109,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns the settings in which another process, given by its [`Fingerprints::hash_line`], differs from these
-    /// fingerprints. Hashes that are not stored are skipped.
+    /// Returns the settings that differ between another process and `fingerprints`. The other process provides
+    /// `hash_line` by [`Fingerprints::hash_line`]. Skips hashes that are not stored.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -132,7 +132,7 @@ impl Catalog {
     }
 }
 
-/// Returns the ids of the fingerprints that the catalog knows.
+/// Returns the ids of the fingerprints. `None` marks a fingerprint that is not stored.
 pub(crate) async fn known(
     conn: &mut SqliteConnection,
     fingerprints: &Fingerprints,
@@ -146,8 +146,8 @@ pub(crate) async fn known(
     Ok(ids)
 }
 
-/// Returns the ids of the fingerprints by stage, as a JSON array for `json_each`. A fingerprint that is not stored has
-/// the id -1, which no result has.
+/// Returns the ids of the four fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
+/// matches no result.
 pub(crate) async fn current_json(
     conn: &mut SqliteConnection,
     fingerprints: &Fingerprints,
@@ -164,7 +164,7 @@ pub(crate) async fn fields_of(conn: &mut SqliteConnection, id: FingerprintId) ->
     Ok(fields)
 }
 
-/// All stored fingerprints with their stage and upstream fingerprint, and the ids of the current fingerprints.
+/// All stored fingerprints, and the ids of the current ones.
 pub(crate) struct FingerprintChains {
     /// Stage and upstream by id.
     stored: BTreeMap<FingerprintId, (Stage, Option<FingerprintId>)>,
@@ -172,7 +172,7 @@ pub(crate) struct FingerprintChains {
 }
 
 impl FingerprintChains {
-    /// Reads all fingerprints. There are at most four for each combination of settings that was ever used.
+    /// Reads all fingerprints. Each combination of settings has added at most four.
     pub(crate) async fn load(
         conn: &mut SqliteConnection,
         fingerprints: &Fingerprints,
@@ -189,8 +189,8 @@ impl FingerprintChains {
         })
     }
 
-    /// Follows the chain of a fingerprint to the first stage. Returns the earliest stage whose settings differ from the
-    /// current ones, with the stage's fingerprint in the chain.
+    /// Follows a fingerprint's chain back to the first stage. Returns the earliest stage whose settings differ from the
+    /// current ones, and this stage's fingerprint in the chain.
     pub(crate) fn first_change(&self, id: i64) -> Option<(Stage, FingerprintId)> {
         let mut change = None;
         let mut next = Some(FingerprintId(id));
@@ -220,7 +220,7 @@ pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldCh
     changes.collect()
 }
 
-/// Flattens nested objects; names leave out the key `settings`.
+/// Flattens nested objects. The key `settings` is left out of the names.
 fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.name().to_owned(), fields)];

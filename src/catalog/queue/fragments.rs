@@ -1,6 +1,6 @@
 //! SQL fragments that several statements of the queue share.
 
-/// Selects the fingerprint that a job stores when it goes back to a stage: that of the result before the stage.
+/// Selects the fingerprint of the result before a stage. A job that goes back to the stage stores this fingerprint.
 macro_rules! fingerprint_before {
     ($stage:literal) => {
         concat!(

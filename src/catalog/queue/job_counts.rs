@@ -1,5 +1,5 @@
-//! Counts jobs from their rows, in ranges of pairs. SQLite sorts the rows of a `GROUP BY` in memory, and that memory
-//! must not grow with the number of pairs.
+//! Counts jobs from their rows, in ranges of pairs. SQLite sorts the rows of a `GROUP BY` in memory, so one statement
+//! over all jobs would use too much of it.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ GROUP BY stage, status, job.fingerprint";
 
 pub(crate) const NEXT_PAIR: &str = "SELECT min(pair) FROM job WHERE pair > ?1";
 
-/// Counts all jobs. In a transaction the counts are of one moment.
+/// Counts all jobs. In a transaction, all counts are of the same moment.
 pub(crate) async fn count_jobs(conn: &mut SqliteConnection) -> Result<BTreeMap<CounterKey, u64>> {
     count_in_ranges(conn, RANGE).await
 }

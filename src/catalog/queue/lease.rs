@@ -8,11 +8,11 @@ use crate::domain::{
     WorkerId,
 };
 
-/// The right to work on one pair. Only a claim creates a lease, and only the lease's owner can store anything for the
-/// pair.
+/// The right to work on one pair. Only a claim creates a lease. Only the lease's owner can store results or failures of
+/// the pair.
 ///
-/// `token` is the fencing token: each claim and each recovery raises the job's token, so a write under an older lease
-/// changes nothing.
+/// `token` is the fencing token. Each claim and each recovery increases the job's token, so a write under an older
+/// lease changes nothing.
 #[derive(Debug, sqlx::FromRow)]
 pub struct Lease {
     pub(crate) pair: PairId,
@@ -24,7 +24,7 @@ pub struct Lease {
     pub(crate) fingerprint: Option<FingerprintId>,
     pub(crate) attempt: u32,
     pub(crate) exclusive: bool,
-    /// Whether a stage was stored under it, which removed the pair's failure.
+    /// Whether a stage was stored under this lease, which removed the pair's failure.
     #[sqlx(skip)]
     pub(crate) cleared: bool,
 }
@@ -45,12 +45,12 @@ impl Lease {
         self.attempt
     }
 
-    /// Returns whether the pair must run alone, because it needed too much memory or a worker died while processing it.
+    /// Returns whether the pair must run exclusively: it exceeded a resource limit, or a worker died or hung over it.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
 
-    /// Returns where the leased job is counted.
+    /// Returns the counter key of the leased job.
     pub(crate) fn counter_key(&self) -> CounterKey {
         let fingerprint = self.fingerprint.map(|FingerprintId(id)| id);
         CounterKey::new(cursor(self.cursor), JobStatus::Leased, fingerprint)
@@ -63,7 +63,7 @@ impl Lease {
     }
 }
 
-/// A job that a write under a lease changed, with the token of that lease.
+/// A job that was changed under a lease, with the token of that lease.
 #[derive(Debug, Clone, Copy, sqlx::FromRow)]
 pub(crate) struct FencedRow {
     pub(crate) pair: i64,
@@ -86,11 +86,11 @@ pub enum CheckpointOutcome {
 pub struct InputVersion {
     /// Hash of its bytes.
     pub hash: ContentHash,
-    /// Size, time and inode of the file when it was read, as text in the store's format.
+    /// Size, modification time and inode of the file when it was read, as text.
     pub stat: String,
 }
 
-/// The input files of a pair as its worker read them. A file that was not read is `None`.
+/// Versions of a pair's input files that its worker read. `None` for a file that was not read.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct InputVersions {
     /// The mesh.
@@ -111,7 +111,7 @@ impl InputVersions {
 pub struct MetricResult {
     /// The scores.
     pub outcome: MetricOutcome,
-    /// Hash over the scores and the pictures that a reviewer sees.
+    /// Hash of the scores and of the images that a reviewer sees.
     pub result_hash: ContentHash,
 }
 
@@ -146,21 +146,21 @@ pub struct StageCheckpoint {
     pub at: UnixMillis,
     /// Deadline of the next stage.
     pub next_deadline: UnixMillis,
-    /// Oldest heartbeat of the worker, by its own clock, with which the lease is still valid.
+    /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
 }
 
 /// What happens to a failed job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureAction {
-    /// Retry at a time.
+    /// Retry at a given time.
     BackOff {
         /// When.
         run_at: UnixMillis,
     },
-    /// Retry at once, with nothing beside it.
+    /// Retry at once, while no other pair runs.
     RetryExclusive,
-    /// No retry until somebody asks for it.
+    /// No retry until a user requests one.
     Quarantine,
 }
 
@@ -183,7 +183,7 @@ pub struct StageFailure {
     pub ms: Option<u64>,
     /// When it failed.
     pub at: UnixMillis,
-    /// Oldest heartbeat of the worker, by its own clock, with which the lease is still valid.
+    /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
 }
 

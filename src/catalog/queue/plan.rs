@@ -12,17 +12,17 @@ use crate::domain::{JobStatus, Stage};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case", tag = "reason")]
 pub enum StaleReason {
-    /// It has never run.
+    /// The pair has never run.
     New,
-    /// An earlier run ended before it was done, or `retry` requeued it.
+    /// An earlier run ended before the pair was done, or `retry` requeued the pair.
     Unfinished,
-    /// It waits for its next attempt after a transient failure.
+    /// The pair waits for its next attempt after a transient failure.
     BackingOff,
-    /// The pair failed permanently, but with other settings or inputs than the current ones.
+    /// The pair failed permanently, but its settings or inputs have changed since.
     FailedBefore,
-    /// The settings of `stage` or the program's revision of it changed.
+    /// The settings of `stage`, or its revision in this program, changed.
     Settings {
-        /// First stage with other settings.
+        /// First stage whose settings changed.
         stage: Stage,
         /// Fingerprint of the old settings.
         #[serde(skip)]
@@ -34,7 +34,7 @@ pub enum StaleReason {
     Print,
     /// An import changed the unit or the scanned side.
     Manifest,
-    /// It was requested (`--rerun`).
+    /// A rerun was requested (`--rerun`).
     Requested,
 }
 
@@ -43,9 +43,9 @@ pub enum StaleReason {
 pub struct FieldChange {
     /// Name such as `register.max_scale`.
     pub field: String,
-    /// Old value; `None` when the setting is new.
+    /// Old value. `None` if the setting is new.
     pub old: Option<Value>,
-    /// New value; `None` when the setting was removed.
+    /// New value. `None` if the setting was removed.
     pub new: Option<Value>,
 }
 
@@ -71,7 +71,7 @@ pub struct Plan {
     pub entries: Vec<PlanEntry>,
     /// Pairs with nothing left to do.
     pub done: u64,
-    /// Quarantined pairs that stay so.
+    /// Quarantined pairs that the run leaves in quarantine.
     pub quarantined: u64,
     /// Pairs leased by another process.
     pub leased: u64,
@@ -106,7 +106,7 @@ impl fmt::Display for FieldChange {
 }
 
 impl fmt::Display for PlanEntry {
-    /// Writes the reason, such as `the print changed`. If settings changed, writes the first of the changed settings.
+    /// Writes the reason, such as `the print changed`. If settings changed, lists the first few of them.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const SHOWN: usize = 4;
         let changes = self.changes.as_deref().unwrap_or_default();

@@ -19,8 +19,8 @@ pub struct LeaseHolder {
     /// The worker.
     #[sqlx(rename = "id")]
     pub worker: WorkerId,
-    /// Last heartbeat of the worker, by its own clock. Compare it only with an earlier heartbeat of that worker, never
-    /// with this machine's clock.
+    /// Last heartbeat of the worker, by its own clock. Compare it only with other heartbeats of the same worker,
+    /// because clocks may differ.
     pub heartbeat: UnixMillis,
 }
 
@@ -36,9 +36,9 @@ pub struct Recovered {
 /// Which workers are dead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeadWorker {
-    /// These.
+    /// These workers.
     Workers(Vec<WorkerId>),
-    /// All but one, because the lock proves that no other process is alive.
+    /// All workers except this one, which holds the exclusive run lock.
     AllExcept(WorkerId),
 }
 
@@ -47,16 +47,15 @@ SELECT w.id, w.heartbeat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
-/// Selects the given workers that hold leases, with whether each died (did not end properly) and its number of leases.
+/// Selects the given workers that hold leases. `died` is 1 if the worker did not end properly.
 pub(crate) const LEFT_BY: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Recovers the leases of workers. An item consists of a worker, whether the worker died, and whether its pair is
-/// blamed for the death. A crash does not count as an attempt, so that a transient failure keeps all its attempts.
-/// Pairs of a worker that died must run exclusively from now on. The condition for status 4 (quarantined) is
-/// `domain::is_poisoned`.
+/// Recovers the leases of workers. Each item has a worker, whether it died, and whether its pair is blamed. The
+/// interrupted attempt does not count. If the worker died, its pairs must run exclusively from now on. The condition
+/// for status 4 (quarantined) is that of `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
@@ -73,16 +72,16 @@ const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
 
-/// Counts the dead among the newest 32 workers.
+/// Counts the workers that died among the newest 32.
 const DEATHS: &str = "
 SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) WHERE died AND ended IS NULL";
 
-/// Leases of some workers.
+/// Selects the leased pairs of the given workers.
 pub(crate) const AFFECTED_PAIRS: &str = "
 SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
 
-/// Recovers leases of workers that still send heartbeats long after the lease's deadline. Heartbeat and deadline are
-/// both measured by the worker's own clock; two clocks are never compared.
+/// Recovers overdue leases of workers that are not known to be dead. A lease is overdue if the worker's last heartbeat
+/// is later than the deadline by more than `?3`. The worker's own clock sets both times.
 pub(crate) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
@@ -90,7 +89,7 @@ WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
-/// Stores the failure of a quarantined pair, with the settings of its dead worker and the inputs as last read.
+/// Stores the failure of a quarantined pair, with its worker's settings and the inputs as last read.
 const CRASHED: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
 SELECT p.id, item.value ->> 'stage', item.value ->> 'class', item.value ->> 'message',
@@ -129,12 +128,11 @@ impl Catalog {
         Ok(sqlx::query_as(HOLDERS).fetch_all(&mut *conn).await?)
     }
 
-    /// Recovers the leases of dead workers. Their pairs become ready again, or are quarantined if too many workers died
-    /// while processing them.
+    /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused
+    /// several deaths.
     ///
-    /// A pair is blamed for a death only if its worker held no other lease, and quarantined only if `is_poisoned` says
-    /// so. Killing processes from outside, however often, therefore rarely quarantines a pair. The pair must have been
-    /// the only lease at nearly every death, which is the pattern of a pair that kills workers.
+    /// A pair is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned` returns true,
+    /// which depends on all recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -153,8 +151,8 @@ impl Catalog {
         .await
     }
 
-    /// Stores the versions of the input files of quarantined pairs, for files that no stage has read. The stored hashes
-    /// distinguish a file that is repaired later from the file that killed the workers.
+    /// Stores the input files of quarantined pairs that no stage had read before the worker died. A later run compares
+    /// the stored hashes to detect replaced files.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -171,8 +169,9 @@ impl Catalog {
         .await
     }
 
-    /// Recovers leases that exceed their deadline by more than `margin_ms` although their worker, another process, is
-    /// alive. This is rare, because a living process enforces its own deadlines.
+    /// Recovers overdue leases of other workers that are not known to be dead. A lease is overdue if its worker's last
+    /// heartbeat is more than `margin_ms` after the deadline. This is rare, because processes enforce their own
+    /// deadlines.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -211,7 +210,7 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     Ok(json_array(items))
 }
 
-/// Marks the workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
+/// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
 async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {
@@ -241,7 +240,7 @@ async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BT
     Ok(found.into_iter().collect())
 }
 
-/// Updates the counters for the recovered pairs, and stores why the quarantined pairs failed.
+/// Updates the counters for recovered pairs, and stores a failure for each quarantined pair.
 async fn count_recovered(
     conn: &mut SqliteConnection,
     found: Vec<RecoveredJob>,

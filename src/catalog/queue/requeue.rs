@@ -1,4 +1,4 @@
-//! Requeues pairs: after a change of settings or inputs, or on request.
+//! Requeues pairs after changes of settings or inputs, or on request.
 
 use std::collections::BTreeMap;
 
@@ -23,13 +23,13 @@ use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 pub enum RetrySelection {
     /// These pairs, if they failed or back off.
     Names(Vec<PairName>),
-    /// All that failed or back off with this class.
+    /// All pairs that failed or back off with this class.
     Class(FailureClass),
-    /// All that failed or back off.
+    /// All pairs that failed or back off.
     All,
 }
 
-/// Sends jobs back to a stage as if the jobs were new. Leased jobs do not change.
+/// Resets jobs to a stage, without attempts and crashes. Skips leased jobs.
 pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
@@ -40,7 +40,7 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1
 RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
-/// Unmarked jobs of a group, in pages by pair.
+/// Selects one page of a group's jobs without the dirty mark, sorted by pair.
 pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
@@ -48,7 +48,7 @@ ORDER BY pair LIMIT ?5";
 pub(crate) const CLEAR_FAILURES: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
-/// Jobs that failed or back off, of one class or all.
+/// Selects the jobs that failed or back off, of one failure class or of all.
 const FAILED_JOBS: &str = "
 SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint FROM job AS j JOIN failure AS f ON f.pair = j.pair
 WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
@@ -58,11 +58,11 @@ SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
 FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.status IN (2, 4)";
 
 impl Catalog {
-    /// Requeues pairs whose settings or inputs changed, and pairs selected by the policy. Returns the number of
-    /// requeued pairs.
+    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers
+    /// only its pairs. Returns the number of requeued pairs.
     ///
     /// # Errors
-    /// If the database returns an error, or the counters do not add up to the number of jobs.
+    /// Returns an error if the counters do not add up to the number of jobs, or if a database operation fails.
     pub async fn requeue_stale(
         &self,
         fingerprints: &Fingerprints,
@@ -73,7 +73,8 @@ impl Catalog {
         let current = current_json(&mut conn, fingerprints).await?;
         let mut moves = Vec::new();
         if among.is_none() {
-            // Unmarked jobs are requeued by group. Marked jobs and quarantined jobs are inspected one by one below.
+            // Jobs without the dirty mark are requeued in groups. Dirty or quarantined jobs are inspected one by one
+            // below.
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
             let groups = groups(&mut conn, &chains).await?;
             assert_complete(&mut conn, &groups).await?;
@@ -98,9 +99,9 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues jobs page by page. Returns the number of requeued jobs. `page` requeues the jobs on the page after a
-    /// pair, and returns their number and the last pair of the page. Each page is a transaction of its own, so that
-    /// other writes do not wait.
+    /// Requeues jobs page by page, and returns their number. `page` gets the last pair of the previous page. It returns
+    /// how many jobs it requeued, and the last pair of its own page, or `None` at the end. Each page is a separate
+    /// transaction, so that other writes can run in between.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
         F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>
@@ -118,10 +119,10 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues the selected pairs that failed or back off, and returns their number. Other pairs do not change.
+    /// Requeues the selected pairs that failed or back off, and returns their number.
     ///
     /// # Errors
-    /// If a named pair does not exist, or the database returns an error. In that case nothing changes.
+    /// Returns an error if a named pair does not exist, or if a database operation fails. In that case nothing changes.
     pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
         let selection = selection.clone();
         self.in_transaction(move |conn| {
@@ -137,7 +138,7 @@ impl Catalog {
     }
 }
 
-/// Returns an error if the groups do not cover all jobs, because a wrong counter would hide stale jobs.
+/// Returns an error unless the groups contain all jobs. A wrong counter could hide stale jobs.
 async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]) -> Result<()> {
     let jobs: i64 = sqlx::query_scalar("SELECT count(*) FROM job")
         .fetch_one(conn)
@@ -150,7 +151,7 @@ async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]
     }
 }
 
-/// Returns the stage that a job goes back to, or `None` if the job stays or is going to run anyway.
+/// Returns the stage that a job is requeued at, or `None` if it needs no requeue.
 fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
     let (to, reason) = decide(job, policy)?;
     let waits = matches!(
@@ -160,7 +161,8 @@ fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
     (!waits).then_some(to)
 }
 
-/// Requeues one page of a group. Returns the number of requeued jobs, and the last pair of the page.
+/// Requeues the jobs of a group on the page after a pair. Returns the number of requeued jobs, and the last pair of the
+/// page.
 async fn requeue_group(
     conn: &mut SqliteConnection,
     key: CounterKey,
@@ -180,8 +182,9 @@ async fn requeue_group(
     Ok((moved, pairs.last().copied()))
 }
 
-/// Requeues the stale jobs on one page of the selected pairs or, without a selection, of the marked jobs. Marked jobs
-/// whose results agree again are unmarked. Returns the number of requeued jobs, and the last pair of the page.
+/// Inspects the page of jobs after a pair, and requeues the stale ones. Returns their number, and the last pair of the
+/// page. If `among` is `None`, inspects dirty and quarantined jobs, and removes the dirty mark if the results agree
+/// again.
 async fn requeue_inspected(
     conn: &mut SqliteConnection,
     current: String,
@@ -225,7 +228,7 @@ async fn failed_jobs(
     Ok(query.fetch_all(conn).await?)
 }
 
-/// Sends each job back to its stage, except leased jobs. Returns the number of jobs sent back.
+/// Resets each job to the given stage, except leased jobs. Returns the number of changed jobs.
 async fn requeue(conn: &mut SqliteConnection, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
     if jobs.is_empty() {
         return Ok(0);

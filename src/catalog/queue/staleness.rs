@@ -1,9 +1,10 @@
-//! Which pairs must run again because their settings or inputs changed, and why.
+//! Finds the pairs that must run again because their settings or inputs changed, and the reasons.
 //!
-//! A job stores the fingerprint of the result before its cursor. Each fingerprint includes the previous stage's, so
-//! this number identifies the settings of all earlier results, and one comparison covers all jobs with the same number.
-//! A job whose results may disagree with each other or with the inputs has the `dirty` mark. Marked and quarantined
-//! jobs are found by partial indexes and inspected one by one, because a failure has settings and inputs of its own.
+//! A job stores the fingerprint of the result before its cursor. The fingerprint covers the settings of that stage and
+//! of all earlier stages. Therefore one comparison decides for all jobs with the same fingerprint.
+//!
+//! Jobs with the `dirty` mark or in quarantine are inspected one by one. The results of a dirty job may disagree with
+//! each other or with the inputs. The failure of a quarantined job has settings and inputs of its own.
 
 use std::collections::BTreeMap;
 
@@ -28,11 +29,11 @@ pub enum RerunPolicy {
     Changed,
     /// Pairs that failed.
     Failed,
-    /// Every pair, from a stage on.
+    /// Every pair, from this stage on.
     All(Stage),
 }
 
-/// Selects each job with its first result whose settings or inputs differ from the current ones.
+/// Selects jobs, each with its first outdated result. A result is outdated if its settings or inputs have changed.
 pub(crate) const INSPECT: &str = "
 WITH found AS (
     SELECT j.pair, j.stage, j.status, j.fingerprint, p.mesh_hash, p.print_hash, p.attributes, (
@@ -50,12 +51,12 @@ SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS 
 FROM found LEFT JOIN stage_result AS r ON r.pair = found.pair AND r.stage = found.first
     LEFT JOIN failure AS f ON f.pair = found.pair ORDER BY found.pair";
 
-/// Jobs that the counters cannot answer for, in pages by pair.
+/// Selects one page of the dirty and quarantined jobs, sorted by pair.
 pub(crate) const MARKED: &str = "
 SELECT pair FROM job WHERE dirty = 1 AND pair > ?1 UNION SELECT pair FROM job WHERE status = 4 AND pair > ?1
 ORDER BY 1 LIMIT ?2";
 
-/// Counts the pairs with a result whose settings or inputs differ from the current ones.
+/// Counts the pairs that have a result with outdated settings or inputs.
 pub(crate) const COUNT_STALE: &str = "
 SELECT (SELECT coalesce(sum(n), 0) FROM counter
         WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT value FROM json_each(?1))) + (
@@ -65,7 +66,7 @@ SELECT (SELECT coalesce(sum(n), 0) FROM counter
             r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)))";
 
-/// Unmarks jobs whose results agree again. Leased jobs keep the mark, as a result with other inputs may follow.
+/// Unmarks dirty jobs whose results are consistent again. Skips leased jobs, which may still get inconsistent results.
 pub(crate) const CLEAR_DIRTY: &str = concat!(
     "
 UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status <> 1 AND NOT EXISTS (
@@ -74,17 +75,17 @@ UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status
     ")"
 );
 
-/// A job or a group of jobs, and what changed since its results were computed.
+/// A job or a group of equal jobs, and what changed since the results were computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StaleJob {
     pub(crate) key: CounterKey,
-    /// First stage whose result has other settings or inputs than the current ones, and what differs.
+    /// First stage with an outdated result, and what changed.
     pub(crate) change: Option<(Stage, StaleReason)>,
-    /// Whether the job failed with other settings or inputs than the current ones.
+    /// Whether settings or inputs changed since the job failed.
     pub(crate) failure_is_outdated: bool,
 }
 
-/// Returns the stage from which a job must run and why, or `None` if the job is leased or has nothing left to run.
+/// Returns the first stage that a job must run, and why. Returns `None` if the job is leased or need not run.
 pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleReason)> {
     let CounterKey { cursor, status, .. } = job.key;
     let next = job.key.stage();
@@ -101,8 +102,7 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
         }
         RerunPolicy::Failed | RerunPolicy::Changed => None,
     };
-    // The earlier stage is used. If both are the same stage, the change is the reason, because it explains more than
-    // the request.
+    // Use the earlier stage. If both stages are equal, report the change, which explains more than the request.
     match (job.change, requested) {
         (Some(changed), Some(requested)) if requested.0 < changed.0 => return Some(requested),
         (Some(changed), _) => return Some(changed),
@@ -119,7 +119,7 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
     next.map(|at| (at, cause))
 }
 
-/// Inspects the next of some jobs after a pair; returns them by pair.
+/// Inspects the page of the selected jobs after a pair. Returns each job with its pair.
 pub(crate) async fn inspect(
     conn: &mut SqliteConnection,
     current: &str,
@@ -144,7 +144,7 @@ fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
     Ok((row.try_get("pair")?, job))
 }
 
-/// Returns what differs in the first outdated result. Inputs are checked before settings, because they explain more.
+/// Returns why the first outdated result is outdated. Changed inputs take precedence over changed settings.
 fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     Ok(if row.try_get("mesh")? {
         StaleReason::Mesh
@@ -158,7 +158,8 @@ fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     })
 }
 
-/// Inspects a page of marked and quarantined jobs after a pair. Also returns its last pair, which is `None` at the end.
+/// Inspects the page of dirty and quarantined jobs after a pair. Also returns the last pair of the page, or `None` at
+/// the end.
 pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
@@ -173,10 +174,10 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Returns one group for each counter that is not 0: the state of its unmarked jobs, and the number of all its jobs.
-/// Groups with earlier cursors come first.
+/// Groups all jobs by counter key, sorted by cursor and status. Each group consists of the state of its jobs without
+/// the dirty mark, and the number of all its jobs.
 ///
-/// A requeued job moves to a group that comes before its own in this order, so each job is handled once.
+/// A requeued job moves to an earlier group. Therefore a pass over the groups handles each job only once.
 pub(crate) async fn groups(
     conn: &mut SqliteConnection,
     chains: &FingerprintChains,
@@ -193,14 +194,14 @@ pub(crate) async fn groups(
     Ok(groups.collect())
 }
 
-/// Returns the first stage before the cursor whose settings differ from the current ones.
+/// Returns the first stage before the cursor whose settings have changed.
 fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stage, StaleReason)> {
     let (stage, old) = chains.first_change(key.fingerprint)?;
     let is_before = (stage.index() as Cursor) < key.cursor;
     is_before.then_some((stage, StaleReason::Settings { stage, old }))
 }
 
-/// Calls `each` repeatedly with a state and a number of jobs in that state, so that each job is counted once.
+/// Passes every job to `each` exactly once, as a state and the number of jobs in that state.
 pub(crate) async fn inspect_all(
     conn: &mut SqliteConnection,
     current: &str,
@@ -227,13 +228,13 @@ pub(crate) async fn inspect_all(
     Ok(())
 }
 
-/// Counts the pairs with a result whose settings or inputs differ from the current ones.
+/// Counts the pairs that have a result with outdated settings or inputs.
 pub(crate) async fn count_stale(conn: &mut SqliteConnection, current: &str) -> Result<u64> {
     let query = sqlx::query_scalar(COUNT_STALE).bind(current);
     Ok(query.fetch_one(conn).await?)
 }
 
-/// Unmarks the jobs in a range of pairs whose results agree again.
+/// Unmarks dirty jobs whose results are consistent again, in a range of pairs.
 pub(crate) async fn clear_dirty(conn: &mut SqliteConnection, after: i64, last: i64) -> Result<()> {
     let query = sqlx::query(CLEAR_DIRTY).bind(after).bind(last);
     query.execute(conn).await?;
