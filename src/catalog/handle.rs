@@ -47,7 +47,7 @@ impl Catalog {
     /// Opens an existing catalog read-only. This works even while a run is active.
     ///
     /// # Errors
-    /// If the file does not exist or is not a catalog, or the database returns an error.
+    /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
             reader_pool: open::reader_pool(path).await?,

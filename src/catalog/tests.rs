@@ -63,7 +63,7 @@ impl Catalog {
         self.checkpoint(lease, vec![stage]).await
     }
 
-    /// Creates a catalog whose writer delays deferrable requests indefinitely.
+    /// Creates a catalog whose writer delays deferrable requests for an hour.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
         Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
     }
@@ -159,7 +159,7 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// Registers another worker, recovers the leases of all other workers, and asserts the number of recovered pairs.
+    /// Registers a worker that recovers the leases of all others. Asserts the number of pairs made ready.
     async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
         let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
@@ -197,7 +197,8 @@ impl World {
 }
 
 impl World {
-    /// Asserts that the plan from counters equals the plan from inspecting every pair, with current and other settings.
+    /// Asserts that plans from the counters equal plans from inspecting every pair, for current and for changed
+    /// settings.
     async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

@@ -128,7 +128,7 @@ impl Catalog {
     /// Describes at most 50 rows that reference a missing row.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn broken_references(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
@@ -138,7 +138,7 @@ impl Catalog {
     /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let found = objects(&mut conn).await?;
@@ -161,7 +161,7 @@ impl Catalog {
     /// `quick`, checks only the counters, because the other checks read all results.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
         // One transaction, so that the writes of a concurrent run do not look like drift.
         let mut conn = self.snapshot().await?;

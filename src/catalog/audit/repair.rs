@@ -69,7 +69,7 @@ impl Catalog {
     /// all counters.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -90,7 +90,7 @@ impl Catalog {
     /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -104,7 +104,7 @@ impl Catalog {
     /// Recreates missing indexes and triggers. Does not change tables.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
         self.in_transaction(move |conn| {

@@ -13,9 +13,9 @@ const BATCH: usize = 256;
 /// The requests collected so far.
 struct BatchCollector {
     batch: Batch,
-    /// Time until which to wait for more requests. `None` if a caller already waits for a reply.
+    /// End of the wait for more requests. `None` if the batch must be committed without delay.
     until: Option<Instant>,
-    /// A message that is not a request ends the batch.
+    /// Message that ended the batch, unless it was a request.
     other: Option<Message>,
 }
 
@@ -37,9 +37,9 @@ impl BatchCollector {
     }
 }
 
-/// Collects the batch that begins with `first`. Returns the batch, and the message that ended the batch if that message
-/// is not a request. Yields to other tasks before each read of the inbox, because senders that have just received a
-/// reply often send their next request immediately.
+/// Collects the batch that begins with `first`. Also returns the message that ended the batch, unless it was a request.
+/// Yields to other tasks before it reads the inbox, because callers that just received a reply often send their next
+/// request at once.
 pub(crate) async fn collect(
     first: Message,
     delay: &CommitDelay,
@@ -98,12 +98,12 @@ mod tests {
         Request::Heartbeat(heartbeat, oneshot::channel().0)
     }
 
-    /// Returns the number of requests in the batch that begins with the first message, if no further message arrives.
+    /// Returns the size of the first batch if only `messages` arrive.
     async fn gathered(messages: Vec<Message>) -> usize {
         gathered_later(messages, Vec::new()).await
     }
 
-    /// Like `gathered`, but the `later` messages arrive while the collector waits.
+    /// Like `gathered`, but the messages in `later` arrive while the collector waits.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
         let delay = CommitDelay::of(Duration::from_hours(1));
         let (sender, mut inbox) = mpsc::channel(messages.len());

@@ -1,4 +1,4 @@
-//! Retries while another process has the catalog locked, beyond SQLite's own busy timeout.
+//! Retries operations while another process has the catalog locked, for longer than SQLite's busy timeout.
 
 use std::path::Path;
 use std::time::Duration;
@@ -16,7 +16,7 @@ const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
-/// Retries an operation while the catalog is locked, until `LONGEST_WAIT` is over.
+/// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
@@ -33,8 +33,8 @@ impl<'p> BusyRetry<'p> {
         }
     }
 
-    /// Returns the sleep to await before the next attempt. Returns `None` if the outcome is not a lock error, or the
-    /// longest wait is over.
+    /// Returns the pause before the next attempt. Returns `None` if the outcome is not a lock error, or if
+    /// `LONGEST_WAIT` has passed.
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
         let waited = self.begun.elapsed();
@@ -53,8 +53,8 @@ impl<'p> BusyRetry<'p> {
     }
 }
 
-/// Evaluates a fallible expression repeatedly while the catalog is locked, until the longest wait is over. The value is
-/// the last outcome.
+/// Evaluates a fallible expression again while it fails with a lock error, for at most `LONGEST_WAIT`. The value is the
+/// last result.
 macro_rules! retry_while_busy {
     ($catalog:expr, $attempt:expr) => {{
         let mut retry = $crate::catalog::db::busy_retry::BusyRetry::begin($catalog);
@@ -90,7 +90,7 @@ mod tests {
         options.connect().await.expect("a connection")
     }
 
-    /// Returns the error of a write that fails because another connection has the database locked.
+    /// Returns the error of a write to a locked database.
     async fn busy() -> Result<()> {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("catalog.sqlite");

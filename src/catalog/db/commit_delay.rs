@@ -1,4 +1,4 @@
-//! The delay of a commit. A commit is delayed, so that later requests share it, if no caller waits for its requests.
+//! The delay of commits. If no caller waits for a reply, a commit is delayed so that later requests can share it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// Longest delay. A process that is killed loses the stages it finished during the delay.
+/// Longest delay of a commit. A process that is killed loses the stages that it finished during the delay.
 const LONGEST: Duration = Duration::from_millis(250);
 
 /// The delay, and how many callers currently forbid it.

@@ -11,15 +11,16 @@ use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
 impl Catalog {
-    /// Copies the catalog, as of one moment, to a new file and verifies the copy. Does not sync the file to disk.
+    /// Copies the catalog, as of one moment, to a new file and verifies the copy. Does not sync the copy to disk.
     ///
     /// # Errors
-    /// If the database or the disk returns an error, or the copy is damaged. A partial copy is left behind.
+    /// Returns an error if the path is not UTF-8, if the database or the disk fails, or if the copy is damaged. A
+    /// partial copy may be left behind.
     pub async fn copy_to(&self, file: &Path) -> Result<()> {
         let Some(name) = file.to_str() else {
             return Err(CatalogError::NotUtf8(file.to_owned()));
         };
-        // SQLite refuses VACUUM INTO under `query_only`, so this connection is taken out of the pool.
+        // `VACUUM INTO` fails under `query_only`. The connection leaves the pool, because it turns this setting off.
         let mut conn = self.read_conn().await?.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)

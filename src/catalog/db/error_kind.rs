@@ -15,16 +15,16 @@ pub enum CatalogErrorKind {
     CannotOpen,
     /// The disk is full.
     Full,
-    /// Another process kept it locked for too long.
+    /// Another process kept the file locked for too long.
     Busy,
     /// An I/O error.
     Disk,
-    /// A write violated a constraint, because stored rows or counters already contradict each other.
+    /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
 }
 
 impl CatalogErrorKind {
-    /// Returns the kind of a SQLite result code. Extended codes have the kind of their base code.
+    /// Returns the kind of a SQLite result code, if it has one. An extended code has the kind of its primary code.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
             // SQLITE_PROTOCOL: a reader lost the race for the log's locks too often.
@@ -47,7 +47,7 @@ impl CatalogErrorKind {
 }
 
 impl CatalogError {
-    /// Returns the kind; `None` when the error has none or names it itself.
+    /// Returns the kind, or `None` if the error is not of these kinds.
     pub fn kind(&self) -> Option<CatalogErrorKind> {
         match self {
             Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {

@@ -1,4 +1,4 @@
-//! One group commit: requests grouped by kind and stored in one transaction, with two round trips to SQLite's thread.
+//! Group commit: stores a batch of requests in one transaction, with two round trips to SQLite's thread.
 
 use std::sync::Arc;
 
@@ -60,8 +60,8 @@ pub(crate) struct BatchReply {
     claims: Vec<Vec<Lease>>,
 }
 
-/// The statements of the first round trip, which change workers and jobs. A write under a lease changes its job only if
-/// the lease still holds.
+/// Statements of the first round trip, which change workers and jobs. A request under a lease changes its job only if
+/// the lease is still valid.
 struct JobStatements {
     heartbeats: Vec<Statement<(i64,)>>,
     advanced: Option<Statement<FencedRow>>,
@@ -89,8 +89,8 @@ impl Batch {
             + self.claims.0.len()
     }
 
-    /// Runs the requests in one transaction, in the order heartbeats, checkpoints, failures, releases, claims. After an
-    /// error, the transaction may still be open, so the caller must roll it back.
+    /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
+    /// the transaction may still be open, so the caller must roll it back.
     pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<BatchReply> {
         let mut script = Script::default();
         script.execute("BEGIN IMMEDIATE");
@@ -123,7 +123,7 @@ impl Batch {
         })
     }
 
-    /// Adds the statements that store results, failures and counters to the script. Returns the replies.
+    /// Adds the statements of the second round trip, which store results, failures and counters. Returns the replies.
     fn add_records(
         &self,
         script: &mut Script,

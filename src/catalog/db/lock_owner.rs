@@ -4,7 +4,7 @@ use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-/// Byte of the `-shm` file that a writer locks (see "WAL-index locks" in SQLite's file format).
+/// Offset of the byte in the `-shm` file that a writer locks (see "WAL-index locks" in SQLite's file format).
 const WRITE_LOCK: &str = "120";
 
 /// A process that holds the write lock.
@@ -27,8 +27,8 @@ impl fmt::Display for LockOwner {
     }
 }
 
-/// Returns the process that holds the write lock, or `None` if there is none or it is unknown. This function opens no
-/// file of the catalog, because closing the file again would drop the locks of this process's own connections.
+/// Returns the process that holds the write lock, or `None` if no such process is found. Does not open the catalog's
+/// files, because closing them again would drop the locks of this process's own connections.
 pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
     let index = std::fs::metadata(sidecar(catalog, "-shm")).ok()?;
     let device = index.dev();
@@ -50,7 +50,7 @@ pub(crate) fn sidecar(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Returns the process id from a line of `/proc/locks`, if the line describes the write lock on this file.
+/// Returns the process id in a line of `/proc/locks`, if the line describes the write lock on `file`.
 fn writer(line: &str, file: &str) -> Option<u32> {
     let words: Vec<_> = line.split_whitespace().collect();
     let [_, "POSIX", _, "WRITE", pid, of, WRITE_LOCK, _] = words[..] else {
@@ -59,7 +59,8 @@ fn writer(line: &str, file: &str) -> Option<u32> {
     (of == file).then(|| pid.parse().ok())?
 }
 
-/// Returns whether the text of `/proc/PID/stat` shows a stopped process. The state follows the name in parentheses.
+/// Returns whether the text of `/proc/PID/stat` shows a stopped process. The state follows the name, which is in
+/// parentheses.
 fn is_stopped(stat: &str) -> bool {
     let state = stat.rsplit(") ").next();
     state.is_some_and(|state| state.starts_with('T'))

@@ -1,4 +1,4 @@
-//! The database file: opening, the writer task, errors, and reading columns.
+//! Access to the database file: opening, the writer task, errors, and decoding of columns.
 
 pub(crate) mod batch_collector;
 pub(crate) mod busy_retry;

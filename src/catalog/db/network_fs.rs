@@ -1,10 +1,10 @@
-//! Detects network file systems, where the shared memory of the write-ahead log does not work.
+//! Detects network file systems. The write-ahead log needs shared memory, which does not work on them.
 
 use std::path::Path;
 
 use crate::catalog::db::error::{CatalogError, Result};
 
-/// The `f_type` and the name of each network file system, from statfs(2) and the kernel's `magic.h`.
+/// Number (`f_type`) and name of each network file system, from statfs(2) and the kernel's `magic.h`.
 const MAGICS: [(u64, &str); 20] = [
     (0x6969, "nfs"),
     (0x517b, "smb"),
@@ -31,14 +31,14 @@ const MAGICS: [(u64, &str); 20] = [
 /// `f_type` of every FUSE file system.
 const FUSE: u64 = 0x6573_5546;
 
-/// Names of FUSE file systems that use a network, as they follow `fuse.` in the mount table.
+/// Names of FUSE file systems that use a network. The mount table lists them with the prefix `fuse.`.
 const FUSE_NETWORKS: &str = "sshfs rclone s3fs gcsfuse glusterfs ceph-fuse davfs curlftpfs smbnetfs juicefs mfs \
     lizardfs goofys blobfuse blobfuse2 gvfsd-fuse onedriver google-drive-ocamlfuse";
 
-/// Refuses a catalog on a network file system.
+/// Refuses a catalog on a network file system. An unknown file system counts as local.
 ///
 /// # Errors
-/// Returns an error if the catalog is on a network file system. An unknown file system counts as local.
+/// Returns an error if the catalog is on a network file system.
 pub(crate) fn refuse(catalog: &Path) -> Result<()> {
     let dir = catalog.parent().filter(|dir| !dir.as_os_str().is_empty());
     let dir = dir.unwrap_or(Path::new("."));
@@ -75,8 +75,8 @@ fn mount_type(dir: &Path) -> Option<String> {
     type_of_device(&table, &number).map(ToOwned::to_owned)
 }
 
-/// Returns the file system type of a device from the text of `/proc/self/mountinfo`. On each line, the device number is
-/// the third field, and the type is the first field after a lone `-`.
+/// Returns the file system type of a device from the text of `/proc/self/mountinfo`. In each line, the third field is
+/// the device number. The first field after a single `-` is the type.
 fn type_of_device<'a>(table: &'a str, number: &str) -> Option<&'a str> {
     let line = table
         .lines()
@@ -84,8 +84,8 @@ fn type_of_device<'a>(table: &'a str, number: &str) -> Option<&'a str> {
     line.split_once(" - ")?.1.split(' ').next()
 }
 
-/// Returns the name of a network file system, or `None` for a local one. A FUSE file system is identified by its mount
-/// type, any other file system by `f_type`.
+/// Returns the name of a network file system, or `None` for any other. `magic` is the `f_type`. `mount` is the type in
+/// the mount table, which identifies FUSE file systems.
 fn network_kind(magic: u64, mount: Option<&str>) -> Option<&'static str> {
     if magic == FUSE {
         let name = mount?.strip_prefix("fuse.")?;

@@ -38,7 +38,7 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// Opens the write connection. If `create` is set, creates the file and the schema if they do not exist.
+/// Opens the write connection. Creates a missing file only if `create` is set, and a missing schema in any case.
 pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     check_file(path, create)?;
@@ -70,7 +70,7 @@ pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnec
 }
 
 async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    // The writer task checkpoints the write-ahead log itself, so that no commit waits for a checkpoint.
+    // Automatic checkpoints would delay commits. The writer task checkpoints the write-ahead log instead.
     let mut conn = options(path)
         .create_if_missing(create)
         .journal_mode(SqliteJournalMode::Wal)
@@ -82,8 +82,8 @@ async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
     Ok(conn)
 }
 
-/// Opens read connections. In WAL mode, readers and the writer never wait for each other. If nothing can be written,
-/// not even the shared-memory file, the catalog is opened as an immutable file.
+/// Opens read connections. In WAL mode, readers and the writer do not block each other. If the catalog's directory
+/// seems to be read-only, opens the catalog as an immutable file.
 pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
     check_file(path, false)?;
     let (pool, found) = match shared(path).await {
@@ -106,8 +106,8 @@ async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
     retry_while_busy!(path, pool(options(path).pragma("query_only", "1")).await)
 }
 
-/// Opens the catalog as an immutable file. SQLite ignores the write-ahead log of an immutable file, so this fails if
-/// the log still has content.
+/// Opens the catalog as an immutable file. SQLite then ignores the write-ahead log, so this fails if the log has
+/// content.
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
@@ -130,8 +130,8 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     Ok((pool, found))
 }
 
-/// Checks the file before SQLite opens it, because SQLite treats an empty file as a new database. This function does
-/// not open the file, because closing it again would drop the locks of this process's connections.
+/// Checks the file, because SQLite would treat an empty file as a new database. Does not open the file: closing it
+/// again would drop the locks of this process's connections.
 fn check_file(path: &Path, create: bool) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
@@ -150,7 +150,7 @@ async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
         Identity::Other(number) => return Err(wrong_identity(path, number)),
     }
     let outcome = MIGRATOR.run(&mut *conn).await;
-    // If another process created the schema at the same time, the migration failed here, but the database is ready.
+    // The migration fails if another process creates the schema at the same time. The database is ready in that case.
     if identity(conn).await? == Identity::Current {
         return Ok(());
     }
@@ -162,7 +162,7 @@ async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
 pub(crate) enum Identity {
     /// A catalog with the schema of this program.
     Current,
-    /// A database without tables: new, or its creation was interrupted.
+    /// A database without tables. It is new, or its creation was interrupted.
     Uninitialized,
     /// Anything else, by application id and version.
     Other((i64, i64)),
@@ -214,10 +214,11 @@ fn is_read_only(error: &CatalogError) -> bool {
     )
 }
 
-/// Replaces the error when the file is not a database, or is corrupt.
+/// Replaces the error if the file is not a database or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // A file that is not a database has no open connection, so opening and closing it here drops no locks.
+        // `kind` opens and closes the file. This drops no locks, because no connection is open to a file that is no
+        // database.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),

@@ -1,4 +1,4 @@
-//! Messages to the writer task: requests that share a commit, transactions of their own, and the senders for replies.
+//! Messages to the writer task: requests that share a commit, separate transactions, and the senders for replies.
 
 use std::pin::Pin;
 
@@ -13,7 +13,8 @@ use crate::catalog::queue::lease::{Lease, StageFailure};
 /// Where a reply goes.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 
-/// A request that may share a commit with others. The reply to a write under a lease says whether the lease still held.
+/// A request that may share a commit with other requests. The reply `false` means that the request was refused, for
+/// example because the lease was lost.
 pub(crate) enum Request {
     Heartbeat(Heartbeat, Reply<bool>),
     Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),
@@ -24,7 +25,7 @@ pub(crate) enum Request {
 
 /// A future that borrows the write connection.
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
-/// A separate transaction; it sends its own reply.
+/// A separate transaction, which sends its own reply.
 pub(crate) type TransactionTask =
     Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
 

@@ -1,4 +1,4 @@
-//! Reads domain types from columns. A value that the type does not allow is an error.
+//! Decodes columns into domain types. An invalid value is an error.
 
 use serde_json::{Map, Value};
 use sqlx::error::BoxDynError;
@@ -10,7 +10,7 @@ use crate::domain::{
     PairName, PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
-/// Implements `Type` and `Decode` for each type, given its column's type and a function that converts the value.
+/// Implements `Type` and `Decode` for types. Each line has a type, the type of its column, and a conversion function.
 macro_rules! decode {
     ($($type:ty: $column:ty = $convert:expr;)+) => {$(
         impl Type<Sqlite> for $type {

@@ -1,4 +1,5 @@
-//! Runs several statements in one round trip to SQLite's thread, which costs about 30 us, more than most statements.
+//! Runs several statements in one round trip to SQLite's thread. A round trip takes about 30 us, longer than most
+//! statements.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -13,7 +14,7 @@ use sqlx::{
 
 use crate::catalog::db::error::Result;
 
-/// Statements with their parameters. They run in order, and the first error ends the script.
+/// SQL statements with their parameters. They run in order until one of them fails.
 ///
 /// Parameters are written as plain `?`. sqlx binds them in order across all statements.
 #[derive(Debug, Default)]

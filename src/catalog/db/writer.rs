@@ -1,4 +1,4 @@
-//! The writer task: commits waiting requests together and replies after the commit.
+//! The writer task, which commits pending requests together and replies after the commit.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
 use crate::catalog::db::request::{Message, Work};
 
-/// Number of commits after which the write-ahead log is checkpointed even under load, which is about 4 MiB of log.
+/// Number of commits, about 4 MiB of log, after which the write-ahead log is checkpointed even under load.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// Idle time after which the write-ahead log is checkpointed.
 const IDLE: Duration = Duration::from_millis(250);
@@ -71,9 +71,8 @@ pub(crate) async fn run(
     }
 }
 
-/// Commits a batch and replies to its requests. If the commit fails because of a request, each request is committed on
-/// its own, so that an invalid request does not fail the others. If it fails because of the file, such as a lock or a
-/// disk error, all requests fail.
+/// Commits a batch and replies to its requests. If the database file causes the error, such as a lock or a full disk,
+/// all requests fail. After any other error, each request is committed on its own, so that only the invalid ones fail.
 async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
     match apply(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
@@ -122,7 +121,7 @@ async fn wal_checkpoint(conn: &mut SqliteConnection, pragma: &'static str) {
     }
 }
 
-/// Runs `work` in a transaction of its own, which is committed on success and rolled back on an error.
+/// Runs `work` in a separate transaction. Rolls it back if `work` or the commit fails.
 pub(crate) async fn run_transaction<T>(
     conn: &mut SqliteConnection,
     path: &Path,

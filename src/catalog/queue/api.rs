@@ -21,7 +21,7 @@ impl Catalog {
     /// Gives a lease back. The attempt does not count. Returns `false` if the lease was already lost.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn release(&self, lease: Lease) -> Result<bool> {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
@@ -30,7 +30,7 @@ impl Catalog {
     /// heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must register again.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn heartbeat(
         &self,
         worker: WorkerId,
@@ -82,7 +82,7 @@ impl Catalog {
     /// Stores a failed stage. Returns `false`, and stores nothing, if the lease was lost.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn fail(&self, lease: Lease, failure: StageFailure) -> Result<bool> {
         self.grouped(|reply| Request::Fail(Box::new((lease, failure)), reply))
             .await
@@ -91,7 +91,7 @@ impl Catalog {
     /// Reads the counters of jobs.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn counters(&self) -> Result<JobCounts> {
         let mut conn = self.read_conn().await?;
         Ok(by_status(counters(&mut conn).await?))
@@ -101,7 +101,7 @@ impl Catalog {
     /// between.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn recount(&self) -> Result<JobCounts> {
         let mut conn = self.snapshot().await?;
         Ok(by_status(count_jobs(&mut conn).await?))

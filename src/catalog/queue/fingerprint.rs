@@ -79,7 +79,7 @@ impl Catalog {
     /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
@@ -113,7 +113,7 @@ impl Catalog {
     /// `hash_line` by [`Fingerprints::hash_line`]. Skips hashes that are not stored.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn changes_from(
         &self,
         hash_line: &str,

@@ -122,7 +122,7 @@ impl Catalog {
     /// Returns the workers that hold leases.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
         Ok(sqlx::query_as(HOLDERS).fetch_all(&mut *conn).await?)
@@ -135,7 +135,7 @@ impl Catalog {
     /// which depends on all recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -155,7 +155,7 @@ impl Catalog {
     /// the stored hashes to detect replaced files.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -174,7 +174,7 @@ impl Catalog {
     /// deadlines.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn recover_overdue(
         &self,
         me: WorkerId,

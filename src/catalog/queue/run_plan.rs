@@ -19,7 +19,7 @@ impl Catalog {
     /// Plans a run with these settings for the named pairs. If `names` is `None`, plans a run for all pairs.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
@@ -37,7 +37,7 @@ impl Catalog {
     /// Counts the pairs that have a result with outdated settings or inputs.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn count_stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;

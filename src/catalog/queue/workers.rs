@@ -72,7 +72,7 @@ impl Catalog {
     /// before.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
@@ -86,7 +86,7 @@ impl Catalog {
     /// Records that a worker ended properly.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -105,7 +105,7 @@ impl Catalog {
     /// `longest` milliseconds left, which only a clock jump can cause.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -126,7 +126,7 @@ impl Catalog {
     /// counts all pairs, but at most 1000 ready ones.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn outstanding(
         &self,
         until: Stage,
@@ -146,7 +146,7 @@ impl Catalog {
     /// jobs.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
         let query = match among {

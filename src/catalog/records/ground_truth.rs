@@ -22,7 +22,7 @@ impl Catalog {
     /// Returns whether any pair has a true alignment.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         let exists = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");

@@ -112,7 +112,7 @@ impl Catalog {
     /// Returns the names of all pairs, sorted.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = sqlx::query_scalar("SELECT name FROM pair ORDER BY name");
@@ -122,7 +122,7 @@ impl Catalog {
     /// Returns the unknown names among `names`, in the given order.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
@@ -131,7 +131,7 @@ impl Catalog {
     /// Returns the pairs with the given names. Unknown names are left out.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await

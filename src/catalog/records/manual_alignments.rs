@@ -76,7 +76,7 @@ impl Catalog {
     /// Appends a manual alignment durably. Returns `false`, and stores nothing, if an alignment with this event exists.
     ///
     /// # Errors
-    /// If there is no such pair, or the database returns an error.
+    /// Returns an error if there is no such pair, or if a database operation fails.
     pub async fn store_manual_alignment(
         &self,
         made: ManualAlignment,
@@ -110,7 +110,7 @@ impl Catalog {
     /// Returns all manual alignments, including undone ones, oldest first.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
         Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
@@ -119,7 +119,7 @@ impl Catalog {
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());

@@ -99,7 +99,7 @@ impl StageRecord {
     /// Parses the outcome as a type of `domain`, such as `FitOutcome` for the stage `Fit`.
     ///
     /// # Errors
-    /// If the stored JSON does not match the type, for example after an upgrade.
+    /// Returns an error if the stored JSON does not match the type, for example after an upgrade.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, serde_json::Error> {
         T::deserialize(&self.outcome)
     }

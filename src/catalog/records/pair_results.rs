@@ -55,7 +55,7 @@ impl Catalog {
     /// after the last pair.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub(crate) async fn results_page(
         &self,
         after: Option<&PairName>,
@@ -74,7 +74,7 @@ impl Catalog {
     /// Returns the details of a pair, or `None` if the pair does not exist.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
         let found = sqlx::query(ONE)
@@ -100,7 +100,7 @@ impl Catalog {
     /// Returns up to `limit` quarantined pairs, sorted by name.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query(FAILED).bind(limit as i64);
@@ -119,7 +119,7 @@ impl Catalog {
     /// Counts the quarantined pairs by failure class. Leaves out classes without pairs.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(FAILED_BY_CLASS);
@@ -252,7 +252,7 @@ impl ResultPages<'_> {
     /// Returns the next page, which is never empty, or `None` after the last page.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
         let page = self.catalog.results_page(self.after.as_ref(), self.size);
         let page = page.await?;

@@ -93,7 +93,7 @@ impl Catalog {
     /// after the last pair.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
@@ -116,7 +116,7 @@ impl Catalog {
     /// Stores the current state of input files.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

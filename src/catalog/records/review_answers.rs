@@ -217,7 +217,7 @@ impl Catalog {
     /// for each of these results.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(ANSWERS).bind(reviewer);
@@ -227,7 +227,7 @@ impl Catalog {
     /// Returns all answers to attention checks, including undone ones, oldest first.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(CHECK_ANSWERS);
@@ -237,7 +237,7 @@ impl Catalog {
     /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_scalar("SELECT key FROM review_key");

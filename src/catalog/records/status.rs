@@ -30,7 +30,7 @@ impl Catalog {
     /// changed inputs, count as stale.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
         let counted = by_status(counters(&mut conn).await?);

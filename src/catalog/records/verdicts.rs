@@ -176,7 +176,7 @@ impl Catalog {
     /// Returns the verdict log of one pair, or of all pairs, oldest first.
     ///
     /// # Errors
-    /// If the database returns an error.
+    /// Returns an error if a database operation fails.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair).await

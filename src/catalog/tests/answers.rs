@@ -1,4 +1,4 @@
-//! Answers are bound to what was shown, stored once and undone by event id. Attention checks are kept apart.
+//! Answers on the review page: bound to what was shown, stored once, and undone by event id.
 
 use super::{World, name};
 use crate::catalog::db::open;

@@ -27,7 +27,7 @@ fn failed(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
     }
 }
 
-/// Ids of workers are not reused, even after the newest worker was removed.
+/// Worker ids are not reused, even if the newest worker was deleted.
 #[tokio::test]
 async fn worker_ids_are_not_reused() {
     let world = World::new(1).await;
@@ -49,8 +49,8 @@ async fn worker_ids_are_not_reused() {
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
-/// Returns two leases of one worker on one pair. The first was overdue and recovered by another worker, and the pair
-/// was claimed again. Both leases have the same pair, worker, status and heartbeat; only the token differs.
+/// Returns two leases of one worker on the same pair. Another worker recovered the first lease, which was overdue, and
+/// then the pair was leased again. Of the values that a write must match, only the token differs.
 async fn leased_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
     let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
@@ -86,7 +86,7 @@ async fn a_late_checkpoint_under_an_older_lease_of_the_same_worker_changes_nothi
 }
 
 /// Both requests share one commit, and each must get its own reply. A third lease keeps the counters above zero.
-/// Without it, the commit would fail and each request would be committed on its own.
+/// Otherwise a wrongly stored checkpoint would fail the commit, and each request would be committed on its own.
 #[tokio::test]
 async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
     let world = World::new(2).await;
@@ -192,7 +192,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     world.assert_counters().await;
 }
 
-/// Two processes write as fast as they can while a third imports and others read.
+/// Two workers write as fast as they can while pairs are imported and open work is counted.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn busy_errors_do_not_reach_callers() {
     let world = World::new(80).await;
@@ -242,7 +242,7 @@ async fn busy_errors_do_not_reach_callers() {
     world.assert_counters().await;
 }
 
-/// The end of a back-off is stored in the row, so that it survives the death of the process.
+/// The end of a back-off is stored in the job, so it survives the death of the process.
 #[tokio::test]
 async fn a_backoff_survives_the_death_of_its_process() {
     let world = World::new(1).await;
@@ -269,8 +269,8 @@ async fn a_backoff_survives_the_death_of_its_process() {
     assert_eq!((again[0].attempt(), world.crashes("p0").await), (3, 1));
 }
 
-/// One worker's clock is years behind, another's years ahead. No living worker loses a lease, and no pair waits for
-/// years.
+/// One worker's clock is years behind, and another worker's clock is years ahead. No living worker loses a lease, and
+/// no pair waits for years.
 #[tokio::test]
 async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     const YEARS: i64 = 100_000_000_000;

@@ -1,4 +1,4 @@
-//! Random histories of several processes, applied to the catalog and to the model. Both must always agree.
+//! Applies random events of several processes to the catalog and to the model. Both must always agree.
 
 mod compare;
 mod upkeep;
@@ -26,7 +26,7 @@ struct Game {
     conn: SqliteConnection,
     dice: ChaCha8Rng,
     model: Queue,
-    /// Leases as their holders see them. A holder may be dead, or not know that others consider it dead.
+    /// Leases that processes hold or believe to hold.
     leases: Vec<Lease>,
     /// The wall clock of the next process and of back-offs; it jumps.
     wall: i64,
@@ -101,7 +101,7 @@ impl Game {
         self.dice.random_bool(chance)
     }
 
-    /// Picks a process that can act, even if others consider it dead without its knowledge.
+    /// Picks a running process, even if others consider it dead.
     fn somebody(&mut self) -> Option<usize> {
         let running = |index: &usize| self.model.processes[*index].running;
         let running: Vec<_> = (0..self.model.processes.len()).filter(running).collect();
@@ -201,7 +201,7 @@ impl Game {
             return;
         };
         let (stands, process) = (self.stands(&lease), *self.process(&lease));
-        // Sometimes an earlier stage is computed again, as after the loss of an artifact.
+        // Sometimes compute an earlier stage again, as a worker does after an artifact was lost.
         let again = self.is_likely(0.2);
         let earlier = self.dice.random_range(0..=lease.cursor().index());
         let stage = if again {

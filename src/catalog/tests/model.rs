@@ -1,4 +1,4 @@
-//! A minimal model of the queue in memory, which the SQL is tested against.
+//! A minimal model of the queue in memory. The SQL of the queue is tested against it.
 
 use std::collections::BTreeMap;
 
@@ -19,9 +19,9 @@ pub(super) struct Job {
     pub(super) attempt: u32,
     pub(super) crashes: u32,
     pub(super) exclusive: bool,
-    /// Settings and inputs of each stage's result.
+    /// Settings of each stage's result.
     results: [Option<FingerprintIds>; 4],
-    /// Stage, settings and inputs of its failure.
+    /// Stage and settings of the failure.
     pub(super) failure: Option<(Stage, FingerprintIds)>,
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Process {
     pub(super) heartbeat: UnixMillis,
     pub(super) ended: bool,
     pub(super) died: bool,
-    /// Whether it can still act; a process that others consider dead may.
+    /// Whether the process runs, even if others consider it dead.
     pub(super) running: bool,
     pub(super) fingerprints: FingerprintIds,
 }
@@ -74,7 +74,7 @@ impl Job {
         self.state = transition(self.state, event).expect("the model allows it");
     }
 
-    /// Returns the first stage whose result has other settings or inputs than the current ones.
+    /// Returns the first stage whose result has other settings than the current ones.
     fn changed(&self, current: FingerprintIds) -> Option<Stage> {
         let behind = |stage: &Stage| self.state.stage().is_none_or(|next| *stage < next);
         Stage::ALL.into_iter().filter(behind).find(|stage| {
@@ -161,8 +161,8 @@ impl Queue {
         job.failure = None;
     }
 
-    /// Stores a failure. `back_off` is the time of the next attempt; `exclusive` makes the pair ready for an exclusive
-    /// run. With neither, the pair is quarantined.
+    /// Stores a failure. `back_off` is the time of the next attempt. `exclusive` makes the pair ready for an exclusive
+    /// run. If neither is set, quarantines the pair.
     pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, exclusive: bool) {
         let (worker, fingerprints) = (lease.worker, self.of_worker(lease.worker).fingerprints);
         let job = self.job(lease.pair().0);
@@ -185,7 +185,7 @@ impl Queue {
         job.attempt = job.attempt.saturating_sub(1);
     }
 
-    /// Recovers the leases of workers that are considered dead. Returns the number of pairs that are ready again.
+    /// Recovers the leases of workers that are considered dead. Returns the number of pairs made ready.
     pub(super) fn recover(&mut self, dead: &[WorkerId]) -> u64 {
         for process in &mut self.processes {
             process.died |= dead.contains(&process.worker) && !process.ended;
@@ -220,7 +220,8 @@ impl Queue {
         jobs.map(|(pair, _)| *pair).collect()
     }
 
-    /// Recovers leases of other workers whose last heartbeat is later than the lease's deadline by more than `margin`.
+    /// Recovers overdue leases of workers other than `me`, and returns the number of pairs made ready. A lease is
+    /// overdue if its worker's last heartbeat is more than `margin` after the deadline.
     pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {
@@ -251,7 +252,7 @@ impl Queue {
         due
     }
 
-    /// Requeues jobs with outdated settings or inputs and, on request, all jobs. Returns their number.
+    /// Requeues jobs whose results or failure have outdated settings. If `again` requests it, requeues all jobs.
     pub(super) fn requeue_stale(&mut self, current: FingerprintIds, again: RerunPolicy) -> u64 {
         let mut sent = 0;
         for job in self.jobs.values_mut() {

@@ -1,4 +1,4 @@
-//! Query plans of frequent statements use a primary key or a partial index, without table scans or sorts.
+//! Query plans of frequent statements: by primary key or partial index, without table scans or sorts.
 
 use sqlx::{AssertSqlSafe, Row as _};
 

@@ -159,7 +159,7 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
 async fn repeated_kills_from_outside_quarantine_no_pair() {
     let world = World::new(1).await;
     for round in 0..8 {
-        // One process is killed before its first claim, the next process while it holds the pair.
+        // One worker dies before its first claim, and the next worker dies while it holds the pair.
         register(&world.catalog).await;
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
@@ -219,7 +219,7 @@ async fn an_overdue_lease_of_a_living_worker_is_recovered() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = register(&world.catalog).await;
-    // The lease's deadline is 1000, and the worker's heartbeat is later by its own clock. Other clocks do not matter.
+    // The deadline is 1000, and the margin is 60, both by the worker's own clock. Other clocks do not matter.
     for (heartbeat, recovered) in [(1_060, 0), (1_061, 1)] {
         assert!(
             world

@@ -1,4 +1,4 @@
-//! The state machine of a job. It is the specification that the SQL of the queue is tested against.
+//! The state machine of a job. The SQL of the queue is tested against this specification.
 
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
@@ -47,7 +47,7 @@ impl JobState {
         }
     }
 
-    /// Returns the next stage; `None` when all are done.
+    /// Returns the next stage, or `None` if all stages are done.
     pub(super) const fn stage(&self) -> Option<Stage> {
         match self {
             Self::Ready { stage }
@@ -73,7 +73,7 @@ pub(super) enum Event {
     Checkpoint {
         /// The worker.
         worker: WorkerId,
-        /// The completed stage: the current one, or an earlier one that had to be computed again.
+        /// The completed stage. It precedes the current stage if it had to be computed again.
         stage: Stage,
         /// Deadline of the next stage.
         deadline: UnixMillis,
@@ -90,7 +90,7 @@ pub(super) enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// The worker releases the job unfinished, because it is stopping or the job must run exclusively.
+    /// The worker releases the job unfinished: the worker is stopping, or the job must run exclusively.
     Release {
         /// The worker.
         worker: WorkerId,
@@ -100,7 +100,7 @@ pub(super) enum Event {
         /// Whether too many workers died over it: see [`is_poisoned`].
         poisoned: bool,
     },
-    /// The back-off ends if it is due, or so far in the future that the clock must have jumped.
+    /// Ends a back-off that is due, or whose end is so far away that the clock must have jumped.
     Due {
         /// The current time.
         now: UnixMillis,
@@ -127,7 +127,7 @@ pub(super) struct Refused {
 /// Applies an event to a job.
 ///
 /// # Errors
-/// If the event is invalid in that state, or comes from a worker that does not hold the lease.
+/// Returns an error if the event is invalid in that state, or if its worker does not hold the lease.
 pub(super) fn transition(state: JobState, event: Event) -> Result<JobState, Refused> {
     let next = match (state, event) {
         (JobState::Ready { stage }, Event::Claim { worker, deadline }) => Some(JobState::Leased {

@@ -68,7 +68,7 @@ async fn a_job_with_inconsistent_results_is_dirty_until_they_agree() {
     assert_eq!(lease.cursor(), Stage::Normalize);
     assert!(fingerprint(&world, 1).await.1);
     world.assert_counters().await;
-    // Results that begin again with the first stage are consistent, which the next run finds.
+    // These stages include a new `Fit`, so the results agree again. The next run removes the dirty mark.
     let again = [Stage::Normalize, Stage::Fit, Stage::Depth];
     let CheckpointOutcome::Lease(lease) = store(&world, lease, &again).await else {
         panic!("stages are left");

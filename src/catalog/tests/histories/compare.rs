@@ -1,4 +1,4 @@
-//! Compares the catalog with the model, and its rows before and after refused writes.
+//! Compares the catalog with the model, and compares its rows before and after refused writes.
 
 use sqlx::{AssertSqlSafe, Row as _};
 
@@ -18,7 +18,8 @@ const TABLES: [&str; 8] = [
 ];
 
 impl Game {
-    /// Returns the rows of all tables that a write could change, if the write must be refused, otherwise nothing.
+    /// Returns the rows of all `TABLES`, which a refused write must not change. Returns nothing if the write is
+    /// `allowed`.
     pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
         let mut lines = Vec::new();
         for table in TABLES.iter().filter(|_| !allowed) {
@@ -37,7 +38,7 @@ impl Game {
         lines
     }
 
-    /// Asserts that every row equals the model, no token decreased, the counters are right and no verdict was lost.
+    /// Asserts that all jobs equal the model, no token decreased, the counters are right, and no verdict was lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
             "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j

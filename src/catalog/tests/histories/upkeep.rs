@@ -25,7 +25,7 @@ impl Game {
         }
     }
 
-    /// A process considers another process dead, rightly or not, or recovers overdue leases of other processes.
+    /// A process recovers leases of a process that it considers dead, rightly or not, or overdue leases of others.
     pub(super) async fn recover(&mut self) {
         let (Some(me), now) = (self.somebody(), self.wall) else {
             return;
