@@ -30,7 +30,7 @@ impl Catalog {
     /// Opens the catalog, or creates it.
     ///
     /// # Errors
-    /// Returns an error if the file is not a catalog or is on a network file system, or if a database operation fails.
+    /// Returns an error if the file is not a catalog or is on a network file system, or if the database fails.
     pub async fn create(path: &Path) -> Result<Self> {
         Self::with_writer(path, true, CommitDelay::new()).await
     }
@@ -38,8 +38,7 @@ impl Catalog {
     /// Opens an existing catalog for reading and writing.
     ///
     /// # Errors
-    /// Returns an error if the file does not exist, is not a catalog or is on a network file system, or if a database
-    /// operation fails.
+    /// Returns an error if the file is missing, no catalog or on a network file system, or if the database fails.
     pub async fn open(path: &Path) -> Result<Self> {
         Self::with_writer(path, false, CommitDelay::new()).await
     }
@@ -76,8 +75,7 @@ impl Catalog {
         })
     }
 
-    /// Closes all connections. The writer task first handles the requests sent so far and checkpoints the write-ahead
-    /// log.
+    /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
     pub async fn close(self) {
         // Readers first: an open reader prevents a complete checkpoint.
         self.reader_pool.close().await;

@@ -159,7 +159,7 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// Registers a worker that recovers the leases of all others. Asserts the number of pairs made ready.
+    /// Registers a worker that recovers the leases of all other workers. Asserts the number of pairs made ready.
     async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
         let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
@@ -197,8 +197,7 @@ impl World {
 }
 
 impl World {
-    /// Asserts that plans from the counters equal plans from inspecting every pair, for current and for changed
-    /// settings.
+    /// Asserts that counters and inspection of every pair give the same plan, for current and for changed settings.
     async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

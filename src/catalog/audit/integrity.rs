@@ -186,7 +186,7 @@ impl Catalog {
         Ok(Drift { counters, marks })
     }
 
-    /// Returns up to `limit` pairs whose ids follow `after`, sorted by id. Returns an empty list after the last pair.
+    /// Returns up to `limit` pairs with ids above `after`, sorted by id. Returns an empty list at the end.
     ///
     /// # Errors
     /// Returns an error if a database operation fails, or if a stored value is invalid.

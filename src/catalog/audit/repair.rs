@@ -65,8 +65,7 @@ impl Catalog {
             .await
     }
 
-    /// Sets each job's fingerprint to that of its last result, marks jobs with inconsistent results dirty, and recounts
-    /// all counters.
+    /// Corrects the fingerprint of each job, marks jobs with inconsistent results dirty, and recounts all counters.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -14,8 +14,7 @@ impl Catalog {
     /// Copies the catalog, as of one moment, to a new file and verifies the copy. Does not sync the copy to disk.
     ///
     /// # Errors
-    /// Returns an error if the path is not UTF-8, if the database or the disk fails, or if the copy is damaged. A
-    /// partial copy may be left behind.
+    /// Returns an error if the path is not UTF-8, the copy fails, or the copy is damaged. May leave a partial copy.
     pub async fn copy_to(&self, file: &Path) -> Result<()> {
         let Some(name) = file.to_str() else {
             return Err(CatalogError::NotUtf8(file.to_owned()));

@@ -47,7 +47,7 @@ impl CatalogErrorKind {
 }
 
 impl CatalogError {
-    /// Returns the kind, or `None` if the error is not of these kinds.
+    /// Returns the kind of a SQLite error or of wrong counters, or `None` for any other error.
     pub fn kind(&self) -> Option<CatalogErrorKind> {
         match self {
             Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {

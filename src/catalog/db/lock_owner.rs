@@ -59,8 +59,7 @@ fn writer(line: &str, file: &str) -> Option<u32> {
     (of == file).then(|| pid.parse().ok())?
 }
 
-/// Returns whether the text of `/proc/PID/stat` shows a stopped process. The state follows the name, which is in
-/// parentheses.
+/// Returns whether a text from `/proc/PID/stat` shows a stopped process. The state follows the name in parentheses.
 fn is_stopped(stat: &str) -> bool {
     let state = stat.rsplit(") ").next();
     state.is_some_and(|state| state.starts_with('T'))

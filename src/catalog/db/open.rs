@@ -38,7 +38,7 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// Opens the write connection. Creates a missing file only if `create` is set, and a missing schema in any case.
+/// Opens the write connection. If `create` is set, creates a missing file. Creates a missing schema in any case.
 pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     check_file(path, create)?;
@@ -150,7 +150,7 @@ async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
         Identity::Other(number) => return Err(wrong_identity(path, number)),
     }
     let outcome = MIGRATOR.run(&mut *conn).await;
-    // The migration fails if another process creates the schema at the same time. The database is ready in that case.
+    // The migration fails if another process creates the schema at the same time. Then the database is ready anyway.
     if identity(conn).await? == Identity::Current {
         return Ok(());
     }
@@ -217,8 +217,7 @@ fn is_read_only(error: &CatalogError) -> bool {
 /// Replaces the error if the file is not a database or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // `kind` opens and closes the file. This drops no locks, because no connection is open to a file that is no
-        // database.
+        // `kind` opens and closes the file. This drops no locks, because no connection has such a file open.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),

@@ -13,8 +13,7 @@ use crate::catalog::queue::lease::{Lease, StageFailure};
 /// Where a reply goes.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 
-/// A request that may share a commit with other requests. The reply `false` means that the request was refused, for
-/// example because the lease was lost.
+/// A request that may share a commit with others. The reply `false` means that its lease or worker was not valid.
 pub(crate) enum Request {
     Heartbeat(Heartbeat, Reply<bool>),
     Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),

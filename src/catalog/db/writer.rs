@@ -15,7 +15,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
 use crate::catalog::db::request::{Message, Work};
 
-/// Number of commits, about 4 MiB of log, after which the write-ahead log is checkpointed even under load.
+/// Number of commits, with about 4 MiB of log, after which the log is checkpointed even if requests are pending.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// Idle time after which the write-ahead log is checkpointed.
 const IDLE: Duration = Duration::from_millis(250);

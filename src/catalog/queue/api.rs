@@ -10,7 +10,7 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{UnixMillis, WorkerId};
 
 impl Catalog {
-    /// Leases up to `slots` ready pairs. Returns no lease if the worker has ended or counts as dead by `alive_since`.
+    /// Leases up to `slots` ready pairs, or none if the worker has ended or its heartbeat is before `alive_since`.
     ///
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is leased.
@@ -97,8 +97,7 @@ impl Catalog {
         Ok(by_status(counters(&mut conn).await?))
     }
 
-    /// Counts all jobs from their rows. Equals [`Catalog::counters`] unless the catalog is damaged or changes in
-    /// between.
+    /// Counts all jobs from their rows. In an undamaged catalog, [`Catalog::counters`] gives the same result.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

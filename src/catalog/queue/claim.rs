@@ -30,8 +30,7 @@ pub struct ClaimRequest {
 }
 
 impl ClaimRequest {
-    /// Requests pairs that need not run exclusively, with any next stage. The worker's last heartbeat may be of any
-    /// age.
+    /// Requests pairs that need not run exclusively, with any next stage. Does not limit the age of the last heartbeat.
     pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
         Self {
             worker,
@@ -53,7 +52,7 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. The limit is written `+?` to hide its value from
+/// Leases the first ready jobs in the order of the index `job_ready`. The limit is `+?`, which hides its value from
 /// SQLite's query planner. With a plain `?`, SQLite would prepare the statement again each time.
 pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
@@ -81,8 +80,7 @@ WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.toke
     AND job.status = 1
 RETURNING pair, token";
 
-/// Stores a heartbeat. Skips it if the worker has ended, or if its last heartbeat is so old that others may consider it
-/// dead.
+/// Stores a heartbeat, unless the worker has ended or its last heartbeat is too old. Others may consider it dead then.
 pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 

@@ -109,8 +109,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns the settings that differ between another process and `fingerprints`. The other process provides
-    /// `hash_line` by [`Fingerprints::hash_line`]. Skips hashes that are not stored.
+    /// Returns the settings that differ between another process and `fingerprints`. `hash_line` is the other process's
+    /// [`Fingerprints::hash_line`]. Skips hashes that are not stored.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -1,5 +1,5 @@
 //! Counts jobs from their rows, in ranges of pairs. SQLite sorts the rows of a `GROUP BY` in memory, so one statement
-//! over all jobs would use too much of it.
+//! over all jobs could use too much memory.
 
 use std::collections::BTreeMap;
 

@@ -45,7 +45,7 @@ impl Lease {
         self.attempt
     }
 
-    /// Returns whether the pair must run exclusively: it exceeded a resource limit, or a worker died or hung over it.
+    /// Returns whether the pair must run exclusively, because it exceeded a resource limit or its worker died or hung.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }

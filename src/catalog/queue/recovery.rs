@@ -81,7 +81,7 @@ pub(crate) const AFFECTED_PAIRS: &str = "
 SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
 
 /// Recovers overdue leases of workers that are not known to be dead. A lease is overdue if the worker's last heartbeat
-/// is later than the deadline by more than `?3`. The worker's own clock sets both times.
+/// is more than `?3` after the deadline. Both times are by the worker's own clock.
 pub(crate) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
@@ -132,7 +132,7 @@ impl Catalog {
     /// several deaths.
     ///
     /// A pair is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned` returns true,
-    /// which depends on all recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
+    /// which also considers other recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -151,8 +151,8 @@ impl Catalog {
         .await
     }
 
-    /// Stores the input files of quarantined pairs that no stage had read before the worker died. A later run compares
-    /// the stored hashes to detect replaced files.
+    /// Stores the current versions of those input files of quarantined pairs that no stage has read. A later run
+    /// compares the stored hashes to detect replaced files.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

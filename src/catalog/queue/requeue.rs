@@ -29,7 +29,7 @@ pub enum RetrySelection {
     All,
 }
 
-/// Resets jobs to a stage, without attempts and crashes. Skips leased jobs.
+/// Resets jobs to a stage, with no attempts or crashes. Skips leased jobs.
 pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
@@ -73,8 +73,7 @@ impl Catalog {
         let current = current_json(&mut conn, fingerprints).await?;
         let mut moves = Vec::new();
         if among.is_none() {
-            // Jobs without the dirty mark are requeued in groups. Dirty or quarantined jobs are inspected one by one
-            // below.
+            // Jobs without the dirty mark are requeued in groups. Dirty and quarantined jobs are inspected below.
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
             let groups = groups(&mut conn, &chains).await?;
             assert_complete(&mut conn, &groups).await?;
@@ -99,9 +98,9 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues jobs page by page, and returns their number. `page` gets the last pair of the previous page. It returns
-    /// how many jobs it requeued, and the last pair of its own page, or `None` at the end. Each page is a separate
-    /// transaction, so that other writes can run in between.
+    /// Requeues jobs page by page, and returns their number. Each page is a separate transaction, so that other writes
+    /// can run in between. `page` gets the last pair of the page before, and returns its number of jobs and its last
+    /// pair.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
         F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>
@@ -161,8 +160,7 @@ fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
     (!waits).then_some(to)
 }
 
-/// Requeues the jobs of a group on the page after a pair. Returns the number of requeued jobs, and the last pair of the
-/// page.
+/// Requeues one page of a group: jobs whose pairs follow `after`. Returns their number, and the last pair of the page.
 async fn requeue_group(
     conn: &mut SqliteConnection,
     key: CounterKey,
@@ -182,9 +180,9 @@ async fn requeue_group(
     Ok((moved, pairs.last().copied()))
 }
 
-/// Inspects the page of jobs after a pair, and requeues the stale ones. Returns their number, and the last pair of the
-/// page. If `among` is `None`, inspects dirty and quarantined jobs, and removes the dirty mark if the results agree
-/// again.
+/// Inspects one page of jobs whose pairs follow `after`, and requeues the stale ones. Returns their number, and the
+/// last pair of the page. If `among` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
+/// consistent again.
 async fn requeue_inspected(
     conn: &mut SqliteConnection,
     current: String,

@@ -1,7 +1,7 @@
 //! Finds the pairs that must run again because their settings or inputs changed, and the reasons.
 //!
 //! A job stores the fingerprint of the result before its cursor. The fingerprint covers the settings of that stage and
-//! of all earlier stages. Therefore one comparison decides for all jobs with the same fingerprint.
+//! of all earlier stages. Therefore one comparison of fingerprints decides for many jobs.
 //!
 //! Jobs with the `dirty` mark or in quarantine are inspected one by one. The results of a dirty job may disagree with
 //! each other or with the inputs. The failure of a quarantined job has settings and inputs of its own.
@@ -119,7 +119,7 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
     next.map(|at| (at, cause))
 }
 
-/// Inspects the page of the selected jobs after a pair. Returns each job with its pair.
+/// Inspects one page of selected jobs whose pairs follow `after`. Returns each job with its pair.
 pub(crate) async fn inspect(
     conn: &mut SqliteConnection,
     current: &str,
@@ -158,8 +158,7 @@ fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     })
 }
 
-/// Inspects the page of dirty and quarantined jobs after a pair. Also returns the last pair of the page, or `None` at
-/// the end.
+/// Inspects one page of dirty or quarantined jobs after a pair. Also returns the page's last pair, if any.
 pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
@@ -174,8 +173,8 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Groups all jobs by counter key, sorted by cursor and status. Each group consists of the state of its jobs without
-/// the dirty mark, and the number of all its jobs.
+/// Groups all jobs by counter key. The groups are sorted by cursor and status. Each group consists of the state of its
+/// jobs without the dirty mark, and the number of all its jobs.
 ///
 /// A requeued job moves to an earlier group. Therefore a pass over the groups handles each job only once.
 pub(crate) async fn groups(

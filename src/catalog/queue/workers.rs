@@ -43,8 +43,7 @@ pub struct WorkLeft {
     pub quarantined: u64,
 }
 
-/// Ends the back-offs that are due at `?1`. Also ends back-offs until later than `?2`, which only a clock jump can
-/// cause.
+/// Ends the back-offs that are due at `?1`. Also ends those that last beyond `?2`, which only a clock jump can cause.
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
@@ -68,8 +67,7 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Registers a worker process with the fingerprints of its settings. Returns a worker id that was never used
-    /// before.
+    /// Registers a worker process with the fingerprints of its settings. Returns an id that no worker had before.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -122,8 +120,8 @@ impl Catalog {
         .await
     }
 
-    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. If `among` is `None`,
-    /// counts all pairs, but at most 1000 ready ones.
+    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `among`, counts
+    /// all pairs, but at most 1000 ready ones.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -142,8 +140,7 @@ impl Catalog {
         Ok(query.fetch_one(&mut *conn).await?)
     }
 
-    /// Counts the stages up to `until` that pairs have yet to run. If `among` is `None`, reads the counters, not the
-    /// jobs.
+    /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -1,5 +1,4 @@
-//! Manual alignments, in an append-only log. Each entry has the hashes of the mesh, print and depth map it was made
-//! for.
+//! Manual alignments, in an append-only log. Each has the hashes of the mesh, print and depth map it was made for.
 
 use std::collections::BTreeMap;
 
@@ -30,8 +29,7 @@ pub struct ManualAlignment {
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the masks of relief and print at the manual pose. Uses the canvas of the pair's
-    /// scores.
+    /// Intersection over union of the relief's and the print's masks at the manual pose, on the canvas of the scores.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,

@@ -115,7 +115,7 @@ pub struct MetricRecord {
     pub result_hash: ContentHash,
     /// Verdicts on this result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
-    /// Number of verdicts on older results of this pair and metric. They have no effect.
+    /// Number of verdicts on older results of this pair and metric. They do not count.
     pub older_verdicts: u64,
 }
 

@@ -51,8 +51,7 @@ const ATTEMPTS: &str =
     "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id";
 
 impl Catalog {
-    /// Returns the results of up to `limit` pairs whose names follow `after`, sorted by name. Returns an empty list
-    /// after the last pair.
+    /// Returns up to `limit` pairs with names above `after`, sorted by name. Returns an empty list at the end.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -166,7 +165,7 @@ fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
     }))
 }
 
-/// Returns the metrics of a pair, each with the verdicts on its current result. Returns none if the pair is not done.
+/// Returns the metrics of a pair, with the verdicts on their current results. Returns none if the pair is not done.
 fn metrics(
     pair: i64,
     stages: &[StageRecord],

@@ -89,8 +89,7 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns up to `limit` pairs whose ids follow `after`, with their input files as last read. Returns an empty list
-    /// after the last pair.
+    /// Returns up to `limit` pairs with ids above `after`, sorted by id. Returns an empty list at the end.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -11,7 +11,7 @@ use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, Stage, Verdict};
 
-/// Counts verdicts on current results by verdict. Only the newest verdict of each reviewer on a result counts.
+/// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts.
 const VERDICTS: &str = "
 SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
@@ -26,8 +26,7 @@ pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Returns the counts that the `status` command shows. Results with other settings than `fingerprints`, or with
-    /// changed inputs, count as stale.
+    /// Returns the counts of the `status` command. Results with other `fingerprints` or changed inputs count as stale.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

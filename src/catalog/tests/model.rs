@@ -220,8 +220,7 @@ impl Queue {
         jobs.map(|(pair, _)| *pair).collect()
     }
 
-    /// Recovers overdue leases of workers other than `me`, and returns the number of pairs made ready. A lease is
-    /// overdue if its worker's last heartbeat is more than `margin` after the deadline.
+    /// Recovers leases of workers other than `me` whose last heartbeat is more than `margin` after the deadline.
     pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {

@@ -219,7 +219,7 @@ async fn an_overdue_lease_of_a_living_worker_is_recovered() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = register(&world.catalog).await;
-    // The deadline is 1000, and the margin is 60, both by the worker's own clock. Other clocks do not matter.
+    // The deadline is 1000 by the worker's own clock, and the margin is 60. Other clocks do not matter.
     for (heartbeat, recovered) in [(1_060, 0), (1_061, 1)] {
         assert!(
             world

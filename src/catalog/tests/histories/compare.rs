@@ -18,8 +18,7 @@ const TABLES: [&str; 8] = [
 ];
 
 impl Game {
-    /// Returns the rows of all `TABLES`, which a refused write must not change. Returns nothing if the write is
-    /// `allowed`.
+    /// Returns the rows of all `TABLES`, which a refused write must not change. Returns none if `allowed` is true.
     pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
         let mut lines = Vec::new();
         for table in TABLES.iter().filter(|_| !allowed) {
@@ -38,7 +37,7 @@ impl Game {
         lines
     }
 
-    /// Asserts that all jobs equal the model, no token decreased, the counters are right, and no verdict was lost.
+    /// Asserts that all jobs equal the model, no token decreased, the counters are right and no verdict was lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
             "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j

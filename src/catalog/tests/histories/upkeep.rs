@@ -25,7 +25,7 @@ impl Game {
         }
     }
 
-    /// A process recovers leases of a process that it considers dead, rightly or not, or overdue leases of others.
+    /// A process recovers overdue leases, or the leases of a process that it considers dead, rightly or not.
     pub(super) async fn recover(&mut self) {
         let (Some(me), now) = (self.somebody(), self.wall) else {
             return;
