@@ -99,7 +99,7 @@ impl Catalog {
     }
 
     /// Requeues jobs page by page, and returns their number. Each page is a separate transaction, so that other writes
-    /// can run in between. `page` gets the last pair of the page before, and returns its number of jobs and its last
+    /// can run in between. `page` gets the last pair of the page before. It returns its number of jobs and its last
     /// pair.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where

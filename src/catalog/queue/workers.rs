@@ -43,7 +43,7 @@ pub struct WorkLeft {
     pub quarantined: u64,
 }
 
-/// Ends the back-offs that are due at `?1`. Also ends those that last beyond `?2`, which only a clock jump can cause.
+/// Ends the back-offs that are due at `?1`. Also ends back-offs beyond `?2`, which only a clock jump can cause.
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
