@@ -1,7 +1,6 @@
-//! Stores the stages of one pair under its lease. This is a separate task, so that the compute thread does not wait
-//! for the disk. The files of a stage are on the disk before a row names them. Stages are stored in order. Stages that
-//! arrive while earlier ones are being stored share a transaction. The task returns the lease once all stages are
-//! stored.
+//! Stores the stages of one pair under its lease, in order. A separate task does this, so that the compute thread does
+//! not wait for the disk. The files of a stage are on the disk before its row is stored. Stages that arrive while an
+//! earlier one is being stored share a transaction. The task returns the lease at its end.
 
 use std::io;
 use std::sync::Arc;
@@ -26,20 +25,20 @@ pub(super) struct Checkpointer {
     task: JoinHandle<Result<StoredStages, RunError>>,
 }
 
-/// What a checkpointer has stored, and what is left of the lease.
+/// Result of a checkpointer: the number of stored stages, and the lease if it continues.
 pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// Whether every stage that was sent is stored. `false` after a request to stop at once.
+    /// `false` if an immediate stop left a stage unstored. A lost lease does not change this flag.
     is_complete: bool,
 }
 
 impl StoredStages {
-    /// Returns the lease if this process still holds it and every stage that was sent is stored.
+    /// Returns the lease if this process still holds it and no stage was left unstored.
     ///
     /// # Errors
-    /// Returns `self` if the lease is lost or a stage is not stored.
+    /// Returns `self` if the lease is lost, ended with the pair's last stage, or a stage was left unstored.
     pub(super) fn into_lease(self) -> Result<Lease, Self> {
         match self.lease {
             CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),
@@ -47,8 +46,8 @@ impl StoredStages {
         }
     }
 
-    /// Releases a remaining lease, and returns how the pair ended: `end`, unless the lease was lost or not every stage
-    /// was stored.
+    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or an
+    /// immediate stop left a stage unstored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let end = match &self.lease {
             CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
@@ -78,24 +77,25 @@ impl Checkpointer {
         }
     }
 
-    /// Sends a computed stage to be stored. Returns `false` when no more stages can be stored: the lease is lost, the
-    /// disk or the catalog returned an error, or an immediate stop was requested.
+    /// Sends a computed stage to be stored. Returns `false` if the task has ended: the lease is lost, the disk or the
+    /// catalog returned an error, or an immediate stop was requested.
     pub(super) fn store(&self, stage: ComputedStage) -> bool {
         self.stages.send(stage).is_ok()
     }
 
-    /// Waits until the stages that were sent are stored, without delay for a larger commit, because the caller waits.
+    /// Waits until the task has stored the sent stages. Meanwhile the catalog does not delay commits.
     pub(super) async fn settle(self) -> Result<StoredStages, RunError> {
         let _flush = self.context.catalog.waiting().await?;
         drop(self.stages);
         task_result(self.task.await)
     }
 
-    /// Waits until the stages that were sent are stored, releases a lease that is left, and returns how the pair ended.
+    /// Waits until the task has stored the sent stages, and releases the lease if it is still held. Returns how the
+    /// pair ended.
     pub(super) async fn finish(self, end: PairEnd) -> PairReport {
         let context = Arc::clone(&self.context);
         let settled = if end == PairEnd::Done {
-            // No slot waits for this pair, so its last stages may share a commit with other pairs.
+            // No slot waits for this pair, so its commit may be delayed and shared with other pairs.
             drop(self.stages);
             task_result(self.task.await)
         } else {
@@ -143,8 +143,8 @@ async fn store_stages(
     })
 }
 
-/// Writes the files of a stage and of all stages that have arrived since. The second value is `false` when the run was
-/// stopped before all were written.
+/// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
+/// and `false` if an immediate stop left a stage unwritten.
 async fn write_batch(
     context: &RunContext,
     pair: &PairName,
@@ -171,7 +171,7 @@ async fn write_stage(
     if !write_files(context, pair, stage.stage, files).await? {
         return Ok(None);
     }
-    // The disk may have taken long, so the lease must be valid now, not when the stage was computed.
+    // Writing may have taken long. With these times, the lease must be valid after the writing.
     Ok(Some(StageCheckpoint {
         at: context.clock.now(),
         next_deadline: context.deadline(),
@@ -180,8 +180,8 @@ async fn write_stage(
     }))
 }
 
-/// Writes a stage's files durably, on a thread for blocking calls. Returns `false` without waiting for the disk if the
-/// run must stop at once.
+/// Writes a stage's files durably, on a thread for blocking calls. If an immediate stop is requested, returns `false`
+/// without waiting for the disk.
 ///
 /// # Errors
 /// Returns an error if the disk fails, or does not finish within the time limit.

@@ -1,8 +1,8 @@
-//! The bridge from async code to blocking code: the stages of a pair run one after another on a thread of their own.
+//! Computes the stages of a pair one after another on the pair's own thread, and reports them to async code.
 //!
-//! Each pair has its own thread instead of one from a pool, so that a stage that hangs past its deadline can be
-//! abandoned without taking a place from other pairs. The thread keeps the pair from stage to stage, because handing
-//! each stage to another thread leaves a core idle until the scheduler wakes that thread, often some milliseconds.
+//! Each pair has its own thread instead of one from a pool. A stage that hangs past its deadline can therefore be
+//! abandoned without blocking other pairs. All stages of a pair run on the same thread, because waking another thread
+//! for each stage can leave a core idle for some milliseconds.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,7 +21,7 @@ use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
 
-/// A computed stage: its row, and the files that must be on the disk before the row is stored.
+/// A computed stage: its catalog row, and the files that must be on the disk before the row is stored.
 pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);
 
 /// What happens on a pair's thread.
@@ -57,7 +57,7 @@ impl ComputeThread {
     /// Starts a thread that computes a pair's stages from `first` on.
     ///
     /// # Errors
-    /// Returns an error if the system cannot start a thread; the pair's data is lost then.
+    /// Returns an error if the system cannot start a thread. In that case the pair's data is lost.
     pub(super) fn start(
         context: Arc<RunContext>,
         first: Stage,
@@ -82,7 +82,7 @@ impl ComputeThread {
     }
 }
 
-/// Computes stages until there is no next one, one fails, or the receiver of the events is closed.
+/// Computes stages until none is left, a stage fails, or the receiver of the events is closed.
 fn run_stages(
     context: &RunContext,
     mut stage: Stage,

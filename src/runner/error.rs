@@ -4,7 +4,7 @@ use crate::catalog::{CatalogError, FieldChange};
 use crate::domain::PairName;
 use crate::store::{ArtifactError, LockError, StoreError};
 
-/// A reason for which a run cannot continue. A failed pair is not an error of the run; the summary counts it.
+/// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// Another process runs this project.
@@ -33,7 +33,7 @@ pub enum RunError {
     Artifact(#[from] ArtifactError),
 }
 
-/// Formats changed settings as ` (register.smoothing_px: 1.0 -> 1.5)`; returns nothing where none is known.
+/// Formats changed settings as ` (register.smoothing_px: 1.0 -> 1.5)`. Returns an empty text if no change is known.
 fn list(changes: &[FieldChange]) -> String {
     let changes: Vec<_> = changes.iter().map(ToString::to_string).collect();
     match changes.as_slice() {

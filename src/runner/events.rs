@@ -16,7 +16,7 @@ pub enum RunEvent {
     Started {
         /// Pairs with stages to run.
         pairs: u64,
-        /// Stages to run, all pairs together: the length of the overall progress bar.
+        /// Total number of stages to run, over all pairs.
         stages: u64,
         /// Pairs that each stage has to run for.
         by_stage: [u64; 4],
@@ -53,8 +53,7 @@ pub enum RunEvent {
         /// Class and message.
         #[serde(flatten)]
         failure: Failure,
-        /// Number of stages of the pair that will not run, including this one. The progress bar advances by this
-        /// number.
+        /// Number of the pair's stages that will not run, including the failed one. Progress bars advance by it.
         skipped: u64,
     },
     /// A stage failed in a way that may pass; it is retried later.
@@ -103,7 +102,7 @@ pub struct RunSummary {
     pub stages: u64,
     /// Selected pairs with stages left to run.
     pub left: u64,
-    /// Selected pairs that are quarantined now, by this run or an earlier one: exit code 3 if there are any.
+    /// Selected pairs that are quarantined, by this run or an earlier one. If there are any, the exit code is 3.
     pub failed_in_all: u64,
     /// Whether a signal stopped the run before everything was done.
     pub stopped: bool,

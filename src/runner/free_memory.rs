@@ -1,19 +1,19 @@
-//! The memory that this process can still take: what the machine has available, within the limits of its control
-//! groups. Everything is read from the files of Linux; on other systems nothing is known.
+//! Finds how much memory this process can still take: what the machine has available, within the limits of the control
+//! groups. Reads files of Linux. On other systems the amount is unknown.
 
 use std::path::{Path, PathBuf};
 
 /// Share of the free memory that a run takes by default.
 const SHARE: f64 = 0.8;
 
-/// Returns the memory limit of a run for which none was set, in bytes: 80 % of what is free now. `None` if the free
-/// memory is not known.
+/// Returns the default memory limit of a run in bytes: 80 % of the free memory. Returns `None` if the free memory is
+/// unknown.
 pub fn default_memory_limit() -> Option<u64> {
     let free = free_memory(Path::new("/"))?;
     Some((free as f64 * SHARE) as u64)
 }
 
-/// Returns the free memory in bytes, given the directory below which `proc` and the control groups are mounted.
+/// Returns the free memory in bytes. Reads `proc` and the control groups below `root`.
 fn free_memory(root: &Path) -> Option<u64> {
     let meminfo = std::fs::read_to_string(root.join("proc/meminfo")).ok();
     let machine = meminfo.as_deref().and_then(available);
@@ -34,7 +34,7 @@ fn available(meminfo: &str) -> Option<u64> {
 #[derive(Debug, PartialEq, Eq)]
 struct MemoryGroup {
     files: &'static GroupFiles,
-    /// Where the hierarchy is mounted. In a container this may be the container's own group.
+    /// Mount point of the control groups. In a container it may show only the container's own group.
     mount: PathBuf,
     /// The process's group: the mount point or a directory below it.
     dir: PathBuf,
@@ -43,10 +43,10 @@ struct MemoryGroup {
 /// Names of a control group's files.
 #[derive(Debug, PartialEq, Eq)]
 struct GroupFiles {
-    /// Files with a limit in bytes. The smallest number counts, and other text means no limit.
+    /// Files that contain a limit in bytes, or another text for no limit. The smallest limit applies.
     limits: &'static [&'static str],
     usage: &'static str,
-    /// Field of `memory.stat`: bytes of the usage that are cached file contents, which the kernel gives up first.
+    /// Field of `memory.stat` with the bytes of cached file contents. The kernel frees these first if memory is short.
     reclaimable: &'static str,
 }
 
@@ -62,15 +62,15 @@ const VERSION_2: GroupFiles = GroupFiles {
 };
 
 impl MemoryGroup {
-    /// Finds the group in the hierarchy that controls memory: version 1 where it is mounted, else version 2.
+    /// Finds the group that limits this process. Uses version 1 if it controls memory, otherwise version 2.
     fn of_this_process(root: &Path) -> Option<Self> {
         let groups = std::fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
         let mounts = std::fs::read_to_string(root.join("proc/self/mountinfo")).ok()?;
         let (files, path) = group_path(&groups)?;
         let (mount_root, mount) = mount_of(files, &mounts)?;
         let mount = root.join(mount.trim_start_matches('/'));
-        // A path outside the mounted part of the hierarchy belongs to another namespace: then the mount point itself
-        // is the nearest group that can be read.
+        // A path outside the mounted groups belongs to another namespace. In that case the nearest group that can be
+        // read is the mount point itself.
         let below = Path::new(path).strip_prefix(mount_root).ok();
         let dir = below
             .filter(|below| !below.starts_with(".."))
@@ -78,8 +78,8 @@ impl MemoryGroup {
         Some(Self { files, mount, dir })
     }
 
-    /// Returns the smallest amount of memory, in bytes, that is left to the group or any of its ancestors. Returns
-    /// `None` without a limit.
+    /// Returns how many bytes the group may still take within its own limits and those of its ancestors. Returns `None`
+    /// if there is no limit.
     fn free(&self) -> Option<u64> {
         let groups = self.dir.ancestors();
         let groups = groups.take_while(|dir| dir.starts_with(&self.mount));
@@ -105,8 +105,8 @@ impl GroupFiles {
     }
 }
 
-/// Finds the path of the memory group in `/proc/self/cgroup`: lines of `ID:CONTROLLERS:PATH`, where version 2 names no
-/// controllers.
+/// Finds the path of this process's memory group in the text of `/proc/self/cgroup`. Each line has the form
+/// `ID:CONTROLLERS:PATH`. For version 2, CONTROLLERS is empty.
 fn group_path(groups: &str) -> Option<(&'static GroupFiles, &str)> {
     let lines = || {
         groups
@@ -122,8 +122,8 @@ fn group_path(groups: &str) -> Option<(&'static GroupFiles, &str)> {
     version_1.map(|path| (&VERSION_1, path)).or_else(version_2)
 }
 
-/// Finds where a hierarchy is mounted in `/proc/self/mountinfo`: the group that the mount point shows, and the mount
-/// point. The fourth and the fifth field hold them; the file system and its options follow a lone `-`.
+/// Finds the mount of the control groups in the text of `/proc/self/mountinfo`. Returns the mounted group (fourth
+/// field) and the mount point (fifth field). The file system's type and options follow ` - `.
 fn mount_of<'m>(files: &GroupFiles, mounts: &'m str) -> Option<(&'m str, &'m str)> {
     mounts.lines().find_map(|line| {
         let (mount, file_system) = line.split_once(" - ")?;
@@ -151,7 +151,7 @@ mod tests {
         32 30 0:28 / /sys/fs/cgroup/memory rw - cgroup cgroup rw,memory\n";
     const MACHINE: u64 = 1 << 30;
 
-    /// Returns what is free on a machine with 1 GiB available and these further files.
+    /// Returns the free memory in bytes for a machine with these files and 1 GiB available.
     fn free(files: &[(&str, &str)]) -> Option<u64> {
         let root = tempfile::tempdir().expect("a temporary directory");
         let write = |path: &str, text: &str| {
@@ -169,7 +169,7 @@ mod tests {
         free_memory(root.path())
     }
 
-    /// Returns what is free for a process of a version 2 group, with files below `/sys/fs/cgroup`.
+    /// Returns the free memory in bytes for a process in `group` of version 2, with files below `/sys/fs/cgroup`.
     fn free_in_v2(group: &str, mount: &str, files: &[(&str, &str)]) -> Option<u64> {
         let groups = format!("0::{group}\n");
         let mut all = vec![
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_container_whose_group_is_mounted_as_the_root_is_limited_by_it() {
         let limit = [("memory.max", "5000"), ("memory.current", "1000")];
-        // In a namespace of its own; with the host's paths; and with a path outside the namespace.
+        // Three views: the group's own namespace, the host's paths, and a path outside the namespace.
         assert_eq!(free_in_v2("/", V2_MOUNT, &limit), Some(4000));
         let mount = V2_MOUNT.replace(" / /sys", " /docker/7f /sys");
         assert_eq!(free_in_v2("/docker/7f", &mount, &limit), Some(4000));

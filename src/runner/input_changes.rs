@@ -1,5 +1,5 @@
-//! Which input files have changed since they were read. Size, modification time and inode are compared first; only
-//! files that differ in them are hashed.
+//! Finds input files that have changed since they were read. A file is hashed only if its size, modification time or
+//! inode has changed.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
 
-/// Stores in the catalog which input files have changed. Files that no stage has read yet are left out.
+/// Stores the new versions of changed input files in the catalog. Files that no stage has read are skipped.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
@@ -40,8 +40,8 @@ pub(super) async fn store_changes(
     Ok(())
 }
 
-/// Stores the current input files of pairs that were quarantined because their workers died before a stage could
-/// report the files it had read. With them a later run notices whether a file was replaced.
+/// Stores the current input files of pairs that were quarantined because their workers died. The workers may not have
+/// reported the files that they read. A later run notices by these versions whether a file was replaced.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
@@ -76,7 +76,7 @@ fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
     }
 }
 
-/// Returns which input files of a pair have changed. Returns `None` if none has changed.
+/// Returns the new versions of a pair's changed input files. Returns `None` if no file has changed.
 fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersions)> {
     let changed = InputVersions {
         mesh: change(project, &known.mesh_path, known.mesh.as_ref()),
@@ -85,8 +85,8 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
     (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// Returns the current state of a file that differs from the known one. A missing file does not count as changed,
-/// because results computed from it stay valid, unless the manifest names another path than before.
+/// Returns the current version of a file if it may differ from the known version. A missing file counts as changed only
+/// if the manifest has named a new path since the file was read. Otherwise results computed from the file stay valid.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);

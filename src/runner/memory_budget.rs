@@ -1,4 +1,4 @@
-//! The memory that running pairs may take together, and an estimate of what each needs, from the sizes of its files.
+//! Limits the estimated memory of all running pairs together. Estimates follow from the sizes of the input files.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -9,14 +9,14 @@ use crate::domain::Stage;
 use crate::raster;
 use crate::store::Project;
 
-/// Bytes that any pair needs besides its files, for the maps and masks of the stages.
+/// Bytes reserved for the maps and masks of each pair, in addition to the memory for its mesh and print.
 const PAIR_BYTES: u64 = 32 << 20;
-/// Bytes needed for each byte of a mesh file, including the bytes of the file. Measured with one to two million
-/// vertices: binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5, OBJ 1.8, and 5.7 for an OBJ
-/// with normals or texture coordinates.
+/// Bytes needed per byte of a mesh file, including the file's content. Measured with one to two million vertices:
+/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5. For OBJ it is 1.8, or 5.7 with normals or
+/// texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
-/// Bytes needed for each pixel of a print. Measured with 10 and 28 million pixels, grey and colour: 32 to 39.
+/// Bytes needed per pixel of a print. Measured: 32 to 39, with grey and colour images of 10 and 28 million pixels.
 const PIXEL_BYTES: u64 = 50;
 /// Pixels assumed for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;
@@ -40,8 +40,8 @@ impl MemoryBudget {
         self.limit.is_some()
     }
 
-    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. A pair that needs more than the
-    /// limit is allowed if nothing else is reserved, and then no other pair runs at the same time.
+    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. If nothing is reserved, a pair may
+    /// exceed the limit; no other pair fits beside it.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);
@@ -62,7 +62,8 @@ impl MemoryBudget {
     }
 }
 
-/// Estimates the bytes that a pair needs at most from a stage on. A missing file counts as empty: its pair fails soon.
+/// Estimates the memory in bytes that a pair needs if it continues at stage `from`. A missing file counts as empty,
+/// because its pair soon fails.
 pub(super) fn estimated_bytes(
     project: &Project,
     pair: &PairAttributes,
@@ -94,8 +95,8 @@ fn mesh_bytes(path: &Path) -> u64 {
     (size(path) as f64 * factor) as u64
 }
 
-/// Estimates the bytes for a print, up to the largest one that is read. A small file may hold many pixels, so the
-/// number of pixels is read from its header where possible.
+/// Estimates the memory in bytes for a print from the pixel count in its header, because a small file may hold many
+/// pixels. If the header cannot be read, the file size decides. At most `images.max_pixels` pixels count.
 fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     let size = size(path);
     // A file without a size may be a pipe; reading it would block.

@@ -1,9 +1,9 @@
-//! The runner takes the pairs of a project through their stages, several at a time.
+//! Runs the stages of a project's pairs, several pairs at a time.
 //!
-//! `run` prepares a run and starts the `scheduler`, which starts a `pair_task` for each pair that `prefetch` leases.
-//! The task follows its pair's `compute_thread`, on which `stage_executor` calls the stages, and sends each computed
-//! stage to its `checkpointer`, which stores it while the next one is computed. `policy` decides what a failure leads
-//! to. The code map in `lib.rs` says where a lost lease is noticed.
+//! `run` prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
+//! `pair_task` and the task starts a `compute_thread`. The thread calls the stages through `stage_executor`. The task
+//! sends computed stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what
+//! follows a failure. The code map in `lib.rs` says where a lost lease is noticed.
 
 mod checkpointer;
 mod compute_thread;

@@ -1,4 +1,4 @@
-//! State of a pair between two stages: its row in the catalog, and the values that stages keep in memory.
+//! State of a pair between two stages: its data from the catalog, and the values that stages keep in memory.
 
 use std::collections::BTreeMap;
 
@@ -26,13 +26,13 @@ pub(super) struct StoredStage {
 pub(super) struct PairContext {
     /// The pair as imported.
     pub(super) attributes: PairAttributes,
-    /// The manifest attributes that results depend on, in the form that the catalog compares.
+    /// The manifest attributes that results depend on, as JSON. The catalog compares this text.
     pub(super) attributes_json: String,
     /// Results of earlier stages.
     pub(super) stored: BTreeMap<Stage, StoredStage>,
     /// Input files as read by this thread.
     pub(super) inputs: InputVersions,
-    /// The part of `inputs` that an earlier stage has reported to the catalog.
+    /// The `inputs` that were last reported to the catalog.
     reported: InputVersions,
     pub(super) scan: Option<Scan>,
     pub(super) print: Option<Print>,
@@ -67,7 +67,7 @@ impl PairContext {
         }
     }
 
-    /// Returns the input files as read, unless an earlier stage has reported the same.
+    /// Returns the input files as read. Returns no files if an earlier stage has reported the same versions.
     pub(super) fn unreported_inputs(&mut self) -> InputVersions {
         if self.reported == self.inputs {
             return InputVersions::default();
@@ -76,21 +76,21 @@ impl PairContext {
         self.inputs.clone()
     }
 
-    /// Returns the stored outcome of a stage. Returns `None` if there is none, or if it cannot be parsed as this type.
+    /// Returns the stored outcome of a stage. Returns `None` if the stage has none, or if it cannot be parsed as `T`.
     pub(super) fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Option<T> {
         let stored = self.stored.get(&stage)?;
         T::deserialize(&stored.outcome).ok()
     }
 
-    /// Returns the hash of the mesh that the results belong to: of the file that this thread read, or else of the file
-    /// that the fit read.
+    /// Returns the hash of the mesh file that this thread read. If it read none, returns the hash of the file that the
+    /// fit read.
     pub(super) fn mesh_hash(&self) -> Option<ContentHash> {
         let read = self.inputs.mesh.as_ref().map(|input| input.hash);
         read.or_else(|| Some(self.stored.get(&Stage::Fit)?.mesh_hash))
     }
 
-    /// Returns the hash of the print that the results belong to: of the file that this thread read, or else of the
-    /// file that the latest stage read. Returns `None` if no stage has read the print.
+    /// Returns the hash of the print file that this thread read. If it read none, returns the hash of the file that the
+    /// latest stage read. Returns `None` if no stage has read the print.
     pub(super) fn print_hash(&self) -> Option<ContentHash> {
         let read = self.inputs.print.as_ref().map(|input| input.hash);
         let mut stored = self.stored.values().rev();

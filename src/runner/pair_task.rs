@@ -1,5 +1,5 @@
-//! One pair's task: follows the thread that computes its stages, hands each computed stage to the checkpointer, and
-//! stores a failure.
+//! The task of one pair: receives each stage from the pair's compute thread, passes it to the checkpointer, and stores
+//! a failure.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub(super) enum PairOutcome {
     Storing(Checkpointer),
 }
 
-/// Computes the stages of a leased pair that have no current result, while the stages before them are stored.
+/// Computes the remaining stages of a leased pair. Earlier stages are stored while later stages are computed.
 pub(super) async fn process_pair(
     context: Arc<RunContext>,
     lease: Lease,
@@ -184,8 +184,8 @@ async fn store_failure(
     Ok(PairEnd::Retry)
 }
 
-/// Data of a pair that is stored with a failure. It is kept apart from the thread, so that it remains if the thread
-/// hangs or panics.
+/// Data of a pair that is stored with a failure. The task keeps this copy, because the thread's data is lost if the
+/// thread hangs or panics.
 struct PairSummary {
     attributes: PairAttributes,
     attributes_json: String,
@@ -201,8 +201,8 @@ impl PairSummary {
         }
     }
 
-    /// Returns the versions of the input files: as the thread read them, or the current ones of files that the thread
-    /// did not report. A later run compares the files with these versions to find out whether one was replaced.
+    /// Returns the versions of the input files that the thread reported. For an unreported file, returns the current
+    /// version. A later run notices by these versions whether a file was replaced.
     async fn inputs_now(&self, project: &Project) -> InputVersions {
         let read = self.inputs.clone();
         let paths = [&self.attributes.mesh_path, &self.attributes.print_path];

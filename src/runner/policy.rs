@@ -1,4 +1,4 @@
-//! The run's decisions without side effects: what a failure leads to, and the times by which workers know each other.
+//! Decisions of a run without side effects: what follows a failure, and the intervals of heartbeats and recovery.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -25,7 +25,7 @@ pub(super) struct FailedAttempt {
     pub(super) exclusive: bool,
 }
 
-/// Decides what a failed attempt leads to: a retry after a wait, a retry with no other pair beside it, or quarantine.
+/// Decides what follows a failed attempt: a retry after a wait, a retry while no other pair runs, or quarantine.
 pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureAction {
     match failed.class {
         FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
@@ -42,8 +42,9 @@ pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureA
     }
 }
 
-/// Returns `min(cap, base * 2^(attempt - 1))` times 0.5 to 1.5 in milliseconds. The factor is a hash of pair and
-/// attempt, so that pairs which failed together are not retried together, and a run can be reproduced.
+/// Returns the wait after an attempt in milliseconds: `min(cap, base * 2^(attempt - 1))` times a factor from 0.5 to
+/// 1.5. The factor is a hash of pair and attempt. It spreads the retries of pairs that failed together, and is the same
+/// in every run.
 fn backoff_ms(pair: PairId, attempt: u32) -> i64 {
     let doubled = BACKOFF_BASE.saturating_mul(1 << attempt.saturating_sub(1).min(16));
     let wait = doubled.min(BACKOFF_CAP).as_millis() as i64;
@@ -58,9 +59,9 @@ pub(super) const fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Intervals by which workers observe each other. The holder of a lease and the observers use the same lease length,
-/// each with its own clock, so that a worker also notices itself that others consider it dead. The pairs of a dead
-/// worker are ready again within a minute: one lease and two recovery intervals.
+/// Intervals of heartbeats and recovery. The holder of a lease and its observers use the same lease length, each with
+/// its own clock. A worker therefore also notices itself that it counts as dead. The pairs of a dead worker are ready
+/// again within a minute: one lease and two recovery intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timing {
     /// Interval between heartbeats.
@@ -69,7 +70,7 @@ pub(super) struct Timing {
     pub(super) lease: Duration,
     /// Interval between searches for dead workers.
     pub(super) recover_every: Duration,
-    /// Time after the deadline of a lease at which it is taken from a worker that still sends heartbeats.
+    /// A living worker loses a lease if its heartbeat is later than the lease's deadline by more than this.
     pub(super) deadline_margin: Duration,
 }
 
@@ -81,7 +82,7 @@ impl Timing {
         deadline_margin: Duration::from_mins(1),
     };
 
-    /// Returns the intervals of this build. With debug assertions, `MOCBAN_TIME_SCALE=N` divides them by N, for tests.
+    /// Returns the intervals of this build. With debug assertions, `MOCBAN_TIME_SCALE=N` divides them by N for tests.
     pub(super) fn of_this_build() -> Self {
         let scale = cfg!(debug_assertions)
             .then(|| std::env::var("MOCBAN_TIME_SCALE").ok()?.parse().ok())
@@ -105,8 +106,8 @@ impl Timing {
     }
 }
 
-/// Wall-clock time that is read once, at the start, and then only advances: a jump of the system's clock during a run
-/// does not move it.
+/// A clock that starts at the system's time and advances steadily. If the system's clock is changed during a run, this
+/// clock does not follow.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clock {
     start: UnixMillis,
@@ -215,7 +216,7 @@ mod tests {
             recover_every,
             ..
         } = Timing::DEFAULT;
-        // One search sees the last heartbeat for the first time, a later one sees the end of the lease.
+        // One search records the last heartbeat. A later search finds that a lease length has passed since.
         assert!(lease + recover_every * 2 <= Duration::from_mins(1));
         assert!(lease >= heartbeat_every * 4);
     }

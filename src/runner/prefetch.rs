@@ -1,5 +1,5 @@
-//! The pairs that this process has leased: running pairs, and a queue of pairs that start as soon as a slot is free, so
-//! that no core waits for a claim.
+//! The pairs that this process has leased: running pairs, and a queue of pairs that start when a slot becomes free.
+//! With the queue, no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
 use crate::domain::{PairName, WorkerId};
 use crate::raster;
 
-/// Pairs are claimed ahead for about this long, so that one claim serves all of them.
+/// How much work is claimed ahead for each slot, as computing time. Short pairs thereby share one claim.
 const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;
@@ -89,7 +89,7 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Records an event of a running pair. When the last stage of a pair starts, its slot will soon be free.
+    /// Records an event of a running pair. A slot counts as soon free when its pair starts the last stage.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
             && *stage == self.context.until
@@ -113,8 +113,8 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Claims pairs for slots that are free or soon become free. Returns `false` without a claim while no pairs are
-    /// needed or none can be found.
+    /// Claims pairs for slots that are free or soon become free. Returns `false`, and claims nothing, if no pair is
+    /// needed, if none may start yet, or if nothing has changed since the last claim.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
         let wanted = self.load().pairs_to_claim(self.durations.pairs_ahead());
         let is_blocked = self.is_exclusive || self.waits_for_memory;
@@ -133,7 +133,7 @@ impl Prefetch {
         Ok(())
     }
 
-    /// Takes the next pair to start, if a slot is free and the memory suffices.
+    /// Returns the next pair to start. Returns `None` if no slot is free, the queue is empty, or memory is short.
     pub(super) async fn next_pair(&mut self) -> Result<Option<LeasedPair>, RunError> {
         if self.free_slots() == 0 || self.waits_for_memory {
             return Ok(None);
@@ -144,7 +144,7 @@ impl Prefetch {
         if !self.memory.reserve(next.bytes) {
             self.waits_for_memory = true;
             self.durations.disable();
-            // Keep FIFO order, so that a large pair is not starved: release the whole queue, not only this pair.
+            // Release the whole queue, not only this pair. Otherwise smaller pairs could overtake a large pair forever.
             self.queue.push_front(next);
             self.release_all().await?;
             return Ok(None);
@@ -189,8 +189,8 @@ impl Prefetch {
         exclusive: bool,
     ) -> Result<(), RunError> {
         let context = &self.context;
-        // A pair that is claimed without a free slot may wait for as long as a stage may take. Its own time starts
-        // after that.
+        // If there are more pairs than free slots, some pairs first wait for another pair's last stage. The deadline is
+        // later by the longest time of a stage.
         let wait = if count > self.free_slots() {
             context.stage_timeout.as_millis() as i64
         } else {
@@ -233,7 +233,7 @@ impl Prefetch {
         run_blocking(move || leased.map(estimate).collect()).await
     }
 
-    /// Warns about a pair that may need more memory than all pairs together may take.
+    /// Warns if the memory estimate of a pair exceeds the limit for all running pairs together.
     fn warn_if_oversized(&self, pair: &LeasedPair) {
         if let Some(limit) = self.memory.exceeded_by(pair.bytes) {
             let (need, limit) = (pair.bytes >> 20, limit >> 20);
@@ -257,8 +257,8 @@ struct Load {
 }
 
 impl Load {
-    /// Returns how many pairs to claim, given the number of pairs that each slot claims ahead. Returns 0 while enough
-    /// pairs are queued.
+    /// Returns how many pairs to claim, or 0 if enough pairs are queued. `ahead_per_slot` is the number of pairs to
+    /// claim ahead for each slot.
     const fn pairs_to_claim(self, ahead_per_slot: usize) -> usize {
         match (self.free + self.soon_free).saturating_sub(self.queued) {
             0 => 0,
@@ -280,7 +280,7 @@ impl DurationEstimate {
         self.mean = Some(self.mean.map_or(elapsed, |mean| (mean * 3 + elapsed) / 4));
     }
 
-    /// Ends claiming ahead, because memory is short and pairs claimed ahead would have to be released.
+    /// Ends claiming ahead. If memory is short, pairs claimed ahead would have to be released again.
     const fn disable(&mut self) {
         self.is_disabled = true;
     }
@@ -303,7 +303,7 @@ mod tests {
 
     use super::{DurationEstimate, Load, MAX_AHEAD_PER_SLOT};
 
-    /// Returns how many pairs a slot claims ahead after pairs of these milliseconds.
+    /// Returns how many pairs a slot claims ahead after pairs that took these times in milliseconds.
     fn pairs_ahead(durations: &[u64]) -> usize {
         let mut estimate = DurationEstimate::default();
         for ms in durations {

@@ -1,4 +1,4 @@
-//! One run from start to end: takes the lock, recovers what dead processes left, finds the work, and runs the
+//! Runs a project from start to end: takes the lock, recovers the pairs of dead processes, finds the work, and runs the
 //! scheduler.
 
 use std::sync::Arc;
@@ -30,7 +30,8 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
 }
 
-/// Returns what [`run`] would do, for `--dry-run`. Compares the input files first, and stores which have changed.
+/// Returns what [`run`] would do, for `--dry-run`. First finds input files that have changed, and stores their new
+/// versions in the catalog.
 ///
 /// # Errors
 /// Returns an error if a named pair does not exist, or the catalog or the files cannot be used.
@@ -48,11 +49,11 @@ pub async fn plan(
         .await?)
 }
 
-/// Runs every stage that has no current result. Calls `on_event` as things happen.
+/// Runs every stage that has no current result. Passes each event of the run to `on_event`.
 ///
 /// # Errors
-/// Returns an error if another process runs the project, a named pair does not exist, or the catalog or the disk
-/// cannot be used.
+/// Returns an error if a named pair does not exist, or if the catalog or the disk cannot be used. Returns an error if
+/// another process runs the project, unless this run joins it with the same settings.
 pub async fn run(
     project: &Project,
     catalog: &Catalog,
@@ -124,7 +125,7 @@ pub(super) async fn run_with(
     });
     let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
     let counts = scheduler.run(&mut received, &mut on_event).await;
-    // Also after an error the worker is ended in the catalog. Otherwise the next run would count a crash.
+    // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let ended = catalog.end_worker(scheduler.worker(), clock.now()).await;
     let counts = counts?;
     ended?;
@@ -144,8 +145,8 @@ struct RunStart<'a> {
 }
 
 impl RunStart<'_> {
-    /// Recovers pairs of dead processes, requeues pairs whose results are stale or requested again, makes pairs ready
-    /// whose back-off is over, and reports how much work there is.
+    /// Recovers pairs of dead processes, requeues pairs to run again, and ends back-offs that are due. Reports how much
+    /// work there is.
     async fn prepare(
         &self,
         lock: &mut RunLock,
@@ -173,8 +174,8 @@ impl RunStart<'_> {
         Ok(())
     }
 
-    /// Recovers the leases of dead processes if the lock proves that no other process is running, then lets other
-    /// processes join. Returns how many pairs are ready again.
+    /// Recovers the leases of dead processes, then lets other processes join. Does nothing if another process may be
+    /// running. Returns how many pairs are ready again.
     async fn recover(&self, lock: &mut RunLock, worker: WorkerId) -> Result<u64, RunError> {
         if !lock.is_exclusive() {
             return Ok(0);
@@ -189,7 +190,7 @@ impl RunStart<'_> {
     }
 }
 
-/// Refuses settings that differ from those of the processes that work already; the first process defines them.
+/// Refuses settings that differ from those of the run in progress. The first process defines the settings of a run.
 async fn require_same_settings(
     catalog: &Catalog,
     lock: &mut RunLock,

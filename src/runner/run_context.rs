@@ -1,4 +1,4 @@
-//! What the parts of a run share, and what a pair's task reports at its end.
+//! Data shared by the tasks of a run, and the report of a pair's task.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -66,7 +66,7 @@ impl RunContext {
         self.stop.level().max(self.drain.level()) >= StopLevel::Drain
     }
 
-    /// Returns the stage to run after `done`; `None` at the end of the run's stages or while the run drains.
+    /// Returns the stage after `done`. Returns `None` if `done` is the run's last stage, or if no new stage may begin.
     pub(super) fn next_stage(&self, done: Stage) -> Option<Stage> {
         done.next()
             .filter(|next| *next <= self.until && !self.is_draining())
@@ -77,7 +77,8 @@ impl RunContext {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }
 
-    /// Returns the oldest heartbeat of this process with which its leases are still valid.
+    /// Returns the start of the current lease period. Leases are valid if the last heartbeat is not older than this
+    /// time.
     pub(super) fn alive_since(&self) -> UnixMillis {
         self.clock.now() - self.timing.lease_ms()
     }
@@ -90,7 +91,7 @@ impl RunContext {
 
     /// Sends an event to the caller of the run.
     pub(super) fn emit(&self, event: RunEvent) {
-        // After a fatal error the receiver is gone; the event has no reader then.
+        // Sending fails after a fatal error, because the receiver is gone. Nobody needs the event in that case.
         let _ = self.events.send(event);
     }
 }

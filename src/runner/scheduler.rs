@@ -1,4 +1,4 @@
-//! The main loop of a run: keeps the slots filled, handles pairs that end, and keeps this worker alive in the catalog.
+//! The main loop of a run: fills the slots, handles pairs that end, and stores this worker's heartbeats.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,8 +23,7 @@ use crate::domain::{PairName, WorkerId};
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
 
-/// Largest number of computed pairs per slot that are not stored yet. The limit exists because their results are in
-/// memory.
+/// Limit of pairs per slot whose results are in memory because they are not stored yet. At the limit, no pair starts.
 const MAX_STORING_PER_SLOT: usize = 8;
 
 /// What a run has counted.
@@ -86,7 +85,8 @@ impl Scheduler {
         self.session.worker()
     }
 
-    /// Runs until nothing is left to do or the run is stopped. Returns what was counted, or the error that ended it.
+    /// Runs until nothing is left to do or the run is stopped. Returns the run's counts, or the error that ended the
+    /// run.
     pub(super) async fn run(
         &mut self,
         events: &mut mpsc::UnboundedReceiver<RunEvent>,
@@ -121,7 +121,7 @@ impl Scheduler {
         }
     }
 
-    /// Starts pairs in free slots. Returns whether the run is over: nothing is in progress and nothing can follow.
+    /// Starts pairs in free slots. Returns `true` if the run is over: no pair is in progress and none can follow.
     async fn fill_slots(&mut self) -> Result<bool, RunError> {
         if self.context.is_draining() || self.fatal.is_some() {
             self.prefetch.release_all().await?;
@@ -135,7 +135,7 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // No other pair is ready or in progress: now claim the pairs that must run exclusively.
+        // No other pair is ready or in progress, so a pair that must run alone can be claimed.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {
@@ -161,9 +161,9 @@ impl Scheduler {
         self.computing.is_empty() && self.storing.is_empty()
     }
 
-    /// Lets the catalog delay commits while all slots are busy and few pairs wait to be stored. In all other cases
-    /// commits are immediate: the next pair or the end of the run may wait for them, and a pair that runs alone must
-    /// be stored before it can be blamed for the death of its process.
+    /// Turns the catalog's commit delay off if a slot is free and a pair is being stored, or if more than half of
+    /// `max_storing` pairs are being stored. Otherwise commits may be delayed. With a free slot, the end of the run or
+    /// a pair that must run alone may wait for the commit.
     async fn flush_where_needed(&mut self) -> Result<(), RunError> {
         let is_slot_free = self.prefetch.free_slots() > 0 && !self.storing.is_empty();
         let is_needed = is_slot_free || self.storing.len() > self.max_storing / 2;
@@ -232,7 +232,7 @@ impl Scheduler {
         });
     }
 
-    /// Makes pairs ready whose back-off is over, and lets the next claim look for pairs that other workers released.
+    /// Ends back-offs that are due, and lets the next claim look for pairs that other workers released.
     async fn poll(&mut self) -> Result<(), RunError> {
         if self.context.is_draining() {
             return Ok(());
@@ -250,8 +250,8 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Stores a heartbeat. If the process was suspended past the end of its leases, it goes on as a new worker; if the
-    /// catalog cannot be written for as long as a lease lasts, the run ends.
+    /// Stores a heartbeat. If the leases expired while the process was suspended, registers it as a new worker. If no
+    /// heartbeat could be stored for the length of a lease, ends the run.
     async fn heartbeat(&mut self) -> Result<(), RunError> {
         match self.session.heartbeat(&self.context).await {
             HeartbeatOutcome::Alive => {}

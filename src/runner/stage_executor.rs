@@ -1,4 +1,4 @@
-//! Runs the stages of a pair: reads what a stage needs, calls the pure stage, and encodes what it returns.
+//! Runs the stages of a pair: reads the inputs of a stage, calls its pure function, and encodes the result.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -16,7 +16,7 @@ use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
 use crate::store::Project;
 
-/// Runs stages on a pair's thread. Tests replace it by stages that fail or hang.
+/// Runs stages on a pair's thread. In tests, a fake executor has stages that fail or hang.
 pub(super) trait StageExecutor: Send + Sync + 'static {
     /// Runs a stage, and leaves in the pair what later stages need.
     fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError>;
@@ -68,7 +68,7 @@ impl PipelineExecutor {
 
     fn depth(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let fit = StageInputs::fit(pair)?;
-        // No later stage needs the scan: it is dropped here, so that another pair can use its memory.
+        // This function drops the scan, because no later stage needs it. Another pair can then use the memory.
         let scan = self.inputs.fitted_scan(pair)?;
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
@@ -117,7 +117,8 @@ impl PipelineExecutor {
         let normalized = self.inputs.normalized(pair)?;
         let registered =
             pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
-                // The mesh is the likelier cause, unless the print may be of another character.
+                // The error names the mesh, the likelier cause. If nothing matches, it names the print, which may show
+                // another character.
                 let path = match error {
                     RegisterError::NoMatch { .. } => &pair.attributes.print_path,
                     _ => &pair.attributes.mesh_path,
@@ -141,10 +142,10 @@ fn in_file(path: &str, error: &StageError) -> ExecutionError {
     ExecutionError::failed(error.class(), format!("{path}: {error}"))
 }
 
-/// Returns an outcome as a later run would read it back, and its JSON.
+/// Encodes an outcome as JSON. Returns the outcome as a later run would decode it, and the JSON.
 ///
 /// # Errors
-/// Returns an error if a number is not finite, which JSON cannot hold.
+/// Returns an error if a number is not finite, because JSON cannot hold it.
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq>(
     outcome: &T,
 ) -> Result<(T, Value), ExecutionError> {

@@ -1,4 +1,4 @@
-//! What the stages read: input files, and results of earlier stages from memory or from their artifacts.
+//! Reads the inputs of stages: input files, and results of earlier stages from memory or from artifacts.
 
 use super::options::RunOptions;
 use super::pair_context::PairContext;
@@ -35,8 +35,8 @@ impl StageInputs {
             .ok_or(ExecutionError::RerunFrom(Stage::Fit))
     }
 
-    /// Returns the fitted scan from memory, or reads its file. If the file has changed since the fit, the fit runs
-    /// again.
+    /// Returns the fitted scan from memory, or reads the mesh file again. If the file has changed since the fit,
+    /// returns an error that makes the fit run again.
     pub(super) fn fitted_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         if let Some(scan) = pair.scan.take() {
             return Ok(scan);
@@ -50,7 +50,8 @@ impl StageInputs {
         Err(ExecutionError::RerunFrom(Stage::Fit))
     }
 
-    /// Returns the print from memory, or reads its file. If the fit has read another print, the fit runs again.
+    /// Returns the print from memory, or reads its file. If the file has changed since the fit read it, the fit runs
+    /// again.
     pub(super) fn print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         if let Some(print) = pair.print.take() {
             return Ok(print);
@@ -95,7 +96,7 @@ impl StageInputs {
         Ok(Normalized { outcome, prints })
     }
 
-    /// Reads an artifact of an earlier stage. If the artifact is missing or was changed, that stage runs again.
+    /// Reads an artifact of an earlier stage. If the artifact is missing or was changed, the earlier stage runs again.
     fn artifact(
         &self,
         pair: &PairContext,

@@ -1,4 +1,4 @@
-//! What a stage returns to the runner: numbers and files with the hashes that identify them, or an error.
+//! Result of a stage: numbers and files with the hashes that identify them, or an error.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ pub(super) struct StageOutput {
 /// Why a stage returned nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ExecutionError {
-    /// The result of an earlier stage is missing, or belongs to other inputs: run again from that stage on.
+    /// The result of an earlier stage is missing, or belongs to other inputs. The pair runs again from that stage on.
     RerunFrom(Stage),
     /// The stage failed.
     Failed {
@@ -90,8 +90,7 @@ pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid
     })
 }
 
-/// Decodes an image from [`encode_print_masks`]. An uninterrupted run uses the decoded masks too, so that a resumed run
-/// computes the same.
+/// Decodes an image from [`encode_print_masks`]. An uninterrupted run also uses decoded masks, as a resumed run must.
 pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     PrintMasks {
         ink: grey.map(|grey| *grey == INK),
@@ -99,13 +98,13 @@ pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     }
 }
 
-/// Returns the hash of a stage's result: its numbers and its files, no times.
+/// Returns the hash of a stage's numbers and files. Times are not included.
 pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     let result = json!({ "outcome": outcome, "files": files });
     ContentHash::of(result.to_string().as_bytes())
 }
 
-/// Adds to each metric the hash that verdicts are bound to: over the numbers and the images that a reviewer sees.
+/// Adds a hash to each metric. It covers the numbers and images that a reviewer sees, and verdicts refer to it.
 pub(super) fn metric_results(
     metrics: &[MetricOutcome],
     files: &ArtifactSet,
@@ -132,8 +131,8 @@ pub(super) fn metric_results(
     metrics.iter().map(with_hash).collect()
 }
 
-/// Returns the numbers that a reviewer judges: all but the confidence, so that a new calibration of the same alignment
-/// keeps its verdicts.
+/// Returns the numbers that a reviewer judges: all except the confidence. A new calibration of the confidence keeps the
+/// verdicts valid.
 fn without_confidence(outcome: &MetricOutcome) -> Value {
     let mut numbers = json!(outcome);
     if let Value::Object(fields) = &mut numbers {

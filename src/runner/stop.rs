@@ -36,7 +36,7 @@ impl Stop {
         Self::default()
     }
 
-    /// Raises the request by one level, first to a drain, then to an immediate stop; returns the new level.
+    /// Raises the request by one level: first to a drain, then to an immediate stop. Returns the new level.
     pub fn escalate(&self) -> StopLevel {
         self.level.send_modify(|level| *level = level.next());
         self.level()

@@ -1,4 +1,4 @@
-//! This process as a worker of the catalog: registration, heartbeats, and recovery of the pairs of dead workers.
+//! Registers this process as a worker in the catalog, stores its heartbeats, and recovers the pairs of dead workers.
 
 use std::collections::BTreeMap;
 
@@ -20,10 +20,9 @@ pub(super) struct WorkerSession {
 /// What became of a heartbeat.
 #[derive(Debug)]
 pub(super) enum HeartbeatOutcome {
-    /// The worker's leases are valid. The heartbeat was stored, or it failed and can be retried before the leases
-    /// expire.
+    /// The worker's leases are valid. Either the heartbeat was stored, or it failed and can be retried in time.
     Alive,
-    /// The heartbeat came after the leases had expired, so another worker may hold the pairs now.
+    /// The heartbeat came after the leases had expired. Another worker may have leased the pairs since.
     Expired,
     /// No heartbeat could be stored for as long as a lease lasts.
     Unwritable(CatalogError),
@@ -70,7 +69,7 @@ impl WorkerSession {
     }
 
     /// Registers the process as a new worker after its leases expired. Pairs that the old worker still holds become
-    /// ready again, and nothing that was computed under its leases can be stored.
+    /// ready again. Stages that are being computed under the old leases cannot be stored.
     pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let expired = self.worker;
@@ -84,7 +83,8 @@ impl WorkerSession {
         Ok(())
     }
 
-    /// Recovers the leases of dead workers and leases past their deadline. Returns how many pairs are ready again.
+    /// Recovers the leases of dead workers, and leases that other workers hold long past the deadline. Returns how many
+    /// pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let holders = catalog.lease_holders().await?;
@@ -105,8 +105,8 @@ impl WorkerSession {
     }
 }
 
-/// Finds dead workers. A worker is dead if its heartbeat did not change for the length of a lease, by the clock of
-/// this process. The clocks of two machines are never compared.
+/// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this
+/// process. The clocks of two machines are never compared.
 #[derive(Debug)]
 struct Liveness {
     lease_ms: i64,

@@ -14,7 +14,7 @@ use crate::runner::stage_executor::StageExecutor;
 use crate::runner::stage_output::{ExecutionError, StageOutput};
 use crate::store::NewArtifact;
 
-/// Runs fake stages: the part of a pair's name before the first `_` selects what its stages do.
+/// Runs fake stages. The part of a pair's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]
 pub(super) struct FakeExecutor {
     /// How often each stage of each pair was computed.

@@ -1,4 +1,4 @@
-//! Tests of what runs while stages are being stored, and of which pairs are claimed ahead.
+//! Tests of pairs that are claimed ahead, and of stages that are computed while others are being stored.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -87,7 +87,7 @@ async fn finished_stages_are_stored_while_a_long_stage_is_computed() {
     assert_eq!((summary.done, summary.stages), (1, 4));
 }
 
-/// Less than the interval between heartbeats, which flush delayed commits.
+/// Shorter than the interval between heartbeats, because a heartbeat ends the delay of commits.
 const SOON: Duration = Duration::from_secs(8);
 
 #[tokio::test]
@@ -148,7 +148,7 @@ async fn the_next_pair_is_claimed_ahead_and_released_by_a_drain() {
     assert_eq!(fixture.status("other").await, JobStatus::Ready);
 }
 
-/// The run does not delay commits either while it could start pairs.
+/// The run does not delay commits while it could start pairs.
 #[tokio::test]
 async fn no_more_pairs_start_than_the_disk_keeps_up_with() {
     let names: Vec<String> = (0..60).map(|number| format!("pair_{number}")).collect();
@@ -182,7 +182,7 @@ async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
     assert_eq!(summary.done, 5);
 }
 
-/// A claimed pair may wait for the pair before it for as long as a stage may take. Its own time starts after that.
+/// A pair claimed ahead may wait as long as one stage may take. Its own time limit starts after that.
 #[tokio::test]
 async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     let fixture = RunFixture::new(&["lasts_1", "next"]).await;
@@ -194,7 +194,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
         while fixture.status("next").await != JobStatus::Leased {
             tokio::task::yield_now().await;
         }
-        // Pretend that the worker has been running for one and a half times that long.
+        // Store a heartbeat that lies one and a half time limits of a stage ahead.
         let (me, other) = (WorkerId(1), WorkerId(99));
         let heartbeat = fixture
             .catalog
@@ -210,7 +210,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     assert_eq!(summary.done, 2);
 }
 
-/// One claim leases all pairs. A pair that does not fit into memory is released before the first pair ends.
+/// One claim leases all pairs. If a pair does not fit into memory, its lease is released before the first pair ends.
 #[tokio::test]
 async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
     let fixture = RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await;
