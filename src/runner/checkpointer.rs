@@ -171,7 +171,7 @@ async fn write_stage(
     if !write_files(context, pair, stage.stage, files).await? {
         return Ok(None);
     }
-    // Writing may have taken long. With these times, the lease must be valid after the writing.
+    // Take the times here, because writing may be slow and the lease must be valid afterwards.
     Ok(Some(StageCheckpoint {
         at: context.clock.now(),
         next_deadline: context.deadline(),

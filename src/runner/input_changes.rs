@@ -41,7 +41,7 @@ pub(super) async fn store_changes(
 }
 
 /// Stores the current input files of pairs that were quarantined because their workers died. The workers may not have
-/// reported the files that they read. A later run notices by these versions whether a file was replaced.
+/// reported the files that they read. Later runs compare the files with these versions to notice a replacement.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,

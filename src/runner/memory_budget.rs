@@ -1,4 +1,4 @@
-//! Limits the estimated memory of all running pairs together. Estimates follow from the sizes of the input files.
+//! Limits the memory of all running pairs together. The memory of a pair is estimated from its input files.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -41,7 +41,7 @@ impl MemoryBudget {
     }
 
     /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. If nothing is reserved, a pair may
-    /// exceed the limit; no other pair fits beside it.
+    /// exceed the limit. In that case no other pair fits beside it.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);

@@ -202,7 +202,7 @@ impl PairSummary {
     }
 
     /// Returns the versions of the input files that the thread reported. For an unreported file, returns the current
-    /// version. A later run notices by these versions whether a file was replaced.
+    /// version. Later runs compare the files with these versions to notice a replacement.
     async fn inputs_now(&self, project: &Project) -> InputVersions {
         let read = self.inputs.clone();
         let paths = [&self.attributes.mesh_path, &self.attributes.print_path];

@@ -60,7 +60,7 @@ pub(super) const fn longest_backoff_ms() -> i64 {
 }
 
 /// Intervals of heartbeats and recovery. The holder of a lease and its observers use the same lease length, each with
-/// its own clock. A worker therefore also notices itself that it counts as dead. The pairs of a dead worker are ready
+/// its own clock. A worker therefore notices that others may consider it dead. The pairs of a dead worker are ready
 /// again within a minute: one lease and two recovery intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timing {

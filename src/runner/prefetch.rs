@@ -15,7 +15,7 @@ use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
 use crate::domain::{PairName, WorkerId};
 use crate::raster;
 
-/// How much work is claimed ahead for each slot, as computing time. Short pairs thereby share one claim.
+/// How much work is claimed ahead for each slot, as computing time. One claim then serves several short pairs.
 const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;
@@ -144,7 +144,7 @@ impl Prefetch {
         if !self.memory.reserve(next.bytes) {
             self.waits_for_memory = true;
             self.durations.disable();
-            // Release the whole queue, not only this pair. Otherwise smaller pairs could overtake a large pair forever.
+            // Release the whole queue, not only this pair. Otherwise smaller pairs could keep overtaking it.
             self.queue.push_front(next);
             self.release_all().await?;
             return Ok(None);

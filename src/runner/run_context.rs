@@ -77,8 +77,7 @@ impl RunContext {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }
 
-    /// Returns the start of the current lease period. Leases are valid if the last heartbeat is not older than this
-    /// time.
+    /// Returns the current time minus one lease length. Leases are valid if the last heartbeat is not older.
     pub(super) fn alive_since(&self) -> UnixMillis {
         self.clock.now() - self.timing.lease_ms()
     }

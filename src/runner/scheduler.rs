@@ -23,7 +23,7 @@ use crate::domain::{PairName, WorkerId};
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
 
-/// Limit of pairs per slot whose results are in memory because they are not stored yet. At the limit, no pair starts.
+/// Limit of computed but unstored pairs per slot. At the limit no pair starts, because unstored results take memory.
 const MAX_STORING_PER_SLOT: usize = 8;
 
 /// What a run has counted.

@@ -90,7 +90,7 @@ pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid
     })
 }
 
-/// Decodes an image from [`encode_print_masks`]. An uninterrupted run also uses decoded masks, as a resumed run must.
+/// Decodes an image from [`encode_print_masks`]. Every run uses the decoded masks, so that a resumed run has the same.
 pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     PrintMasks {
         ink: grey.map(|grey| *grey == INK),

@@ -20,7 +20,7 @@ pub(super) struct WorkerSession {
 /// What became of a heartbeat.
 #[derive(Debug)]
 pub(super) enum HeartbeatOutcome {
-    /// The worker's leases are valid. Either the heartbeat was stored, or it failed and can be retried in time.
+    /// The worker's leases are valid. Either the heartbeat was stored, or there is still time to retry it.
     Alive,
     /// The heartbeat came after the leases had expired. Another worker may have leased the pairs since.
     Expired,

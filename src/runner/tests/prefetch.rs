@@ -194,7 +194,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
         while fixture.status("next").await != JobStatus::Leased {
             tokio::task::yield_now().await;
         }
-        // Store a heartbeat that lies one and a half time limits of a stage ahead.
+        // Store a heartbeat dated one and a half stage timeouts ahead.
         let (me, other) = (WorkerId(1), WorkerId(99));
         let heartbeat = fixture
             .catalog
