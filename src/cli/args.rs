@@ -1,4 +1,4 @@
-//! The command line as clap parses it: global flags and the list of commands.
+//! The command line, parsed with clap: global flags and the list of commands.
 
 use std::ffi::OsString;
 
@@ -70,7 +70,7 @@ pub(super) enum Command {
     Man(man::ManArgs),
 }
 
-/// Returns the command line with help texts as a terminal shows them: without backticks.
+/// Returns the clap command. Backticks are removed from its help texts.
 pub(super) fn command() -> clap::Command {
     without_backticks(Cli::command())
 }
@@ -94,7 +94,7 @@ fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
     })
 }
 
-/// Letters of the flags that take no value. Another letter may follow such a flag in the same word, as in `-nv`.
+/// Letters of the flags that take no value. Such a letter can be followed by another flag, as in `-nv`.
 const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 
 /// Parses a command line.
@@ -107,7 +107,7 @@ pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     Ok(cli)
 }
 
-/// Counts `-v` on a command line that clap has accepted, where a word that starts with a dash is never a value.
+/// Counts `-v`. Requires a command line that clap has accepted, because it assumes that no value starts with a dash.
 fn count_verbose(args: &[OsString]) -> u8 {
     let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
     let words = words.take_while(|word| *word != "--");

@@ -1,4 +1,4 @@
-//! `backup`: copies catalog, verdicts and settings consistently, also during a run.
+//! `backup`: copies catalog, verdicts and settings. The copy is consistent even during a run.
 
 use std::path::{Path, PathBuf};
 
@@ -43,8 +43,8 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         Ok(bytes) => Some(prepare(&settings_file, &bytes)?),
         Err(_) => None,
     };
-    // All files are written before the first one is renamed, and the catalog is renamed last. If a renaming fails, the
-    // files beside the catalog are restored from the previous backup.
+    // Rename no file until all are written, and rename the catalog last. If a renaming fails, restore the other files
+    // from the previous backup.
     let previous =
         [verdicts_file(file), settings_file.clone()].map(|file| PreviousFile::save(&file));
     let renamed = rename(&log, &verdicts_file(file))
@@ -83,7 +83,7 @@ impl PartialFile {
     }
 
     fn clear(&self) {
-        // Usually no such file exists. If an existing file cannot be removed, writing the copy fails later.
+        // Usually no such file exists. If a file cannot be removed, writing the copy fails later.
         remove_database(&self.0);
     }
 }
@@ -102,7 +102,7 @@ struct PreviousFile {
 }
 
 impl PreviousFile {
-    /// Saves a file. Returns `None` if it cannot be saved. In that case the new file stays if a later renaming fails.
+    /// Saves a file so that it can be restored. Returns `None` if it cannot be saved.
     fn save(file: &Path) -> Option<Self> {
         let mut name = file.as_os_str().to_owned();
         name.push(".earlier");
@@ -119,7 +119,7 @@ impl PreviousFile {
     }
 
     fn restore(&self) {
-        // The error that led here is reported. Nothing can be done if restoring fails too.
+        // The caller reports the failed renaming. If restoring fails too, nothing can be done.
         let _ = if self.existed {
             std::fs::rename(&self.saved.0, &self.file)
         } else {
@@ -149,8 +149,8 @@ fn rename(partial: &PartialFile, file: &Path) -> anyhow::Result<()> {
     rename_into_place(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
 }
 
-/// Removes the settings file of the previous backup, for a project without a settings file. A restored project would
-/// otherwise use the old settings.
+/// Removes the settings file of the previous backup if the project has none. Otherwise a restored project would use the
+/// old settings.
 fn remove(file: &Path) -> anyhow::Result<()> {
     match std::fs::remove_file(file) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

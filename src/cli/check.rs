@@ -36,7 +36,7 @@ const MAX_LISTED: usize = 5;
 pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let mut checked = once(&args, context).await;
     if is_database_damage(&checked) {
-        // SQLite reports some read errors of the disk as damage. So check again, and then read the file itself.
+        // SQLite reports some disk read errors as damage. Check again, and then test whether the file can be read.
         checked = once(&args, context).await;
     }
     let path = context.dir().join(CATALOG_FILE);
@@ -58,8 +58,8 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
     })
 }
 
-/// Checks the project. Without `--repair` nothing is changed, and a run may be active. A repair requires that no
-/// other process works on the project, and holds the run's lock.
+/// Checks the project. Without `--repair`, nothing is changed and a run may be active. A repair holds the run's lock,
+/// and fails if another process works on the project.
 async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
     let (project, catalog) = if args.repair {
         context.open().await?

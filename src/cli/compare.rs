@@ -5,7 +5,7 @@ use crate::report::{MetricRow, Report};
 
 /// Formats the numbers of both projects and their differences, one line per metric and number.
 ///
-/// The numbers are those of the report tables, so the projects may have different pairs.
+/// The numbers come from the report tables, so the projects may contain different pairs.
 pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> String {
     let head = ["", "", names[0], names[1], "difference"];
     let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];

@@ -69,7 +69,7 @@ pub(super) async fn contact_sheet(
 /// Draws the sheet, writes it and returns its path.
 ///
 /// # Errors
-/// Returns an error if no pair is finished, or the catalog or the disk fails.
+/// Returns an error if no pair to draw has a result of the metric, or if the catalog or the disk fails.
 pub(super) async fn write(
     args: &ContactSheetArgs,
     context: &Context,

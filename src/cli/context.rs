@@ -50,7 +50,7 @@ impl Context {
         context
     }
 
-    /// Returns the same context without the flags that change settings. Used if the project's file has these settings.
+    /// Returns the same context without `--config` and `--set`, because the project's file contains their settings.
     pub(super) fn without_setting_flags(&self) -> Self {
         let mut context = self.clone();
         context.global.config = None;
@@ -88,7 +88,7 @@ impl Context {
         }
     }
 
-    /// Suggests the next command for this project on stderr, ready to be copied into a shell.
+    /// Suggests the next command for this project on stderr. The text can be copied into a shell.
     pub(super) fn next(&self, tail: &str) {
         self.next_command(&self.command(tail));
     }
@@ -156,7 +156,7 @@ impl Context {
     }
 
     /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
-    /// settings are invalid, because that error is reported elsewhere.
+    /// settings are invalid.
     pub(super) async fn warn_about_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
         let Ok(settings) = self.settings() else {
             return Ok(());
@@ -173,7 +173,7 @@ impl Context {
         Ok(())
     }
 
-    /// Returns a command for this project with the same settings, ready to be copied into a shell.
+    /// Returns a command for this project with the same settings. The text can be copied into a shell.
     pub(super) fn command(&self, tail: &str) -> String {
         let mut words = vec![self.program.clone()];
         if let Some(dir) = &self.global.directory {
@@ -202,7 +202,7 @@ pub(super) fn now() -> UnixMillis {
         .map_or(0, |since| since.as_millis() as UnixMillis)
 }
 
-/// Returns the path by which the program was called, or its bare name if the shell found it on the path.
+/// Returns the path by which the program was called, or `mocban` if the shell found it through `PATH`.
 fn program_name(called: Option<&OsString>) -> String {
     let called = called.map(|name| name.to_string_lossy().into_owned());
     match called {

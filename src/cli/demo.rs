@@ -144,7 +144,7 @@ const NOTE: &str = "README.txt";
 const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their prints, with the true \
 alignments.\nCreated by `mocban demo`, which creates it again if it is incomplete; do not put your own files here.\n";
 
-/// Refuses a directory that holds other files than this demo, before anything is overwritten.
+/// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
 fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(), Refusal> {
     let refuse = |reason: &str| {
         let shown = dir.display();
@@ -181,9 +181,9 @@ fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(),
     }
 }
 
-/// Saves settings given by flags in the project's file, so that later commands use them too.
+/// Saves the settings of `--config` and `--set` in the project's settings file, for later commands.
 ///
-/// An existing file with other settings is not changed. In that case the flags apply to this call only.
+/// A file with other settings is not changed. In that case the flags apply to this call only.
 fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     let global = &context.global;
     if global.config.is_none() && global.set.is_empty() {
@@ -210,8 +210,8 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     Ok(context.without_setting_flags())
 }
 
-/// Formats a settings file with the settings that a preset, a file or flags change. Settings from environment variables
-/// are left out, because the environment does not belong to the project.
+/// Formats the settings of a preset, a file or flags as a settings file. Settings from environment variables are left
+/// out, because the environment does not belong to the project.
 fn changed_settings(tree: &Tree) -> String {
     let mut preset = "";
     let mut changed = Vec::new();

@@ -44,7 +44,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
 }
 
-/// Returns the message for an error: the explanation of a catalog error if there is one, otherwise the chain of causes.
+/// Returns the message for an error: the explanation of a catalog error, or otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     explained.unwrap_or_else(|| join_causes(error))
@@ -64,7 +64,7 @@ fn join_causes(error: &anyhow::Error) -> String {
     text
 }
 
-/// Returns whether the output was closed by its reader, as in `mocban report | head`. This is not a failure.
+/// Returns whether the reader of the output closed it, as in `mocban report | head`. This is not a failure.
 pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause
@@ -98,8 +98,8 @@ pub(super) fn catalog_path(project: &Path) -> String {
     project.join(CATALOG_FILE).display().to_string()
 }
 
-/// Returns a sentence with the file and the way out, in place of the database's own message. Returns `None` if the
-/// error has such a sentence already.
+/// Explains a catalog error: names the file and what the user can do. Returns `None` if the error's own message already
+/// explains it.
 pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
     let path = catalog_path(project);
     Some(match error.kind() {

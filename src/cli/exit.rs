@@ -1,4 +1,4 @@
-//! Exit codes, and the known ways in which a command ends without a result.
+//! Exit codes, and errors of commands that cannot be carried out as given.
 
 /// The exit status of the process; the numbers are fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -8,7 +8,7 @@ pub enum ExitCode {
     Done = 0,
     /// An unexpected error.
     Error = 1,
-    /// The command line, a setting or a manifest is wrong; nothing was changed.
+    /// The command line, a setting or a manifest is wrong. Nothing was changed.
     Usage = 2,
     /// The run ended and some pairs failed.
     SomeFailed = 3,

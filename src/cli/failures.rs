@@ -1,4 +1,4 @@
-//! Lists failed pairs for `run` and `status`, grouped by class, with the first few names of each class.
+//! Lists failed pairs by class, with the first few names of each class. Used by `run` and `status`.
 
 use serde_json::{Value, json};
 

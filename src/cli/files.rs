@@ -19,7 +19,7 @@ pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
         .collect()
 }
 
-/// Returns whether a file holds JSON Lines. A known extension decides, otherwise the first character.
+/// Returns whether a file holds JSON Lines. If its extension is unknown, the first character decides.
 pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let extension = file.extension().and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
@@ -32,7 +32,7 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     }
 }
 
-/// Removes a database and the files that SQLite keeps beside it. Ignores files that are missing or cannot be removed.
+/// Removes a database with its SQLite journal files. Ignores files that are missing or cannot be removed.
 pub(super) fn remove_database(path: &Path) {
     for ending in ["", "-wal", "-shm", "-journal"] {
         let mut name = path.as_os_str().to_owned();

@@ -63,7 +63,7 @@ pub(super) struct ImportOutcome {
     warnings: Vec<String>,
 }
 
-/// Imports pairs; everything is read and checked before anything is written.
+/// Imports pairs. If the import fails, no pair is imported.
 ///
 /// # Errors
 /// Returns an error if a list is refused, or the catalog or the disk fails.
@@ -94,7 +94,7 @@ pub(super) async fn import_pairs(
     })
 }
 
-/// Stores the list. Returns what changed, the number of true alignments stored, and a line per missing file.
+/// Stores the list. Returns what changed, how many true alignments were stored, and a message for each missing file.
 async fn store(
     project: &Project,
     listing: Listing,
@@ -107,7 +107,7 @@ async fn store(
     let sent = tokio::task::spawn_blocking(move || send_rows(listing, &owned, &sender));
     let stored = catalog.import_all(rows, truths, now()).await;
     catalog.close().await;
-    // If a row fails, the catalog only reports that the list ended early, so the row's error is returned first.
+    // If a row fails, the catalog only reports that the list ended early. Return the row's error first.
     let missing = sent
         .await
         .context("the task that reads the list stopped")??;
@@ -115,7 +115,7 @@ async fn store(
     Ok((summary, truths, missing))
 }
 
-/// Sends the rows to the catalog in chunks. Returns a line per missing file.
+/// Sends the rows to the catalog in chunks. Returns a message for each missing file.
 fn send_rows(
     listing: Listing,
     project: &Project,
@@ -142,7 +142,7 @@ fn send_rows(
     Ok(missing)
 }
 
-/// What existed before an import, so that a failed import leaves no incomplete project.
+/// Whether directory and catalog existed before an import. A failed import removes what it created.
 struct StateBefore {
     dir: bool,
     catalog: bool,
@@ -156,7 +156,7 @@ impl StateBefore {
         }
     }
 
-    /// Removes catalog and directory if they did not exist before. If removing fails, an empty project remains.
+    /// Removes the catalog and the directory if the import created them. If removing fails, an empty project remains.
     fn restore(&self, project: &Project) {
         if !self.catalog {
             remove_database(&project.catalog_path());

@@ -42,7 +42,7 @@ fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bo
     Ok((BoxMakeWriter::new(Mutex::new(file)), true))
 }
 
-/// Returns the log filter. A log file gets more messages than the terminal, because it is read after the run.
+/// Returns the log filter. Without `-v`, a log file gets more messages than the terminal.
 const fn level(verbose: u8, quiet: bool, to_file: bool) -> &'static str {
     match (verbose, to_file, quiet) {
         (0, false, true) => "mocban=error",

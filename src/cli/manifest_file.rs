@@ -1,4 +1,4 @@
-//! Reads a manifest, or lists two directories, and passes the content to the parsers in `manifest`.
+//! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use super::files;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
-/// Valid pairs to import. For a list, only its text is kept, and its rows are parsed again one after another.
+/// Valid pairs to import. Of a manifest file, only the text is kept. Its rows are parsed again one by one.
 #[derive(Debug)]
 pub(super) struct Listing {
     source: ListingSource,
@@ -46,7 +46,7 @@ fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
 }
 
 impl Listing {
-    /// Reads a CSV or JSON Lines file. A known extension decides the format, otherwise the first character.
+    /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
     pub(super) fn from_file(file: &Path) -> anyhow::Result<Self> {
         let shown = file.display();
         if file.is_dir() {
@@ -76,7 +76,7 @@ impl Listing {
         })
     }
 
-    /// Pairs the files of two directories by stem.
+    /// Pairs each mesh of one directory with the print of the same file stem in the other directory.
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
@@ -107,7 +107,7 @@ impl Listing {
         })
     }
 
-    /// Passes each row to a function, with paths relative to the working directory and a line per missing file.
+    /// Calls `each` for every row, with a message for each missing file. Paths include the manifest's directory.
     pub(super) fn rows(self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
         let label = self.row_label;
         let mut each = |row: ManifestRow| {

@@ -54,7 +54,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = match args::parse(&args) {
         Ok(cli) => cli,
         Err(error) => {
-            // Printing fails only if the stream is closed. In that case nobody could read an error either.
+            // Printing fails only if the stream is closed. Then nobody could read an error either.
             let _ = error.print();
             return match error.exit_code() {
                 0 => ExitCode::Done,
@@ -80,7 +80,7 @@ fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
 }
 
 /// Returns the asynchronous runtime for a command. A run computes its stages on separate threads. Its asynchronous
-/// tasks are short and exchange messages, which is faster on one thread.
+/// tasks are short and exchange many messages, so they run faster on a single thread.
 fn runtime(command: &Command) -> std::io::Result<Runtime> {
     let mut builder = match command {
         Command::Run(_) | Command::Demo(_) => Builder::new_current_thread(),

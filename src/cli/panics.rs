@@ -1,4 +1,4 @@
-//! Handles panics, which are defects of this program: details go to the log, the user gets one sentence.
+//! Handles panics, which are defects of this program. Details go to the log, and the user sees one sentence.
 
 use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,8 +15,7 @@ pub(super) fn log_only() {
     }));
 }
 
-/// Calls a function and returns its exit code. If it panics, passes a sentence to `show_error` and returns
-/// `ExitCode::Error`.
+/// Calls `work` and returns its exit code. If it panics, shows one sentence and returns `ExitCode::Error`.
 pub(super) fn catch(work: impl FnOnce() -> ExitCode, show_error: impl FnOnce(&str)) -> ExitCode {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         show_error(

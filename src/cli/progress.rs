@@ -31,9 +31,9 @@ enum Display {
     None,
 }
 
-/// Time after which a plain line is written, even if few stages were finished.
+/// Time after which the next event prints a plain line.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
-/// Percentage points of progress after which a plain line is written, even before `PLAIN_INTERVAL`.
+/// Progress, in percentage points, after which the next event also prints a plain line.
 const PLAIN_PERCENT: u64 = 5;
 /// Shortest time between two plain lines.
 const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);

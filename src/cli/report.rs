@@ -155,8 +155,7 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
     Ok(report)
 }
 
-/// Warns about unmet requirements and returns the exit code. If the report is incomplete and its Acc is too low, the
-/// code is that of an incomplete report.
+/// Warns about unmet requirements and returns the exit code. If both requirements are unmet, returns `Incomplete`.
 fn check_requirements(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
     let missing = args.require_complete.then(|| quality_gate::missing(report));
     let below = args

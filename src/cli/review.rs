@@ -117,7 +117,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
     tokio::select! {
         served = served => served?,
-        // After a second signal, open connections are not waited for. Answers already acknowledged are stored.
+        // After a second signal, do not wait for open connections. Acknowledged answers are already stored.
         () = stop.reached(StopLevel::Now) => {}
     }
     signals.abort();
@@ -169,8 +169,8 @@ fn progress(reviewer: &str, counts: QueueCounts) -> String {
     }
 }
 
-/// Prints the page's address and opens the page in a browser. Returns the temporary file that redirects the browser to
-/// the page. The file must exist until the browser has read it.
+/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page. The
+/// file must exist until the browser has read it.
 fn announce(
     page: &ReviewServer,
     args: &ReviewArgs,
@@ -200,9 +200,9 @@ fn announce(
     Ok(if is_for_script { None } else { open(&url) })
 }
 
-/// Opens the address in the system's browser. The browser is started with a file that redirects to the address and that
-/// only this user can read, so that the token does not appear in the list of processes. A missing browser is not an
-/// error, because the address is printed.
+/// Opens the address in the system's browser, through a private file that redirects to it. The token in the address
+/// therefore does not appear in the list of processes. A missing browser is not an error, because the address is
+/// printed.
 fn open(url: &str) -> Option<tempfile::NamedTempFile> {
     let program = if cfg!(target_os = "macos") {
         "open"

@@ -128,7 +128,7 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
     }
 }
 
-/// Runs the pairs, shows the progress on stderr and handles signals. Closes the catalog at the end.
+/// Runs the pairs, shows the progress on stderr and handles signals. Finally closes the catalog.
 pub(super) async fn drive(
     project: &Project,
     catalog: Catalog,

@@ -58,8 +58,7 @@ impl RunProgress {
         }
     }
 
-    /// Returns `fit 24/24  depth 20/24  normalize 12/24  register 10/24`, followed by the number of failed pairs if
-    /// there are any.
+    /// Returns `fit 24/24  depth 20/24  normalize 12/24  register 10/24`, and the number of failed pairs if any failed.
     pub(super) fn by_stage_line(&self) -> String {
         let mut parts: Vec<String> = Stage::ALL
             .iter()
@@ -91,7 +90,7 @@ impl RunProgress {
         }
     }
 
-    /// Returns the percentage of finished stages, rounded down, so that 100 means that all stages are finished.
+    /// Returns the percentage of finished stages, rounded down. At 100, all stages are finished.
     pub(super) const fn percent(&self) -> u64 {
         match (self.finished * 100).checked_div(self.stages) {
             Some(percent) => percent,

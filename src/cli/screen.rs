@@ -1,11 +1,11 @@
-//! The terminal: one writer to stderr for messages, log and progress bar, and colours.
+//! Writes messages, log and progress bar to stderr, and colours text.
 
 use std::io::Write;
 
 use clap::ColorChoice;
 use indicatif::{MultiProgress, ProgressBar};
 
-/// stderr, shared by messages, log and progress bar so that no line overwrites the bar.
+/// The stderr stream. Messages, log and progress bar share it, so that no line overwrites the bar.
 #[derive(Debug, Clone)]
 pub(super) struct Screen(MultiProgress);
 
@@ -67,7 +67,8 @@ impl Palette {
     /// Never any colour.
     pub(super) const PLAIN: Self = Self { on: false };
 
-    /// Returns the palette for one stream. `--color` decides first, then `NO_COLOR`, then whether it is a terminal.
+    /// Returns the palette for one stream. `--color always` and `--color never` decide alone. With `auto`, text has
+    /// colours on a terminal unless `NO_COLOR` is set or `TERM` is `dumb`.
     pub(super) fn choose(when: ColorChoice, is_terminal: bool) -> Self {
         let on = match when {
             ColorChoice::Always => true,

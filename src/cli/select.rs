@@ -8,7 +8,7 @@ use crate::domain::PairName;
 /// Looks up pairs by their ids.
 ///
 /// # Errors
-/// Returns an error if one of them does not exist; the message suggests similar ids.
+/// Returns an error if a pair does not exist. The message suggests similar ids.
 pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -25,7 +25,7 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
     }
 }
 
-/// Looks up pairs by their ids; returns `None` for all pairs if none is named.
+/// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
 ///
 /// # Errors
 /// Like [`pairs`].

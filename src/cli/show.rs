@@ -105,7 +105,7 @@ fn as_json(
     Ok(value)
 }
 
-/// Reads the manual alignments of a pair, oldest first, without undone ones.
+/// Reads the manual alignments of a pair that were not undone, oldest first.
 async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,
@@ -131,7 +131,7 @@ fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustm
     })
 }
 
-/// Returns the result that manual alignments are compared with: the result of the ensemble, otherwise the first one.
+/// Returns the result to compare manual alignments with: that of the ensemble, or otherwise of the first metric.
 fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
     let ensemble = results.metric(ThresholdMetric::Ensemble);
     ensemble

@@ -57,7 +57,7 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
 /// The state that the screen shows.
 struct ProjectStatus {
     counts: StatusCounts,
-    /// Whether a process works on the project. If none does, leased pairs are interrupted, not running.
+    /// Whether a process works on the project. If not, leased pairs count as interrupted, not as running.
     running: bool,
     failures: Failures,
 }

@@ -2,8 +2,8 @@
 
 use unicode_width::UnicodeWidthStr;
 
-/// Formats rows as columns two spaces apart, without trailing blanks. `aligns` has one character per column: `<` aligns
-/// the column left, for words, and `>` aligns it right, for numbers.
+/// Formats rows as columns two spaces apart, without trailing blanks. `aligns` has one character per column: `<` for
+/// left and `>` for right.
 pub(super) fn columns(rows: impl IntoIterator<Item = Vec<String>>, aligns: &str) -> String {
     let rows: Vec<Vec<String>> = rows.into_iter().collect();
     let width_of_column = |column: usize| {
@@ -34,7 +34,7 @@ fn line(row: &[String], aligns: &[(char, usize)]) -> String {
     cells.join("  ").trim_end().to_owned()
 }
 
-/// Returns the number of terminal columns of a text. A colour code takes no column, a wide East Asian character two.
+/// Returns the number of terminal columns of a text. A colour code takes none, a wide East Asian character takes two.
 fn width(text: &str) -> usize {
     let mut parts = text.split("\u{1b}[");
     let first = parts.next().map_or(0, UnicodeWidthStr::width);
@@ -61,7 +61,7 @@ mod tests {
                 "\u{1b}[31mx\u{1b}[0m".to_owned(),
                 "10".to_owned(),
             ],
-            // A Vietnamese letter as one character, and another one as a letter with two combining marks.
+            // Two Vietnamese letters: one as a single character, one as a base letter with two combining marks.
             vec![
                 "Tr\u{1ea7}n".to_owned(),
                 "a\u{302}\u{300}".to_owned(),

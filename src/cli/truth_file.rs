@@ -1,4 +1,4 @@
-//! Parses a `truth.jsonl` file. A file with an invalid line is refused as a whole.
+//! Parses a `truth.jsonl` file. If a line is invalid, the whole file is refused.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

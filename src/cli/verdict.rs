@@ -166,7 +166,7 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-/// Keeps the rows that name the current result of their pair, and the rows that name no result.
+/// Keeps rows that name the current result of their pair, and rows that name no result.
 async fn on_current_results(
     catalog: &Catalog,
     rows: Vec<VerdictRow>,
@@ -256,7 +256,8 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
     ]
 }
 
-/// Formats how long the result was shown, and the remaining rotation that the reviewer read off, in degrees.
+/// Formats how long the result was shown, and the rotation in degrees that the relief still needs by the reviewer's
+/// reading.
 fn view_text(look: &ReviewContext) -> String {
     let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));

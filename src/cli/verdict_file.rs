@@ -1,4 +1,4 @@
-//! Parses files of verdicts, CSV or JSON Lines. A file with an invalid line is refused as a whole.
+//! Parses verdict files in CSV or JSON Lines format. If a line is invalid, the whole file is refused.
 
 use std::str::FromStr;
 
@@ -27,7 +27,7 @@ pub(super) struct VerdictRow {
     pub(super) judged: Option<ContentHash>,
 }
 
-/// Parses a CSV file. Separator and encoding are detected.
+/// Parses a CSV file. Detects its separator and encoding.
 ///
 /// # Errors
 /// Returns an error for the first invalid line.
@@ -137,7 +137,7 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> RefusedLine {
     RefusedLine::new(line, &reason)
 }
 
-/// A line of a file written by `verdict log --json`, an export or a backup. Other fields of the line are ignored.
+/// A line written by `verdict log --json`, an export or a backup. Other fields are ignored.
 #[derive(Debug, Deserialize)]
 struct VerdictLine {
     #[serde(flatten)]
@@ -169,7 +169,7 @@ pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> 
     rows.filter_map(Result::transpose).collect()
 }
 
-/// Returns the parser's message without its line number, because each line is parsed separately.
+/// Returns the parser's message without its line number, which is always 1 because lines are parsed one by one.
 fn json_error(error: &serde_json::Error) -> String {
     let message = error.to_string();
     let reason = message.split(" at line ").next().unwrap_or(&message);

@@ -30,8 +30,7 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
 }
 
-/// Returns what [`run`] would do, for `--dry-run`. First finds input files that have changed, and stores their new
-/// versions in the catalog.
+/// Returns what [`run`] would do, for `--dry-run`. Stores in the catalog which input files have changed.
 ///
 /// # Errors
 /// Returns an error if a named pair does not exist, or the catalog or the files cannot be used.

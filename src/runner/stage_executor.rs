@@ -117,8 +117,7 @@ impl PipelineExecutor {
         let normalized = self.inputs.normalized(pair)?;
         let registered =
             pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
-                // The error names the mesh, the likelier cause. If nothing matches, it names the print, which may show
-                // another character.
+                // If nothing matches, the print may show another character. Otherwise the mesh is the likelier cause.
                 let path = match error {
                     RegisterError::NoMatch { .. } => &pair.attributes.print_path,
                     _ => &pair.attributes.mesh_path,

@@ -35,8 +35,7 @@ impl StageInputs {
             .ok_or(ExecutionError::RerunFrom(Stage::Fit))
     }
 
-    /// Returns the fitted scan from memory, or reads the mesh file again. If the file has changed since the fit,
-    /// returns an error that makes the fit run again.
+    /// Returns the fitted scan from memory, or reads the mesh file again. If the file has changed, the fit runs again.
     pub(super) fn fitted_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         if let Some(scan) = pair.scan.take() {
             return Ok(scan);
