@@ -1,6 +1,6 @@
 //! Builds a report by adding one pair at a time.
 //!
-//! Most numbers are summed at once. For medians and percentiles, each pair's stage times, thresholds and errors stay in
+//! Most numbers are only summed. For medians and percentiles, each pair's stage times, thresholds and errors stay in
 //! memory. For risk-coverage curves, confidences stay in memory. For the bootstrap, sums of scores stay in memory for
 //! up to 100,000 resampling units.
 

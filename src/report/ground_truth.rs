@@ -9,8 +9,7 @@ use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 pub const MAX_ANGLE_DEG: f64 = 5.0;
 /// A result passes only if its mean landmark error is at most this, in percent of the character's height.
 pub const MAX_TRE_PCT: f64 = 5.0;
-/// A result with a tops mask passes only if the overlap of this mask and the depth mask, as `mask_iou`, is at least
-/// this.
+/// Smallest `mask_iou` with which a result passes, if there is a mask of true stroke tops.
 pub const MIN_MASK_IOU: f64 = 0.7;
 
 /// One line of `truth.jsonl`.
@@ -26,7 +25,7 @@ pub struct TruthRecord {
     pub landmarks: Vec<[f64; 3]>,
     /// Height of the character in the print, in print pixels.
     pub char_height_px: f64,
-    /// Path of the mask of the true stroke tops, in print pixels. `None` if there is no mask.
+    /// Path of the mask of the true stroke tops, an image in the print's frame. `None` if there is no mask.
     #[serde(default)]
     pub tops_mask: Option<String>,
 }
@@ -81,7 +80,8 @@ pub struct TruthErrors {
     /// Mean distance in the print between the true and the found positions of the landmarks (target registration
     /// error), in percent of the character's height.
     pub tre_pct: f64,
-    /// Intersection over union of the depth mask and the mask of true stroke tops, in 0..=1. `None` without the latter.
+    /// Intersection over union of the depth mask and the mask of true stroke tops, in 0..=1. `None`
+    /// without a mask of true tops.
     pub mask_iou: Option<f64>,
 }
 

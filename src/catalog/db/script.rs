@@ -1,4 +1,5 @@
-//! Runs several statements in one round trip to SQLite's thread, which takes longer (30 us) than most statements.
+//! Runs several statements in one round trip to SQLite's thread. A round trip takes about 30 us, longer than most
+//! statements.
 
 use std::fmt;
 use std::marker::PhantomData;

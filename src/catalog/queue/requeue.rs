@@ -99,8 +99,8 @@ impl Catalog {
     }
 
     /// Requeues jobs page by page, and returns their number. Each page is a separate transaction, so that other writes
-    /// can run in between. `page` gets the last pair of the page before. It returns its number of jobs and its last
-    /// pair.
+    /// can run in between. `page` requeues the pairs after a given pair, and returns the number of jobs and the last
+    /// pair of the page.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
         F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>

@@ -10,7 +10,7 @@ use crate::report::score_bootstrap::{BootstrapSettings, MeanIntervals};
 /// Reads one interval of a metric's means.
 type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 
-/// Returns the table of comparisons by the number of right results. Returns `None` if there are no comparisons.
+/// Returns the table of comparisons by which results are right. Returns `None` if there are no comparisons.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let table = Table::of(&report.comparisons)
@@ -73,8 +73,7 @@ fn method(settings: &BootstrapSettings) -> String {
     )
 }
 
-/// Returns the table of comparisons by score. Returns `None` if no comparison has an interval; a warning in the report
-/// then gives the reason.
+/// Returns the table of comparisons by score, or `None` if no comparison has an interval.
 pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
     let mut compared = report.score_comparisons.iter();
