@@ -64,8 +64,8 @@ pub(super) struct BootstrapResults {
 /// Why the bootstrap gives no intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BootstrapSkipped {
-    /// More units than are held in memory.
-    TooMany,
+    /// The sample has more units of this kind than are held in memory.
+    TooMany(ResamplingUnit),
     /// Fewer units than an interval needs.
     TooFew {
         /// Number of units.
@@ -127,7 +127,7 @@ impl ScoreSample {
         let (units, by) = (self.0.units(), self.0.unit_kind());
         if self.0.is_full() || units == 0 {
             return BootstrapResults {
-                skipped: self.0.is_full().then_some(BootstrapSkipped::TooMany),
+                skipped: self.0.is_full().then_some(BootstrapSkipped::TooMany(by)),
                 ..BootstrapResults::default()
             };
         }

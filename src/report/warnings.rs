@@ -30,9 +30,10 @@ pub(super) fn warnings(
 
 fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
     let why = match skipped {
-        BootstrapSkipped::TooMany => format!(
-            "there are more than {}, and sampling error is negligible",
-            counted(MAX_UNITS as u64, "pair")
+        BootstrapSkipped::TooMany(by) => format!(
+            "there are more than {} {}, and sampling error is negligible",
+            format_count(MAX_UNITS as u64),
+            by.plural()
         ),
         BootstrapSkipped::TooFew { units, by } => format!(
             "an interval needs at least {MIN_UNITS} {}; here: {units}",
@@ -110,8 +111,11 @@ mod tests {
             few.ends_with("because an interval needs at least 10 blocks; here: 5."),
             "{few}"
         );
-        let many = bootstrap_skipped(BootstrapSkipped::TooMany);
-        assert!(many.contains("there are more than 100,000"), "{many}");
+        let many = bootstrap_skipped(BootstrapSkipped::TooMany(ResamplingUnit::Block));
+        assert!(
+            many.contains("there are more than 100,000 blocks"),
+            "{many}"
+        );
     }
 
     #[test]
