@@ -44,8 +44,14 @@ impl Fixture {
 
     /// Starts `run --json` with one worker and holds it at a failpoint until the returned file is removed.
     fn hold_at(&self, point: &str) -> (Running, PathBuf) {
+        self.hold_at_under(point, |run| run)
+    }
+
+    /// Like [`Self::hold_at`], with a command that starts `run` in another way.
+    fn hold_at_under(&self, point: &str, start: impl Fn(Command) -> Command) -> (Running, PathBuf) {
         let file = self.dir.path().join("held");
-        let mut command = run_with_progress(&self.project, "json", &["-j", "1", "--json"]);
+        let run = run_with_progress(&self.project, "json", &["-j", "1", "--json"]);
+        let mut command = start(run);
         command.env("MOCBAN_HOLD_AT", point);
         command.env("MOCBAN_HOLD_FILE", &file);
         command.stderr(File::create(self.stderr_path()).expect("a file"));
@@ -104,10 +110,10 @@ impl Fixture {
 }
 
 /// A process that is killed when this is dropped.
-struct Running(Option<Child>);
+pub(crate) struct Running(Option<Child>);
 
 impl Running {
-    fn start(command: &mut Command) -> Self {
+    pub(crate) fn start(command: &mut Command) -> Self {
         let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
         Self(Some(command.spawn().expect("the binary starts")))
     }
@@ -120,12 +126,12 @@ impl Running {
         self.child().id()
     }
 
-    fn send(&mut self, signal: Signal) {
+    pub(crate) fn send(&mut self, signal: Signal) {
         kill_process(Pid::from_child(self.child()), signal).expect("sent");
     }
 
     /// Waits until a condition holds that the process brings about.
-    fn wait_until(&mut self, what: &str, condition: impl Fn() -> bool) {
+    pub(crate) fn wait_until(&mut self, what: &str, condition: impl Fn() -> bool) {
         let deadline = Instant::now() + Duration::from_mins(1);
         while !condition() {
             let ended = self.child().try_wait().expect("the child's state");
@@ -136,7 +142,7 @@ impl Running {
     }
 
     /// Waits for the process to end. Returns the exit code, the output of `--json`, and stderr.
-    fn end(mut self) -> (Option<i32>, Value, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, Value, String) {
         let child = self.0.take().expect("a running process");
         let output = child.wait_with_output().expect("it ends");
         let json = serde_json::from_slice(&output.stdout).unwrap_or_default();
@@ -163,6 +169,18 @@ fn is_suspended(pid: u32) -> bool {
             .next()
             .is_some_and(|rest| rest.starts_with('T'))
     })
+}
+
+/// Returns the signals that stop a run. SIGINT stays ignored if these tests run in the background of a script.
+fn stop_signals() -> Vec<Signal> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    let is_ignored = mask.unwrap_or(0) >> (Signal::INT.as_raw() - 1) & 1 == 1;
+    let interrupt = (!is_ignored).then_some(Signal::INT);
+    interrupt.into_iter().chain([Signal::TERM]).collect()
 }
 
 fn joined(project: &Project) -> Command {
@@ -307,7 +325,7 @@ fn pairs_of_a_dead_process_are_recovered_at_once_by_the_only_process() {
 
 #[test]
 fn one_signal_drains_and_does_not_count_the_attempt() {
-    for signal in [Signal::INT, Signal::TERM] {
+    for signal in stop_signals() {
         let fixture = Fixture::new("2");
         let (mut child, file) = fixture.hold_at("fit:computed");
         child.send(signal);
@@ -328,9 +346,29 @@ fn one_signal_drains_and_does_not_count_the_attempt() {
     }
 }
 
+/// `nohup` and a script's background jobs start a process with ignored signals.
+#[test]
+fn a_signal_that_is_ignored_from_the_start_does_not_stop_a_run() {
+    for (signal, name) in [(Signal::HUP, "HUP"), (Signal::INT, "INT")] {
+        let fixture = Fixture::new("2");
+        let (mut child, file) = fixture.hold_at_under("fit:computed", |run| {
+            let mut shell = Command::new("sh");
+            let script = format!("trap '' {name}; exec \"$@\"");
+            shell.args(["-c", &script, "sh"]).arg(run.get_program());
+            shell.args(run.get_args());
+            shell
+        });
+        child.send(signal);
+        std::fs::remove_file(file).expect("removed");
+        let (code, json, stderr) = child.end();
+        assert_eq!((code, &json["stages"]), (Some(0), &8.into()), "{stderr}");
+        fixture.assert_uninterrupted_results();
+    }
+}
+
 #[test]
 fn a_second_signal_stops_at_once_and_leaves_all_resumable() {
-    for signal in [Signal::INT, Signal::TERM] {
+    for signal in stop_signals() {
         let fixture = Fixture::new("2");
         // The file stays, so the stage in progress never ends.
         let (mut child, _file) = fixture.hold_at("fit:computed");
@@ -357,9 +395,9 @@ fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
     ] {
         let fixture = Fixture::new("1");
         let (mut child, _file) = fixture.hold_at(at);
-        child.send(Signal::INT);
+        child.send(Signal::TERM);
         child.wait_until("it drains", || fixture.stop_requests() == 1);
-        child.send(Signal::INT);
+        child.send(Signal::TERM);
         let (code, json, stderr) = child.end();
         // A stage is stored only after its files and the files of all earlier stages were written.
         let ended = (code, &json["stages"], &json["done"]);
