@@ -112,7 +112,7 @@
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `raster`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
-//! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `runner` |
+//! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
 //!
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;

@@ -4,10 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use crate::domain::sanitize;
+use crate::store::read_file_or_pipe;
 
-/// Reads a file.
+/// Longest list that is read, in bytes.
+const MAX_LIST_BYTES: u64 = 1 << 30;
+
+/// Reads a list that is named on the command line, from a file or a pipe.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
-    std::fs::read(path).map_err(|error| refusal("read", path, &error))
+    read_file_or_pipe(path, MAX_LIST_BYTES).map_err(|error| refusal("read", path, &error))
 }
 
 /// Lists a directory.

@@ -1,5 +1,6 @@
 //! The layers above the defaults: preset, file, environment variables, flags.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
@@ -7,6 +8,7 @@ use toml::{Table, Value};
 use super::error::{ConfigError, Origin, hint, quote};
 use super::tree::Tree;
 use crate::domain::enum_names;
+use crate::store::read_file_or_pipe;
 
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -175,11 +177,17 @@ fn preset_layer(preset: Preset) -> Result<Vec<(Table, Origin)>, ConfigError> {
     }
 }
 
+/// Longest file of settings that is read, in bytes.
+const MAX_FILE_BYTES: u64 = 1 << 20;
+
 fn file_layers(path: &Path) -> Result<Vec<(Table, Origin)>, ConfigError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+    let failed = |source| ConfigError::Read {
         path: path.to_owned(),
         source,
-    })?;
+    };
+    let bytes = read_file_or_pipe(path, MAX_FILE_BYTES).map_err(failed)?;
+    let text = String::from_utf8(bytes)
+        .map_err(|error| failed(std::io::Error::new(ErrorKind::InvalidData, error)))?;
     let origin = Origin::File(path.to_owned());
     let mut table = parse(&text, &origin)?;
     let mut layers = match table.remove("preset") {

@@ -4,22 +4,17 @@ use std::path::PathBuf;
 
 use super::pictures::{PrintView, Rgb};
 use crate::catalog::PairResults;
-use crate::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
+use crate::domain::{FileKind, Stage, ThresholdMetric};
 use crate::raster::{self, DecodeError, ImageLimits, PrintImage};
 use crate::report::pair_artifacts::PairArtifacts;
-use crate::store::Project;
+use crate::store::{InputError, InputFile, Project, read_input};
 
 /// Why a print cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SourcePrintError {
     /// The file cannot be read.
-    #[error("{path}: {source}")]
-    Read {
-        /// The print.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] InputError),
     /// The file cannot be decoded, for example because limits were lowered.
     #[error("{path}: {source}")]
     Decode {
@@ -36,7 +31,7 @@ pub enum SourcePrintError {
 /// A print image as a file and decoded.
 #[derive(Debug)]
 pub struct SourcePrint {
-    pub(super) bytes: Vec<u8>,
+    file: InputFile,
     /// The decoded image.
     pub picture: PrintImage,
 }
@@ -52,24 +47,26 @@ impl SourcePrint {
         limits: &ImageLimits,
     ) -> Result<Self, SourcePrintError> {
         let path = project.input_path(&pair.attributes.print_path);
-        let bytes = match std::fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(source) => return Err(SourcePrintError::Read { path, source }),
-        };
+        let file = read_input(&path, limits.max_bytes, "limits.image.max_bytes")?;
         let normalized = pair.stage(Stage::Normalize);
         let aligned = normalized.and_then(|record| record.print_hash);
-        if aligned.is_some_and(|hash| hash != ContentHash::of(&bytes)) {
+        if aligned.is_some_and(|hash| hash != file.digest.hash) {
             return Err(SourcePrintError::Changed(path));
         }
-        match raster::decode(&bytes, limits) {
-            Ok(picture) => Ok(Self { bytes, picture }),
+        match raster::decode(&file.bytes, limits) {
+            Ok(picture) => Ok(Self { file, picture }),
             Err(source) => Err(SourcePrintError::Decode { path, source }),
         }
     }
 
+    /// Returns the content of the file.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.file.bytes
+    }
+
     /// Returns the file name extension of its format.
     pub(super) fn extension(&self) -> &'static str {
-        match FileKind::of(&self.bytes) {
+        match FileKind::of(self.bytes()) {
             FileKind::Png => "png",
             FileKind::Jpeg => "jpg",
             FileKind::Tiff => "tif",

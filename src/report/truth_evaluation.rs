@@ -9,7 +9,7 @@ use super::pair_artifacts::{PairArtifacts, PairArtifactsError, group_identical};
 use crate::catalog::PairResults;
 use crate::domain::{MetricOutcome, ThresholdMetric};
 use crate::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
-use crate::store::Project;
+use crate::store::{Project, read_input};
 
 /// Value of pixels in a tops mask that are a true stroke top.
 const TOP: u8 = 255;
@@ -134,9 +134,11 @@ fn read_tops_and_depth(
 fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
     let path = project.input_path(path);
     let refused = |why: String| TruthError::Mask(format!("{}: {why}", path.display()));
-    let bytes = std::fs::read(&path).map_err(|error| refused(error.to_string()))?;
-    let picture = raster::decode(&bytes, &ImageLimits::SUGGESTED)
-        .map_err(|error| refused(error.to_string()))?;
+    let limits = ImageLimits::SUGGESTED;
+    let file = read_input(&path, limits.max_bytes, "a constant for masks")
+        .map_err(|error| TruthError::Mask(error.to_string()))?;
+    let picture =
+        raster::decode(&file.bytes, &limits).map_err(|error| refused(error.to_string()))?;
     Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
 }
 

@@ -1,12 +1,10 @@
 //! Finds input files that have changed since they were read. A file is hashed only if its size, modification time or
 //! inode has changed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
-
-use super::compute_thread::{run_blocking, task_result};
 use super::error::RunError;
+use super::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use crate::domain::{ContentHash, PairId};
 use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
@@ -14,28 +12,33 @@ use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
 
-/// Stores the new versions of changed input files in the catalog. Files that no stage has read are skipped.
+/// Stores the new versions of changed input files in the catalog. Files that no stage has read are skipped. Files that
+/// cannot be read within the limits count as unchanged.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
     among: Option<&PairSelection>,
+    limits: &ReadLimits,
 ) -> Result<(), RunError> {
     let mut page = catalog.known_inputs(None, PAGE, among).await?;
-    while let Some(last) = page.last() {
+    while let Some(last) = page.last()
+        && limits.stop.level() < limits.until
+    {
         let after = Some(last.pair);
-        let project = project.clone();
-        let compare = move || -> Vec<_> {
-            page.into_par_iter()
-                .filter_map(|known| changes(&project, &known))
-                .collect()
-        };
+        let compared = page.into_iter().map(|known| ComparedInputs {
+            project: project.clone(),
+            known,
+        });
         // Read the next page from the catalog while the files of this one are compared.
-        let comparing = tokio::task::spawn_blocking(compare);
-        page = catalog.known_inputs(after, PAGE, among).await?;
-        let changed = task_result(comparing.await);
+        let (changed, next) = tokio::join!(
+            read_each(compared.collect(), limits),
+            catalog.known_inputs(after, PAGE, among)
+        );
+        let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
         if !changed.is_empty() {
             catalog.store_inputs(changed).await?;
         }
+        page = next?;
     }
     Ok(())
 }
@@ -46,6 +49,7 @@ pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
     pairs: &[PairId],
+    limits: &ReadLimits,
 ) -> Result<(), RunError> {
     if pairs.is_empty() {
         return Ok(());
@@ -54,14 +58,77 @@ pub(super) async fn store_of_poisoned(
     let known = catalog
         .known_inputs(None, pairs.len(), Some(&among))
         .await?;
-    let project = project.clone();
-    let inputs = run_blocking(move || -> Vec<_> {
-        let known = known.into_par_iter();
-        known
-            .map(|known| (known.pair, unread_inputs(&project, &known)))
-            .collect()
+    let unread = known.into_iter().map(|known| UnreadInputs {
+        project: project.clone(),
+        known,
     });
-    Ok(catalog.record_poisoned_inputs(inputs.await).await?)
+    let inputs = read_each(unread.collect(), limits).await;
+    let inputs = inputs.into_iter().flatten().collect();
+    Ok(catalog.record_poisoned_inputs(inputs).await?)
+}
+
+/// Returns the current state of two files. A file that cannot be read within the limits is `None`.
+pub(super) async fn current_of_both(
+    paths: [PathBuf; 2],
+    limits: &ReadLimits,
+) -> [Option<InputVersion>; 2] {
+    let files = paths.into_iter().map(CurrentInput).collect();
+    let mut found = read_each(files, limits)
+        .await
+        .into_iter()
+        .map(Option::flatten);
+    [found.next().flatten(), found.next().flatten()]
+}
+
+/// A pair whose input files are compared with the known ones.
+struct ComparedInputs {
+    project: Project,
+    known: KnownInputs,
+}
+
+impl ReadItem for ComparedInputs {
+    type Output = Option<(PairId, InputVersions)>;
+
+    fn read(&self) -> Self::Output {
+        changes(&self.project, &self.known)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.known.mesh_path)
+    }
+}
+
+/// A pair whose unread input files are hashed.
+struct UnreadInputs {
+    project: Project,
+    known: KnownInputs,
+}
+
+impl ReadItem for UnreadInputs {
+    type Output = (PairId, InputVersions);
+
+    fn read(&self) -> Self::Output {
+        (self.known.pair, unread_inputs(&self.project, &self.known))
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.known.mesh_path)
+    }
+}
+
+/// A file that is hashed.
+struct CurrentInput(PathBuf);
+
+impl ReadItem for CurrentInput {
+    type Output = Option<InputVersion>;
+
+    fn read(&self) -> Self::Output {
+        current(&self.0)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.0.clone()
+    }
 }
 
 /// Returns the current state of the input files that no stage has reported.
@@ -102,7 +169,7 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
 }
 
 /// Returns the current state of a file. Returns `None` if it cannot be read.
-pub(super) fn current(path: &Path) -> Option<InputVersion> {
+fn current(path: &Path) -> Option<InputVersion> {
     hash_input(path).ok().map(Into::into)
 }
 

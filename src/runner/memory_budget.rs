@@ -1,16 +1,15 @@
 //! Limits the memory of all running pairs together. The memory of a pair is estimated from its input files.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use crate::catalog::PairAttributes;
 use crate::domain::Stage;
 use crate::raster;
-use crate::store::Project;
+use crate::store::{Project, open_regular};
 
 /// Bytes reserved for the maps and masks of each pair, in addition to the memory for its mesh and print.
-const PAIR_BYTES: u64 = 32 << 20;
+pub(super) const PAIR_BYTES: u64 = 32 << 20;
 /// Bytes needed per byte of a mesh file, including the file's content. Measured with one to two million vertices:
 /// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5. For OBJ it is 1.8, or 5.7 with normals or
 /// texture coordinates.
@@ -98,10 +97,11 @@ fn mesh_bytes(path: &Path) -> u64 {
 /// Estimates the memory in bytes for a print from the pixel count in its header, because a small file may hold many
 /// pixels. If the header cannot be read, the file size decides. At most `images.max_pixels` pixels count.
 fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
-    let size = size(path);
-    // A file without a size may be a pipe; reading it would block.
-    let of_header = (size > 0).then(|| File::open(path).ok()).flatten();
-    let pixels = of_header
+    let Ok((file, meta)) = open_regular(path) else {
+        return 0;
+    };
+    let size = meta.len();
+    let pixels = Some(file)
         .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
         .unwrap_or_else(|| {
             size.saturating_mul(match extension(path).as_str() {

@@ -11,6 +11,7 @@ mod error;
 mod events;
 mod free_memory;
 mod input_changes;
+mod input_reads;
 mod memory_budget;
 mod options;
 mod pair_context;

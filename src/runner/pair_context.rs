@@ -1,6 +1,8 @@
 //! State of a pair between two stages: its data from the catalog, and the values that stages keep in memory.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -20,6 +22,24 @@ pub(super) struct StoredStage {
     pub(super) print_hash: Option<ContentHash>,
 }
 
+/// The input file that a pair's thread reads now. Others see it while the thread hangs.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FileInUse(Arc<Mutex<Option<PathBuf>>>);
+
+impl FileInUse {
+    /// Notes that a file is being read, until `None` is given.
+    pub(super) fn set(&self, path: Option<&Path>) {
+        let mut file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *file = path.map(Path::to_owned);
+    }
+
+    /// Returns the file.
+    pub(super) fn get(&self) -> Option<PathBuf> {
+        let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        file.clone()
+    }
+}
+
 /// Values that the stages of a pair share. A value stays in memory from the stage that computes it to the last one
 /// that needs it.
 #[derive(Debug)]
@@ -34,6 +54,7 @@ pub(super) struct PairContext {
     pub(super) inputs: InputVersions,
     /// The `inputs` that were last reported to the catalog.
     reported: InputVersions,
+    pub(super) file_in_use: FileInUse,
     pub(super) scan: Option<Scan>,
     pub(super) print: Option<Print>,
     pub(super) fit: Option<FitOutcome>,
@@ -59,6 +80,7 @@ impl PairContext {
             stored: stored.collect(),
             inputs: InputVersions::default(),
             reported: InputVersions::default(),
+            file_in_use: FileInUse::default(),
             scan: None,
             print: None,
             fit: None,

@@ -1,20 +1,23 @@
 //! The task of one pair: receives each stage from the pair's compute thread, passes it to the checkpointer, and stores
 //! a failure.
 
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::checkpointer::Checkpointer;
-use super::compute_thread::{ComputeEvent, ComputeThread, run_blocking};
+use super::compute_thread::{ComputeEvent, ComputeThread};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::input_changes;
-use super::pair_context::PairContext;
+use super::input_reads::ReadLimits;
+use super::pair_context::{FileInUse, PairContext};
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, PairReport, RunContext};
+use super::stop::StopLevel;
 use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
 use crate::domain::{Failure, FailureClass, Stage};
 use crate::failpoint::{self, Point};
-use crate::store::Project;
 
 /// What is left to do for a pair when its stages are computed.
 pub(super) enum PairOutcome {
@@ -92,7 +95,7 @@ async fn compute(
                 break FailedStage::without_pair(FailureClass::Bug, text);
             }
             ComputeEvent::TimedOut => {
-                let text = format!("{stage} took longer than {} s", timeout.as_secs_f64());
+                let text = timeout_text(stage, timeout, pair.file_in_use.get());
                 break FailedStage::without_pair(FailureClass::Resource, text);
             }
             ComputeEvent::Stopped => {
@@ -101,6 +104,19 @@ async fn compute(
         }
     };
     PairOutcome::Ended(fail(context, checkpointer, stage, pair, failed).await)
+}
+
+/// Describes a stage that took too long, and the input file that it was reading.
+fn timeout_text(stage: Stage, timeout: Duration, reading: Option<PathBuf>) -> String {
+    let seconds = timeout.as_secs_f64();
+    let text = format!("{stage} took longer than {seconds} s");
+    match reading {
+        Some(path) => format!(
+            "{text} while it read {}; its disk or network may hang",
+            path.display()
+        ),
+        None => text,
+    }
 }
 
 /// Stores a failure once the stages before it are stored.
@@ -135,7 +151,7 @@ async fn store_failure(
 ) -> Result<PairEnd, RunError> {
     let inputs = match failed.inputs {
         Some(inputs) => inputs,
-        None => pair.inputs_now(&context.project).await,
+        None => pair.inputs_now(context).await,
     };
     let now = context.clock.now();
     let attempt = FailedAttempt {
@@ -190,6 +206,7 @@ struct PairSummary {
     attributes: PairAttributes,
     attributes_json: String,
     inputs: InputVersions,
+    file_in_use: FileInUse,
 }
 
 impl PairSummary {
@@ -198,22 +215,34 @@ impl PairSummary {
             attributes: pair.attributes.clone(),
             attributes_json: pair.attributes_json.clone(),
             inputs: pair.inputs.clone(),
+            file_in_use: pair.file_in_use.clone(),
         }
     }
 
     /// Returns the versions of the input files that the thread reported. For an unreported file, returns the current
-    /// version. Later runs compare the files with these versions to notice a replacement.
-    async fn inputs_now(&self, project: &Project) -> InputVersions {
+    /// version, if it can be read. Later runs compare the files with these versions to notice a replacement.
+    async fn inputs_now(&self, context: &RunContext) -> InputVersions {
         let read = self.inputs.clone();
+        if read.mesh.is_some() && read.print.is_some() {
+            return read;
+        }
         let paths = [&self.attributes.mesh_path, &self.attributes.print_path];
-        let paths = paths.map(|path| project.input_path(path));
-        run_blocking(move || InputVersions {
-            mesh: read.mesh.or_else(|| input_changes::current(&paths[0])),
-            print: read.print.or_else(|| input_changes::current(&paths[1])),
-        })
-        .await
+        let paths = paths.map(|path| context.project.input_path(path));
+        let limits = ReadLimits {
+            timeout: context.stage_timeout.min(MAX_REREAD),
+            stop: context.stop.clone(),
+            until: StopLevel::Now,
+        };
+        let [mesh, print] = input_changes::current_of_both(paths, &limits).await;
+        InputVersions {
+            mesh: read.mesh.or(mesh),
+            print: read.print.or(print),
+        }
     }
 }
+
+/// Longest time for reading the input files again after a stage hung or panicked.
+const MAX_REREAD: Duration = Duration::from_secs(30);
 
 /// How a stage failed.
 struct FailedStage {

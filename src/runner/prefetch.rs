@@ -2,23 +2,31 @@
 //! With the queue, no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::compute_thread::run_blocking;
 use super::error::RunError;
 use super::events::RunEvent;
-use super::memory_budget::{MemoryBudget, estimated_bytes};
+use super::input_reads::{ReadItem, ReadLimits, read_each};
+use super::memory_budget::{MemoryBudget, PAIR_BYTES, estimated_bytes};
 use super::options::RunOptions;
 use super::run_context::RunContext;
-use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
-use crate::domain::{PairName, WorkerId};
+use super::stop::StopLevel;
+use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWork};
+use crate::domain::{PairName, Stage, WorkerId};
 use crate::raster;
+use crate::store::Project;
 
 /// How much work is claimed ahead for each slot, as computing time. One claim then serves several short pairs.
 const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;
+
+/// Identifies a task that occupies a slot. A pair may occupy two of them: after its lease was lost, the process may
+/// lease it again while the earlier task still computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct SlotId(u64);
 
 /// A pair that is leased and has not started.
 #[derive(Debug)]
@@ -38,7 +46,8 @@ pub(super) struct Prefetch {
     slots: usize,
     /// Leased pairs that have not started, in the order of their claim.
     queue: VecDeque<LeasedPair>,
-    running: BTreeMap<PairName, RunningPair>,
+    running: BTreeMap<SlotId, RunningPair>,
+    next_slot: SlotId,
     durations: DurationEstimate,
     memory: MemoryBudget,
     /// The next pair needs memory that a running pair has to return first.
@@ -52,6 +61,7 @@ pub(super) struct Prefetch {
 /// A pair in a slot.
 #[derive(Debug)]
 struct RunningPair {
+    name: PairName,
     since: Instant,
     bytes: u64,
     is_at_last_stage: bool,
@@ -71,6 +81,7 @@ impl Prefetch {
             slots: options.workers.max(1),
             queue: VecDeque::new(),
             running: BTreeMap::new(),
+            next_slot: SlotId(0),
             durations: DurationEstimate::default(),
             memory: MemoryBudget::new(options.memory),
             waits_for_memory: false,
@@ -95,7 +106,9 @@ impl Prefetch {
             && *stage == self.context.until
             && !self.is_exclusive
         {
-            if let Some(running) = self.running.get_mut(pair) {
+            // If two tasks compute the pair, the later one has the lease.
+            let mut running = self.running.values_mut().rev();
+            if let Some(running) = running.find(|running| running.name == *pair) {
                 running.is_at_last_stage = true;
             }
             self.may_find_more = true;
@@ -103,8 +116,8 @@ impl Prefetch {
     }
 
     /// Records that a pair has left its slot.
-    pub(super) fn finish(&mut self, pair: &PairName) {
-        if let Some(running) = self.running.remove(pair) {
+    pub(super) fn finish(&mut self, slot: SlotId) {
+        if let Some(running) = self.running.remove(&slot) {
             self.durations.add(running.since.elapsed());
             self.memory.release(running.bytes);
         }
@@ -133,8 +146,9 @@ impl Prefetch {
         Ok(())
     }
 
-    /// Returns the next pair to start. Returns `None` if no slot is free, the queue is empty, or memory is short.
-    pub(super) async fn next_pair(&mut self) -> Result<Option<LeasedPair>, RunError> {
+    /// Returns the next pair to start, with its slot. Returns `None` if no slot is free, the queue is empty, or memory
+    /// is short.
+    pub(super) async fn next_pair(&mut self) -> Result<Option<(SlotId, LeasedPair)>, RunError> {
         if self.free_slots() == 0 || self.waits_for_memory {
             return Ok(None);
         }
@@ -151,13 +165,15 @@ impl Prefetch {
         }
         self.warn_if_oversized(&next);
         let running = RunningPair {
+            name: next.work.attributes.name.clone(),
             since: Instant::now(),
             bytes: next.bytes,
             is_at_last_stage: false,
         };
-        self.running
-            .insert(next.work.attributes.name.clone(), running);
-        Ok(Some(next))
+        let slot = self.next_slot;
+        self.next_slot = SlotId(slot.0 + 1);
+        self.running.insert(slot, running);
+        Ok(Some((slot, next)))
     }
 
     /// Releases the leases of all pairs that have not started.
@@ -215,22 +231,35 @@ impl Prefetch {
         Ok(())
     }
 
-    /// Adds the memory estimates, which read the headers of print images.
-    async fn estimate(
-        &self,
-        leased: impl Iterator<Item = (Lease, PairWork)> + Send + 'static,
-    ) -> Vec<LeasedPair> {
-        let is_limited = self.memory.is_limited();
-        let (project, limits) = (self.context.project.clone(), self.image_limits);
-        let estimate = move |(lease, work): (Lease, PairWork)| {
-            let bytes = if is_limited {
-                estimated_bytes(&project, &work.attributes, lease.cursor(), &limits)
-            } else {
-                0
+    /// Adds the memory estimates, which read the headers of print images. A pair whose files do not answer counts as
+    /// if they were empty.
+    async fn estimate(&self, leased: impl Iterator<Item = (Lease, PairWork)>) -> Vec<LeasedPair> {
+        let leased: Vec<_> = leased.collect();
+        let estimates = if self.memory.is_limited() {
+            let estimated = leased.iter().map(|(lease, work)| EstimatedPair {
+                project: self.context.project.clone(),
+                attributes: work.attributes.clone(),
+                from: lease.cursor(),
+                limits: self.image_limits,
+            });
+            // The scheduler waits for this, so the next heartbeat must not be missed.
+            let limits = ReadLimits {
+                timeout: self.context.timing.heartbeat_every / 5,
+                stop: self.context.stop.clone(),
+                until: StopLevel::Drain,
             };
-            LeasedPair { lease, work, bytes }
+            read_each(estimated.collect(), &limits).await
+        } else {
+            vec![Some(0); leased.len()]
         };
-        run_blocking(move || leased.map(estimate).collect()).await
+        let leased = leased.into_iter().zip(estimates);
+        leased
+            .map(|((lease, work), bytes)| LeasedPair {
+                lease,
+                work,
+                bytes: bytes.unwrap_or(PAIR_BYTES),
+            })
+            .collect()
     }
 
     /// Warns if the memory estimate of a pair exceeds the limit for all running pairs together.
@@ -242,6 +271,26 @@ impl Prefetch {
                 "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
             );
         }
+    }
+}
+
+/// A pair whose memory is estimated.
+struct EstimatedPair {
+    project: Project,
+    attributes: PairAttributes,
+    from: Stage,
+    limits: raster::ImageLimits,
+}
+
+impl ReadItem for EstimatedPair {
+    type Output = u64;
+
+    fn read(&self) -> u64 {
+        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.attributes.mesh_path)
     }
 }
 

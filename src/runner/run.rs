@@ -10,6 +10,7 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
+use super::input_reads::ReadLimits;
 use super::options::RunOptions;
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
@@ -41,7 +42,8 @@ pub async fn plan(
     options: &RunOptions,
 ) -> Result<Plan, RunError> {
     let selection = selection(catalog, options).await?;
-    input_changes::store_changes(project, catalog, selection.as_ref()).await?;
+    let limits = read_limits(options, &Stop::new());
+    input_changes::store_changes(project, catalog, selection.as_ref(), &limits).await?;
     let names = options.pairs.as_deref();
     Ok(catalog
         .plan(&fingerprints(settings), names, options.rerun)
@@ -101,6 +103,7 @@ pub(super) async fn run_with(
         options,
         selection: selection.as_ref(),
         clock,
+        stop,
     };
     if let Err(error) = start.prepare(&mut lock, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
@@ -141,6 +144,7 @@ struct RunStart<'a> {
     options: &'a RunOptions,
     selection: Option<&'a PairSelection>,
     clock: Clock,
+    stop: &'a Stop,
 }
 
 impl RunStart<'_> {
@@ -154,7 +158,8 @@ impl RunStart<'_> {
     ) -> Result<(), RunError> {
         let (catalog, options) = (self.catalog, self.options);
         let recovered = self.recover(lock, worker).await?;
-        input_changes::store_changes(self.project, catalog, self.selection).await?;
+        let limits = read_limits(options, self.stop);
+        input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
         catalog
             .requeue_stale(self.fingerprints, self.selection, options.rerun)
             .await?;
@@ -181,11 +186,22 @@ impl RunStart<'_> {
         }
         let (dead, now) = (DeadWorker::AllExcept(worker), self.clock.now());
         let recovered = self.catalog.recover(dead, now).await?;
-        let poisoned = &recovered.poisoned;
-        input_changes::store_of_poisoned(self.project, self.catalog, poisoned).await?;
+        let (project, poisoned) = (self.project, &recovered.poisoned);
+        let limits = read_limits(self.options, self.stop);
+        input_changes::store_of_poisoned(project, self.catalog, poisoned, &limits).await?;
         self.project.clear_temporary()?;
         lock.downgrade()?;
         Ok(recovered.ready)
+    }
+}
+
+/// Returns the limits of reads before the first stage starts. Waiting for them ends at the first signal, because no
+/// stage is in progress.
+fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
+    ReadLimits {
+        timeout: options.stage_timeout,
+        stop: stop.clone(),
+        until: StopLevel::Drain,
     }
 }
 

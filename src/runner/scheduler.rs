@@ -13,12 +13,12 @@ use super::events::RunEvent;
 use super::options::RunOptions;
 use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
-use super::prefetch::Prefetch;
+use super::prefetch::{Prefetch, SlotId};
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
 use crate::catalog::{Outstanding, PairSelection, Waiting};
-use crate::domain::{PairName, WorkerId};
+use crate::domain::WorkerId;
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
@@ -45,7 +45,7 @@ pub(super) struct Scheduler {
     max_storing: usize,
     max_failures: Option<u64>,
     /// Pairs that are computed.
-    computing: JoinSet<(PairName, PairOutcome)>,
+    computing: JoinSet<(SlotId, PairOutcome)>,
     /// Pairs that are computed and whose last stages are being stored.
     storing: JoinSet<PairReport>,
     /// While this guard exists, the catalog commits at once instead of waiting for more requests.
@@ -148,11 +148,10 @@ impl Scheduler {
     /// Starts leased pairs while slots and memory are free and the disk keeps up.
     async fn start_pairs(&mut self) -> Result<(), RunError> {
         while self.storing.len() < self.max_storing
-            && let Some(pair) = self.prefetch.next_pair().await?
+            && let Some((slot, pair)) = self.prefetch.next_pair().await?
         {
-            let name = pair.work.attributes.name.clone();
             let task = process_pair(Arc::clone(&self.context), pair.lease, pair.work);
-            self.computing.spawn(async move { (name, task.await) });
+            self.computing.spawn(async move { (slot, task.await) });
         }
         Ok(())
     }
@@ -183,8 +182,8 @@ impl Scheduler {
         Ok(catalog.outstanding(until, self.selection.as_ref()).await?)
     }
 
-    fn finish_computing(&mut self, (name, outcome): (PairName, PairOutcome)) {
-        self.prefetch.finish(&name);
+    fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
+        self.prefetch.finish(slot);
         match outcome {
             PairOutcome::Ended(report) => self.count(report),
             PairOutcome::Storing(checkpointer) => {

@@ -126,6 +126,7 @@ impl StageInputs {
         let stored = &pair.attributes.mesh_path;
         let path = self.project.input_path(stored);
         let limit = self.mesh_limits.max_bytes;
+        pair.file_in_use.set(Some(&path));
         let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unreadable)?;
         let size = file.size();
         let mesh = match mesh::read_from(&mut file, size, stored, &self.mesh_limits) {
@@ -134,6 +135,7 @@ impl StageInputs {
             Ok(mesh) => Ok(mesh),
         };
         pair.inputs.mesh = Some(file.finish().map_err(unreadable)?.into());
+        pair.file_in_use.set(None);
         let mesh = mesh.map_err(|error| {
             let message = format!("{stored}: {error}");
             ExecutionError::failed(error.class(), message)
@@ -146,8 +148,10 @@ impl StageInputs {
         let stored = &pair.attributes.print_path;
         let path = self.project.input_path(stored);
         let limit = self.image_limits.max_bytes;
+        pair.file_in_use.set(Some(&path));
         let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unreadable)?;
         pair.inputs.print = Some(file.digest.into());
+        pair.file_in_use.set(None);
         let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
             let message = format!("{stored}: {error}");
             ExecutionError::failed(error.class(), message)

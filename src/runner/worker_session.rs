@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::error::RunError;
 use super::input_changes;
+use super::input_reads::ReadLimits;
 use super::run_context::RunContext;
+use super::stop::StopLevel;
 use crate::catalog::{CatalogError, DeadWorker, LeaseHolder, WorkerInfo};
 use crate::domain::{UnixMillis, WorkerId};
 
@@ -92,8 +94,14 @@ impl WorkerSession {
         let mut ready = 0;
         if !dead.is_empty() {
             let recovered = catalog.recover(DeadWorker::Workers(dead), now).await?;
-            input_changes::store_of_poisoned(&context.project, catalog, &recovered.poisoned)
-                .await?;
+            // The scheduler waits for this, so the next heartbeat must not be missed.
+            let limits = ReadLimits {
+                timeout: context.timing.heartbeat_every,
+                stop: context.stop.clone(),
+                until: StopLevel::Drain,
+            };
+            let (project, poisoned) = (&context.project, &recovered.poisoned);
+            input_changes::store_of_poisoned(project, catalog, poisoned, &limits).await?;
             ready += recovered.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {

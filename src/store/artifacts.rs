@@ -3,12 +3,14 @@
 //! A file is written under a temporary name, synced, and renamed, and then its folder is synced. Only after that may a
 //! row of the catalog name the file.
 
-use std::fs::File;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
 use super::atomic_write::{parent_folder, sync_folder, write_synced};
+use super::input_error::InputError;
+use super::open_file::{open_regular, regular_metadata};
 use crate::domain::{ArtifactRef, ContentHash};
 
 /// An artifact that is not on disk yet.
@@ -72,6 +74,19 @@ impl ArtifactError {
     }
 }
 
+impl From<InputError> for ArtifactError {
+    fn from(error: InputError) -> Self {
+        match error {
+            InputError::NotThere(path) => Self::Missing(path),
+            InputError::NotAFile { path, .. }
+            | InputError::Changed(path)
+            | InputError::TooLarge { path, .. } => Self::Changed(path),
+            InputError::Denied(path) => Self::io(&path)(ErrorKind::PermissionDenied.into()),
+            InputError::Io { path, source } => Self::Io { path, source },
+        }
+    }
+}
+
 /// Makes the temporary names of this process unique.
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
@@ -89,13 +104,14 @@ impl Project {
     /// Returns an error if the file is missing, unreadable or changed.
     pub fn read_artifact(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
         let path = self.artifact_path(artifact);
-        match std::fs::read(&path) {
-            Ok(bytes) if ContentHash::of(&bytes) == artifact.hash => Ok(bytes),
-            Ok(_) => Err(ArtifactError::Changed(path)),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                Err(ArtifactError::Missing(path))
-            }
-            Err(source) => Err(ArtifactError::Io { path, source }),
+        let (mut file, _) = open_regular(&path)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)
+            .map_err(ArtifactError::io(&path))?;
+        if ContentHash::of(&bytes) == artifact.hash {
+            Ok(bytes)
+        } else {
+            Err(ArtifactError::Changed(path))
         }
     }
 
@@ -105,19 +121,12 @@ impl Project {
     /// Returns an error if the file is missing, unreadable or changed.
     pub fn check_artifact(&self, artifact: &ArtifactRef, quick: bool) -> Result<(), ArtifactError> {
         let path = self.artifact_path(artifact);
-        let is_complete = match std::fs::metadata(&path) {
-            Ok(meta) if meta.len() != artifact.bytes => Ok(false),
-            Ok(_) if quick => Ok(true),
-            Ok(_) => has_hash(&path, &artifact.hash),
-            Err(error) => Err(error),
-        };
-        match is_complete {
-            Ok(true) => Ok(()),
-            Ok(false) => Err(ArtifactError::Changed(path)),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                Err(ArtifactError::Missing(path))
-            }
-            Err(source) => Err(ArtifactError::Io { path, source }),
+        let is_complete = regular_metadata(&path)?.len() == artifact.bytes
+            && (quick || has_hash(&path, &artifact.hash)?);
+        if is_complete {
+            Ok(())
+        } else {
+            Err(ArtifactError::Changed(path))
         }
     }
 
@@ -161,7 +170,7 @@ impl Project {
     pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         match std::fs::remove_dir_all(&folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
                 Err(ArtifactError::io(&folder)(error))
             }
             _ => Ok(()),
@@ -197,9 +206,12 @@ impl Project {
 }
 
 /// Returns whether the bytes of a file have this hash.
-fn has_hash(path: &Path, hash: &ContentHash) -> std::io::Result<bool> {
+fn has_hash(path: &Path, hash: &ContentHash) -> Result<bool, ArtifactError> {
+    let (file, _) = open_regular(path)?;
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path)?)?;
+    hasher
+        .update_reader(file)
+        .map_err(ArtifactError::io(path))?;
     Ok(hasher.finalize().as_bytes() == hash.as_bytes())
 }
 

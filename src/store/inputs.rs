@@ -1,11 +1,13 @@
 //! Input files: reading within a size limit, hashing, and recognizing changes.
 
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Take};
+use std::io::{self, Read, Take};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-use crate::domain::{ContentHash, FailureClass};
+use super::input_error::InputError;
+use super::open_file::{open_regular, regular_metadata};
+use crate::domain::ContentHash;
 use crate::page_vec::PageVec;
 
 /// Returns size, modification time and inode of a file as text. If all three are unchanged, the content is assumed to
@@ -100,89 +102,12 @@ impl InputReader {
     }
 }
 
-/// Why an input file could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum InputError {
-    /// There is no such file.
-    #[error("{0} is not there")]
-    NotThere(PathBuf),
-    /// The path is a directory or anything else that is not a regular file.
-    #[error("{path} is {kind}, not a file")]
-    NotAFile {
-        /// Which path.
-        path: PathBuf,
-        /// What it is.
-        kind: &'static str,
-    },
-    /// The process may not read it.
-    #[error("{0} may not be read: permission denied")]
-    Denied(PathBuf),
-    /// The file is larger than the settings allow.
-    #[error("{path} has {bytes} bytes, over the limit of {limit} ({setting})")]
-    TooLarge {
-        /// Which file.
-        path: PathBuf,
-        /// Its size in bytes.
-        bytes: u64,
-        /// The limit in bytes.
-        limit: u64,
-        /// Name of the setting.
-        setting: &'static str,
-    },
-    /// The file is being written.
-    #[error("{0} changed while it was read")]
-    Changed(PathBuf),
-    /// Reading failed; it may succeed another time.
-    #[error("{path}: {source}")]
-    Io {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-}
-
-impl InputError {
-    fn io(path: &Path, source: std::io::Error) -> Self {
-        match source.kind() {
-            ErrorKind::NotFound | ErrorKind::NotADirectory => Self::NotThere(path.to_owned()),
-            ErrorKind::PermissionDenied => Self::Denied(path.to_owned()),
-            ErrorKind::IsADirectory => Self::NotAFile {
-                path: path.to_owned(),
-                kind: "a directory",
-            },
-            _ => Self::Io {
-                path: path.to_owned(),
-                source,
-            },
-        }
-    }
-
-    /// Returns the class of the failure.
-    pub const fn class(&self) -> FailureClass {
-        match self {
-            Self::NotThere(_)
-            | Self::NotAFile { .. }
-            | Self::Denied(_)
-            | Self::Changed(_)
-            | Self::Io { .. } => FailureClass::Io,
-            Self::TooLarge { .. } => FailureClass::BadInput,
-        }
-    }
-
-    /// Returns whether a retry may succeed without a change by the user.
-    pub const fn is_transient(&self) -> bool {
-        matches!(self, Self::Changed(_) | Self::Io { .. })
-    }
-}
-
 /// Returns size, modification time and inode of a file as text.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn stat_input(path: &Path) -> Result<String, InputError> {
-    let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
-    Ok(file_stat(&check_file(path, meta)?))
+    Ok(file_stat(&regular_metadata(path)?))
 }
 
 /// Opens a file of at most `limit` bytes. `setting` is the name of the limit in error messages.
@@ -194,7 +119,7 @@ pub fn open_input(
     limit: u64,
     setting: &'static str,
 ) -> Result<InputReader, InputError> {
-    let (file, meta) = open(path)?;
+    let (file, meta) = open_regular(path)?;
     if meta.len() > limit {
         return Err(InputError::TooLarge {
             path: path.to_owned(),
@@ -232,7 +157,7 @@ pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<Inpu
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
-    let (file, meta) = open(path)?;
+    let (file, meta) = open_regular(path)?;
     let mut hasher = blake3::Hasher::new();
     hasher
         .update_reader(file)
@@ -243,38 +168,13 @@ pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
     })
 }
 
-fn open(path: &Path) -> Result<(File, std::fs::Metadata), InputError> {
-    // Check the type before opening the path, because opening a pipe waits for a writer.
-    let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
-    check_file(path, meta)?;
-    let file = File::open(path).map_err(|error| InputError::io(path, error))?;
-    let meta = file
-        .metadata()
-        .map_err(|error| InputError::io(path, error))?;
-    Ok((file, meta))
-}
-
-fn check_file(path: &Path, meta: std::fs::Metadata) -> Result<std::fs::Metadata, InputError> {
-    if meta.is_file() {
-        return Ok(meta);
-    }
-    let kind = if meta.is_dir() {
-        "a directory"
-    } else {
-        "a device or a pipe"
-    };
-    Err(InputError::NotAFile {
-        path: path.to_owned(),
-        kind,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::{Read, Write as _};
 
-    use super::{InputError, hash_input, open_input, read_input, stat_input};
+    use super::{hash_input, open_input, read_input, stat_input};
     use crate::domain::{ContentHash, FailureClass};
+    use crate::store::InputError;
 
     #[test]
     fn a_file_over_the_limit_is_bad_input_and_names_the_setting() {

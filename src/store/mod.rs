@@ -2,16 +2,20 @@
 
 mod artifacts;
 mod atomic_write;
+mod input_error;
 mod inputs;
 mod lock;
+mod open_file;
 mod project;
 mod referenced;
 
 pub use artifacts::{ArtifactError, NewArtifact};
 pub use atomic_write::{partial_path, rename_into_place, write_atomic, write_synced};
+pub use input_error::InputError;
 pub use inputs::{
-    InputDigest, InputError, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
+    InputDigest, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
 };
 pub use lock::{LockError, RunLock};
+pub use open_file::{open_regular, read_file_or_pipe};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};

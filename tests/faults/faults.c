@@ -1,6 +1,6 @@
 /* Makes chosen system calls fail in the process that preloads this library.
  *
- * FAULT_CALL     open, read, write, sync, rename, truncate, unlink, mkdir or lock
+ * FAULT_CALL     open, stat, read, write, sync, rename, truncate, unlink, mkdir or lock
  * FAULT_PATH     pattern (fnmatch) for the file's absolute path; for a rename, for either path
  * FAULT_NTH      number of the first matching call that fails, from 1; 0 for none
  * FAULT_TIMES    number of calls that fail from there on, 1 by default; 0 for all
@@ -93,7 +93,8 @@ static enum verdict judge(const char *call, const char *path, const char *other)
     }
     if (plan.delay_ms) {
         struct timespec delay = {plan.delay_ms / 1000, plan.delay_ms % 1000 * 1000000};
-        syscall(SYS_nanosleep, &delay, NULL);
+        while (syscall(SYS_nanosleep, &delay, &delay) != 0 && errno == EINTR) {
+        }
     }
     if (plan.half && which == plan.nth) {
         return HALF;
@@ -129,6 +130,15 @@ static size_t part(enum verdict verdict, size_t count) { return verdict == HALF 
     }
 OPEN(open)
 OPEN(open64)
+
+int statx(int folder, const char *path, int flags, unsigned mask, struct statx *found) {
+    /* Rust asks once without a path whether the call exists, which its declaration does not allow. */
+    const char *volatile given = path;
+    if (given && *given && judge("stat", path, NULL) == FAIL) {
+        return -1;
+    }
+    return REAL(statx)(folder, path, flags, mask, found);
+}
 
 ssize_t read(int fd, void *bytes, size_t count) {
     return judge_file("read", fd) == FAIL ? -1 : REAL(read)(fd, bytes, count);

@@ -20,6 +20,8 @@ mod fault;
 mod fault_scenario;
 #[cfg(target_os = "linux")]
 mod faults;
+#[cfg(target_os = "linux")]
+mod hanging;
 mod hostile;
 #[cfg(target_os = "linux")]
 mod hostile_pairs;

@@ -6,8 +6,8 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
-use crate::catalog::{Catalog, DeadWorker};
-use crate::domain::{JobStatus, PairName, Stage, WorkerId};
+use crate::catalog::{Catalog, DeadWorker, Lease};
+use crate::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
 use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
@@ -247,4 +247,51 @@ async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
         let most = fixture.executor.most.load(Ordering::SeqCst);
         assert_eq!(most, together, "{limit:?}");
     }
+}
+
+/// Returns the first lease of a pair by the first worker.
+const fn first_lease(pair: PairId) -> Lease {
+    Lease {
+        pair,
+        worker: WorkerId(1),
+        token: 1,
+        cursor: Stage::Fit,
+        fingerprint: None,
+        attempt: 1,
+        exclusive: false,
+        cleared: false,
+    }
+}
+
+/// The tasks of the lost leases still compute, so their slots are not free.
+#[tokio::test]
+async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
+    let fixture = RunFixture::new(&["wait_1", "wait_2"]).await;
+    let started = || {
+        let pairs = ["wait_1", "wait_2"];
+        let counts = pairs.map(|pair| fixture.executor.count(pair, Stage::Fit));
+        counts.into_iter().sum::<usize>()
+    };
+    let tasks = async |count: usize| {
+        while started() < count {
+            tokio::task::yield_now().await;
+        }
+    };
+    let take_leases = async {
+        tasks(2).await;
+        // As after a suspension, the pairs are ready again and the process does not know it.
+        for pair in [PairId(1), PairId(2)] {
+            let lease = first_lease(pair);
+            fixture.catalog.release(lease).await.expect("released");
+        }
+        tasks(3).await;
+        // A fourth task must not start: there is no event to wait for, only the next polls.
+        let fourth = timeout(Duration::from_secs(1), tasks(4)).await;
+        fixture.executor.open();
+        fourth
+    };
+    let options = options(3);
+    let (summary, fourth) = tokio::join!(fixture.run(&options), take_leases);
+    assert!(fourth.is_err(), "four tasks in three slots");
+    assert_eq!((summary.done, summary.left), (2, 0));
 }

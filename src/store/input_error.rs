@@ -1,0 +1,121 @@
+//! Why an input file could not be read.
+
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use rustix::io::Errno;
+
+use crate::domain::FailureClass;
+
+/// Why an input file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// There is no such file.
+    #[error("{0} is not there")]
+    NotThere(PathBuf),
+    /// The path is a directory or anything else that is not a regular file.
+    #[error("{path} is {kind}, not a file")]
+    NotAFile {
+        /// Which path.
+        path: PathBuf,
+        /// What it is.
+        kind: &'static str,
+    },
+    /// The process may not read it.
+    #[error("{0} may not be read: permission denied")]
+    Denied(PathBuf),
+    /// The file is larger than the settings allow.
+    #[error("{path} has {bytes} bytes, over the limit of {limit} ({setting})")]
+    TooLarge {
+        /// Which file.
+        path: PathBuf,
+        /// Its size in bytes.
+        bytes: u64,
+        /// The limit in bytes.
+        limit: u64,
+        /// Name of the setting.
+        setting: &'static str,
+    },
+    /// The file is being written.
+    #[error("{0} changed while it was read")]
+    Changed(PathBuf),
+    /// Reading failed; it may succeed another time.
+    #[error("{path}: {source}")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl InputError {
+    /// Adds the path to an error of the system, and replaces errors with a known reason.
+    pub(super) fn io(path: &Path, source: std::io::Error) -> Self {
+        match source.kind() {
+            ErrorKind::NotFound | ErrorKind::NotADirectory => Self::NotThere(path.to_owned()),
+            ErrorKind::PermissionDenied => Self::Denied(path.to_owned()),
+            ErrorKind::IsADirectory => Self::NotAFile {
+                path: path.to_owned(),
+                kind: "a directory",
+            },
+            _ => Self::Io {
+                path: path.to_owned(),
+                source: with_advice(source),
+            },
+        }
+    }
+
+    /// Returns the class of the failure.
+    pub const fn class(&self) -> FailureClass {
+        match self {
+            Self::NotThere(_)
+            | Self::NotAFile { .. }
+            | Self::Denied(_)
+            | Self::Changed(_)
+            | Self::Io { .. } => FailureClass::Io,
+            Self::TooLarge { .. } => FailureClass::BadInput,
+        }
+    }
+
+    /// Returns whether a retry may succeed without a change by the user.
+    pub const fn is_transient(&self) -> bool {
+        matches!(self, Self::Changed(_) | Self::Io { .. })
+    }
+}
+
+/// Replaces the error of a process with too many open files by one that says what to do.
+pub(super) fn with_advice(error: io::Error) -> io::Error {
+    let is_about = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
+    if is_about(Errno::MFILE) {
+        io::Error::other("too many open files; raise the limit with `ulimit -n`")
+    } else if is_about(Errno::NFILE) {
+        io::Error::other("the system has too many open files; close other programs")
+    } else {
+        error
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use rustix::io::Errno;
+
+    use super::with_advice;
+
+    #[test]
+    fn too_many_open_files_name_the_way_out() {
+        let error = io::Error::from(Errno::MFILE);
+        let text = with_advice(error).to_string();
+        assert!(
+            text.contains("too many open files") && text.contains("ulimit -n"),
+            "{text}"
+        );
+        let error = io::Error::from(Errno::IO);
+        assert_eq!(
+            with_advice(error).raw_os_error(),
+            Some(Errno::IO.raw_os_error())
+        );
+    }
+}

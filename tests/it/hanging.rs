@@ -1,0 +1,227 @@
+//! Reads of input files that hang, as on a network file system without a server, and inputs that became pipes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use mocban::domain::{FailureClass, JobStatus};
+use mocban::store::Project;
+use rustix::fs::{CWD, FileType, Mode, mknodat};
+use rustix::process::Signal;
+
+use crate::cli::{binary, call};
+use crate::fault::Fault;
+use crate::processes::Running;
+use crate::resume::{pairs, project, run, run_with_progress};
+
+/// Longer than any test.
+const HOUR_MS: u32 = 3_600_000;
+const MESH: &str = "p/data/meshes/upright-0000.ply";
+const PRINT: &str = "p/data/prints/upright-0000.jpg";
+
+/// A project whose files can hang.
+struct HangingDisk {
+    project: Project,
+    dir: tempfile::TempDir,
+}
+
+impl HangingDisk {
+    fn new(pairs: &str) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = project(dir.path(), "p", pairs);
+        Self { project, dir }
+    }
+
+    /// Makes these calls on a file hang in a command.
+    fn hang<'c>(
+        &self,
+        what: &'static str,
+        file: &'static str,
+        command: &'c mut Command,
+    ) -> &'c mut Command {
+        let fault = Fault::slow(what, file, HOUR_MS);
+        fault.inject(1, self.dir.path(), self.dir.path(), command)
+    }
+
+    /// Starts a command and waits until a call hangs in it.
+    fn start_hanging(
+        &self,
+        what: &'static str,
+        file: &'static str,
+        mut command: Command,
+    ) -> Running {
+        let notes = self.dir.path().join("injected");
+        // The file is missing before the first command.
+        let _ = std::fs::remove_file(&notes);
+        let mut running = Running::start(self.hang(what, file, &mut command));
+        running.wait_until("a call hangs", || notes.exists());
+        running
+    }
+
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = binary();
+        command.current_dir(self.dir.path()).arg("-C");
+        command.arg(self.project.dir()).args(args);
+        command
+    }
+
+    /// Replaces an input by a pipe without a writer.
+    fn replace_by_pipe(&self, stored: &str) -> PathBuf {
+        let path = self.project.input_path(stored);
+        std::fs::remove_file(&path).expect("removed");
+        let mode = Mode::RUSR | Mode::WUSR;
+        mknodat(CWD, &path, FileType::Fifo, mode, 0).expect("a pipe");
+        path
+    }
+}
+
+#[test]
+fn a_read_that_hangs_fails_its_pair_after_the_stage_limit_and_no_other() {
+    for (call_kind, file) in [("read", MESH), ("read", PRINT), ("open", MESH)] {
+        let disk = HangingDisk::new("2");
+        let mut command = run(
+            &disk.project,
+            &["-j", "2", "--set", "run.stage_timeout_s=1"],
+        );
+        call(disk.hang(call_kind, file, &mut command)).expect(3);
+        let [hung, done] = &pairs(&disk.project)[..] else {
+            panic!("two pairs");
+        };
+        assert_eq!(done.results.status, JobStatus::Done);
+        assert_eq!(hung.results.status, JobStatus::Quarantined);
+        let failure = &hung.results.failure.as_ref().expect("a failure").failure;
+        assert_eq!(failure.class, FailureClass::Resource);
+        let wanted = "fit took longer than 1 s while it read ";
+        assert!(failure.message.starts_with(wanted), "{}", failure.message);
+        let name = Path::new(file)
+            .file_name()
+            .expect("a name")
+            .to_string_lossy();
+        assert!(failure.message.contains(&*name), "{}", failure.message);
+    }
+}
+
+#[test]
+fn a_second_signal_does_not_wait_for_a_read_that_hangs() {
+    let disk = HangingDisk::new("1");
+    let command = run_with_progress(&disk.project, "json", &["-j", "1", "--json"]);
+    let mut running = disk.start_hanging("read", MESH, command);
+    running.send(Signal::TERM);
+    running.send(Signal::HUP);
+    let (code, json, stderr) = running.end();
+    assert_eq!((code, &json["stages"]), (Some(130), &0.into()), "{stderr}");
+    let pair = &pairs(&disk.project)[0];
+    assert_eq!((pair.results.status, pair.attempt), (JobStatus::Ready, 0));
+}
+
+/// After the stage limit, the file is hashed again, so that a later run notices whether it was replaced.
+#[test]
+fn a_second_signal_does_not_wait_for_the_hash_after_a_read_that_hung() {
+    let disk = HangingDisk::new("1");
+    let args = ["-j", "1", "--set", "run.stage_timeout_s=3"];
+    let command = run(&disk.project, &args);
+    let mut running = disk.start_hanging("read", MESH, command);
+    let notes = disk.dir.path().to_owned();
+    running.wait_until("the file is hashed", || Fault::injected(&notes) == 2);
+    running.send(Signal::TERM);
+    running.send(Signal::HUP);
+    let (code, _, stderr) = running.end();
+    assert_eq!(code, Some(130), "{stderr}");
+}
+
+#[test]
+fn a_file_that_hangs_before_the_first_stage_does_not_stop_a_run() {
+    let disk = HangingDisk::new("2");
+    call(&mut run(&disk.project, &[])).expect(0);
+    let mut command = run(&disk.project, &["--set", "run.stage_timeout_s=1"]);
+    let ended = call(disk.hang("stat", MESH, &mut command)).expect(0);
+    let wanted = "upright-0000.ply did not answer within 1 s; it counts as unchanged";
+    assert!(ended.err.contains(wanted), "{}", ended.err);
+    assert!(ended.err.contains("nothing left to do"), "{}", ended.err);
+    let mut running = disk.start_hanging("stat", MESH, run(&disk.project, &["--json"]));
+    running.send(Signal::TERM);
+    let (code, _, stderr) = running.end();
+    assert_eq!(code, Some(0), "nothing was left to do: {stderr}");
+}
+
+/// These commands do not catch signals.
+#[test]
+fn a_file_that_hangs_does_not_keep_a_command_from_being_stopped() {
+    let disk = HangingDisk::new("1");
+    call(&mut run(&disk.project, &[])).expect(0);
+    let manifest = disk.project.dir().join("data/manifest.csv");
+    let manifest = manifest.to_str().expect("a path in UTF-8");
+    let commands: [&[&str]; 4] = [
+        &["run", "--dry-run"],
+        &["check"],
+        &["import", manifest],
+        &["export", "-o", "exported"],
+    ];
+    for args in commands {
+        let mut running = disk.start_hanging("stat", PRINT, disk.command(args));
+        running.send(Signal::TERM);
+        let (code, _, stderr) = running.end();
+        assert_eq!(code, None, "{args:?}: {stderr}");
+    }
+}
+
+#[test]
+fn an_input_that_became_a_pipe_is_named_by_every_command() {
+    let disk = HangingDisk::new("1");
+    call(&mut run(&disk.project, &[])).expect(0);
+    let print = disk.replace_by_pipe("data/prints/upright-0000.jpg");
+    let tops = disk.replace_by_pipe("data/tops/upright-0000.png");
+    let named = |path: &Path| format!("{} is a pipe, not a file", path.display());
+    let commands: [(&[&str], i32); 7] = [
+        (&["export", "-o", "exported"], 3),
+        (&["report"], 0),
+        (&["report", "--format", "html", "-o", "report.html"], 0),
+        (&["contact-sheet", "-o", "sheet.png"], 0),
+        (&["show", "upright-0000"], 0),
+        (&["check"], 0),
+        (&["run", "--rerun", "all"], 3),
+    ];
+    for (args, code) in commands {
+        let ended = call(&mut disk.command(args)).expect(code);
+        // A report wraps its lines.
+        let said = format!("{}{}", ended.out, ended.err);
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        match args[0] {
+            "export" | "run" => assert!(said.contains(&named(&print)), "{args:?}: {said}"),
+            "report" => assert!(said.contains(&named(&tops)), "{args:?}: {said}"),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn a_list_is_read_from_standard_input_and_not_from_a_device() {
+    let disk = HangingDisk::new("1");
+    let mut import = disk.command(&["import", "/dev/stdin"]);
+    import.stdin(Stdio::piped()).stdout(Stdio::null());
+    let mut child = import.spawn().expect("the binary starts");
+    let list = "id,mesh,print\nanother,a.ply,a.png\n";
+    let mut stdin = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut stdin, list.as_bytes()).expect("written");
+    drop(stdin);
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(pairs(&disk.project).len(), 2);
+    for args in [
+        &["import", "/dev/zero"][..],
+        &["import", "p/data/manifest.csv", "--truth", "/dev/zero"],
+        &["verdict", "import", "/dev/zero"],
+        &["--config", "/dev/zero", "status"],
+    ] {
+        let refused = call(&mut disk.command(args)).expect(2);
+        let wanted = "/dev/zero: it is a device, not a file";
+        assert!(refused.err.contains(wanted), "{args:?}: {}", refused.err);
+    }
+}
+
+/// Settings are read by most commands before anything else.
+#[test]
+fn a_file_of_settings_that_became_a_device_is_refused() {
+    let disk = HangingDisk::new("1");
+    std::os::unix::fs::symlink("/dev/zero", disk.project.settings_path()).expect("a link");
+    let refused = call(&mut disk.command(&["run"])).expect(2);
+    assert!(refused.err.contains("it is a device"), "{}", refused.err);
+}
