@@ -16,6 +16,7 @@ use crate::catalog::CatalogError;
 use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
+use crate::domain::one_line;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
 
@@ -230,7 +231,7 @@ fn notes(notes: &Notes, problem: &str) -> Option<String> {
         }
         let files = count(notes.count, "input file");
         let verb = if notes.count == 1 { "is" } else { "are" };
-        format!("{files} {verb} {problem}: {}", names.join(", "))
+        format!("{files} {verb} {problem}: {}", one_line(&names.join(", ")))
     })
 }
 

@@ -15,9 +15,12 @@ use super::screen::{Palette, Screen, Tone};
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::config::{BaseLayer, Loaded, Sources, load};
-use crate::domain::UnixMillis;
+use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
+
+/// Maximum number of characters of a line in warnings and errors. The longest path that can exist has 4,096 bytes.
+const MAX_LINE_CHARS: usize = 6000;
 
 /// The global flags and the state derived from them.
 #[derive(Debug, Clone)]
@@ -67,24 +70,24 @@ impl Context {
     /// Writes a line to stderr, unless `-q` is given.
     pub(super) fn info(&self, text: &str) {
         if !self.global.quiet {
-            self.screen.line(text);
+            self.screen.line(&indented(text));
         }
     }
 
     /// Writes a warning to stderr, also with `-q`.
     pub(super) fn warn(&self, text: &str) {
         let label = self.stderr.paint(Tone::Warn, "warning:");
-        self.screen.line(&format!("{label} {text}"));
+        self.screen.line(&format!("{label} {}", indented(text)));
     }
 
     /// Writes an error message to stderr, as text or, with `--json`, as a JSON object.
     pub(super) fn error(&self, text: &str, code: ExitCode) {
         if self.global.json {
             let object = json!({"message_type": "exit_error", "code": code as u8, "message": text});
-            self.screen.line(&object.to_string());
+            self.screen.json_line(&object);
         } else {
             let label = self.stderr.paint(Tone::Bad, "error:");
-            self.screen.line(&format!("{label} {text}"));
+            self.screen.line(&format!("{label} {}", indented(text)));
         }
     }
 
@@ -202,6 +205,25 @@ pub(super) fn now() -> UnixMillis {
         .map_or(0, |since| since.as_millis() as UnixMillis)
 }
 
+/// Indents the lines after the first, so that a line break in the name of a file cannot imitate another message. Cuts
+/// very long lines, for example with the name of a file that cannot exist.
+fn indented(text: &str) -> String {
+    let shown = |line: &str| match line.char_indices().nth(MAX_LINE_CHARS) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line.to_owned(),
+    };
+    let indented = |line: &str| {
+        shown(&if line.starts_with(' ') {
+            line.to_owned()
+        } else {
+            format!("  {line}")
+        })
+    };
+    let (first, rest) = text.split_once('\n').unwrap_or((text, ""));
+    let lines = std::iter::once(shown(first)).chain(rest.lines().map(indented));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
 /// Returns the path by which the program was called, or `mocban` if the shell found it through `PATH`.
 fn program_name(called: Option<&OsString>) -> String {
     let called = called.map(|name| name.to_string_lossy().into_owned());
@@ -211,11 +233,24 @@ fn program_name(called: Option<&OsString>) -> String {
     }
 }
 
-/// Quotes a word for a POSIX shell where it needs quotes.
+/// Quotes a word for a POSIX shell where it needs quotes. A word with hidden characters is quoted as `$'..'` with an
+/// escape for each of their bytes, because the terminal does not show these characters.
 pub(super) fn shell_quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         word.to_owned()
+    } else if word.contains(is_hidden) {
+        let quoted = word.chars().map(|c| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            _ if is_hidden(c) => {
+                let hidden = c.to_string();
+                // Three octal digits end the escape, whatever follows.
+                let bytes = hidden.bytes().map(|byte| format!("\\{byte:03o}"));
+                bytes.collect::<Vec<_>>().concat()
+            }
+            _ => c.to_string(),
+        });
+        format!("$'{}'", quoted.collect::<String>())
     } else {
         format!("'{}'", word.replace('\'', r"'\''"))
     }
@@ -223,7 +258,14 @@ pub(super) fn shell_quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::shell_quoted;
+    use super::{indented, shell_quoted};
+
+    #[test]
+    fn a_message_cannot_imitate_the_next_line() {
+        assert_eq!(indented("a\nnext: b\n  c"), "a\n  next: b\n  c");
+        assert_eq!(indented("a"), "a");
+        assert_eq!(indented(&"a".repeat(7000)).len(), super::MAX_LINE_CHARS + 3);
+    }
 
     #[test]
     fn words_that_a_shell_would_split_are_quoted() {
@@ -231,5 +273,6 @@ mod tests {
         assert_eq!(shell_quoted("my scans"), "'my scans'");
         assert_eq!(shell_quoted("it's"), r"'it'\''s'");
         assert_eq!(shell_quoted(""), "''");
+        assert_eq!(shell_quoted("a\n'\u{1b}5\\"), r"$'a\012\'\0335\\'");
     }
 }

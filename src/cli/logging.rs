@@ -31,8 +31,11 @@ pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
 
 fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bool)> {
     let Some(path) = &global.log_file else {
-        let screen = screen.clone();
-        return Ok((BoxMakeWriter::new(move || screen.clone()), false));
+        let writer = LogWriter {
+            screen: screen.clone(),
+            format: global.log_format,
+        };
+        return Ok((BoxMakeWriter::new(move || writer.clone()), false));
     };
     let file = OpenOptions::new()
         .create(true)
@@ -40,6 +43,30 @@ fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bo
         .open(path)
         .with_context(|| format!("cannot open the log file {}", path.display()))?;
     Ok((BoxMakeWriter::new(Mutex::new(file)), true))
+}
+
+/// Writes log lines to the screen.
+#[derive(Debug, Clone)]
+struct LogWriter {
+    screen: Screen,
+    format: LogFormat,
+}
+
+impl std::io::Write for LogWriter {
+    /// Writes one event, which is passed in one call.
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let text = String::from_utf8_lossy(bytes);
+        let line = text.trim_end_matches('\n');
+        match self.format {
+            LogFormat::Text => self.screen.log_line(line),
+            LogFormat::Json => self.screen.json_log_line(line),
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Returns the log filter. Without `-v`, a log file gets more messages than the terminal.

@@ -47,6 +47,9 @@ use tokio::runtime::{Builder, Runtime};
 use args::Command;
 use context::Context;
 pub use exit::ExitCode;
+use screen::Screen;
+
+use crate::domain::is_hidden;
 
 /// Parses the command line, executes the command and returns the exit code. Prints each error once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
@@ -54,8 +57,16 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = match args::parse(&args) {
         Ok(cli) => cli,
         Err(error) => {
-            // Printing fails only if the stream is closed. Then nobody could read an error either.
-            let _ = error.print();
+            if args
+                .iter()
+                .any(|arg| arg.to_string_lossy().contains(is_hidden))
+            {
+                // The error may quote an argument, for example the name of a file, with codes for the terminal.
+                Screen::new().line(error.render().to_string().trim_end());
+            } else {
+                // Printing fails only if the stream is closed. Then nobody could read an error either.
+                let _ = error.print();
+            }
             return match error.exit_code() {
                 0 => ExitCode::Done,
                 _ => ExitCode::Usage,

@@ -11,6 +11,7 @@ use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use super::time_text::duration;
+use crate::domain::one_line;
 use crate::runner::{RunEvent, StopLevel};
 
 /// Shows one run.
@@ -57,7 +58,7 @@ impl ProgressReporter {
         match &mut self.display {
             Display::None => return,
             Display::Json => {
-                self.screen.line(&json!(event).to_string());
+                self.screen.json_line(&json!(event));
                 return;
             }
             Display::Bar(bar) => update_bar(bar, &self.progress),
@@ -137,7 +138,7 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
             "{} {} at {stage}: {} ({})",
             palette.paint(Tone::Bad, "failed"),
             palette.paint(Tone::Strong, pair),
-            failure.message,
+            one_line(&failure.message),
             failure.class
         )),
         RunEvent::PairBackingOff {
@@ -148,7 +149,7 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
         } => Some(format!(
             "{} {pair} at {stage}: {} ({}), retrying in {}",
             palette.paint(Tone::Warn, "waiting"),
-            failure.message,
+            one_line(&failure.message),
             failure.class,
             duration(*wait_ms)
         )),

@@ -83,6 +83,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
             write_atomic(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
             context.info(&format!("the report is in {shown}"));
         }
+        None if format == ReportFormat::Json => output::print_json_text(&text)?,
         None => output::print(&text)?,
     }
     Ok(check_requirements(&report, &args, context))
@@ -135,7 +136,12 @@ async fn compared(
 /// Prints the report to stdout, as text or JSON.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
     let format = chosen_format(ReportFormat::Text, context);
-    output::print(&render(&read(context).await?, format))?;
+    let text = render(&read(context).await?, format);
+    if format == ReportFormat::Json {
+        output::print_json_text(&text)?;
+    } else {
+        output::print(&text)?;
+    }
     Ok(())
 }
 

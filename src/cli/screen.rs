@@ -1,9 +1,41 @@
 //! Writes messages, log and progress bar to stderr, and colours text.
+//!
+//! Text is sanitized where it is printed, in [`terminal_text`], because a sanitizer at each value would be forgotten at
+//! the next one. The program's own colour codes contain a number that is random in each process, so a value cannot
+//! imitate them. They become real codes only when they are printed.
 
-use std::io::Write;
+use std::hash::{BuildHasher as _, RandomState};
+use std::io::Write as _;
+use std::sync::LazyLock;
 
 use clap::ColorChoice;
 use indicatif::{MultiProgress, ProgressBar};
+
+use crate::domain::{one_line, visible, visible_json};
+
+/// Beginning of the program's own terminal codes, with the number of this process.
+static OWN_CODE: LazyLock<String> =
+    LazyLock::new(|| format!("\u{1b}[{};", RandomState::new().hash_one("own code")));
+
+/// Returns the text that is printed: hidden characters become visible, except line breaks, tabs and the program's own
+/// codes.
+pub(super) fn terminal_text(text: &str) -> String {
+    let mut parts = text.split(OWN_CODE.as_str());
+    let mut shown = parts
+        .next()
+        .map_or_else(String::new, |first| visible(first).into_owned());
+    for part in parts {
+        shown.push_str("\u{1b}[");
+        shown.push_str(&visible(part));
+    }
+    shown
+}
+
+/// Returns a text as one line of visible characters. The program's own codes are kept.
+pub(super) fn terminal_line(text: &str) -> String {
+    let parts = text.split(OWN_CODE.as_str()).map(one_line);
+    parts.collect::<Vec<_>>().join(OWN_CODE.as_str())
+}
 
 /// The stderr stream. Messages, log and progress bar share it, so that no line overwrites the bar.
 #[derive(Debug, Clone)]
@@ -15,10 +47,31 @@ impl Screen {
         Self(MultiProgress::new())
     }
 
-    /// Writes a line, above the bar if there is one.
+    /// Writes a line, above the bar if there is one. Hidden characters of values become visible.
     pub(super) fn line(&self, text: &str) {
+        self.write(&terminal_text(text));
+    }
+
+    /// Writes a JSON document on one line, above the bar if there is one.
+    pub(super) fn json_line(&self, value: &serde_json::Value) {
+        self.write(&visible_json(&value.to_string()));
+    }
+
+    /// Writes a line of the log. Its writer escapes terminal codes of values, so the codes that are left are its own.
+    pub(super) fn log_line(&self, text: &str) {
+        self.line(&text.replace("\u{1b}[", &OWN_CODE));
+    }
+
+    /// Writes a line of a log in JSON.
+    pub(super) fn json_log_line(&self, text: &str) {
+        self.write(&visible_json(text));
+    }
+
+    fn write(&self, line: &str) {
+        let line = format!("{line}\n");
+        let write = || std::io::stderr().lock().write_all(line.as_bytes());
         // A closed stderr cannot be reported anywhere.
-        let _ = self.clone().write_all(format!("{text}\n").as_bytes());
+        let _ = self.0.suspend(write);
     }
 
     /// Shows a bar below all lines.
@@ -27,20 +80,10 @@ impl Screen {
     }
 }
 
-impl Write for Screen {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0
-            .suspend(|| std::io::stderr().lock().write_all(bytes))?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        std::io::stderr().flush()
-    }
+/// Returns the codes that move the cursor to the top left and clear the terminal, for `status --watch`.
+pub(super) fn clear_code() -> String {
+    format!("{0}H{0}2J", OWN_CODE.as_str())
 }
-
-/// Moves the cursor to the top left and clears the terminal, for `status --watch`.
-pub(super) const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 
 /// Meaning of a piece of text, shown as a colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +126,7 @@ impl Palette {
         self.on
     }
 
-    /// Returns the text in the colour of its tone.
+    /// Returns the text in the colour of its tone. The codes become real ones in [`terminal_text`].
     pub(super) fn paint(self, tone: Tone, text: impl std::fmt::Display) -> String {
         let code = match tone {
             Tone::Good => "32",
@@ -93,7 +136,7 @@ impl Palette {
             Tone::Faint => "2",
         };
         if self.on {
-            format!("\u{1b}[{code}m{text}\u{1b}[0m")
+            format!("{0}{code}m{text}{0}0m", OWN_CODE.as_str())
         } else {
             text.to_string()
         }
@@ -111,12 +154,35 @@ fn is_no_color() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{ColorChoice, Palette, Tone};
+    use super::{ColorChoice, Palette, Tone, clear_code, terminal_line, terminal_text};
+
+    #[test]
+    fn only_own_codes_reach_the_terminal() {
+        let palette = Palette::choose(ColorChoice::Always, false);
+        let hostile = "\u{1b}[32mok\u{1b}[0m\u{1b}]0;title\u{7}";
+        let text = format!(
+            "{}\n{}\u{202e}",
+            palette.paint(Tone::Good, hostile),
+            clear_code()
+        );
+        assert_eq!(
+            terminal_text(&text),
+            "\u{1b}[32m\\u{1b}[32mok\\u{1b}[0m\\u{1b}]0;title\\u{7}\u{1b}[0m\n\u{1b}[H\u{1b}[2J\\u{202e}"
+        );
+        let cell = palette.paint(Tone::Bad, "a\nb");
+        assert_eq!(
+            terminal_text(&terminal_line(&cell)),
+            "\u{1b}[31ma b\u{1b}[0m"
+        );
+    }
 
     #[test]
     fn colour_is_used_only_where_it_is_wanted() {
         let always = Palette::choose(ColorChoice::Always, false);
-        assert_eq!(always.paint(Tone::Bad, "x"), "\u{1b}[31mx\u{1b}[0m");
+        assert_eq!(
+            terminal_text(&always.paint(Tone::Bad, "x")),
+            "\u{1b}[31mx\u{1b}[0m"
+        );
         let piped = Palette::choose(ColorChoice::Auto, false);
         assert_eq!(piped.paint(Tone::Bad, "x"), "x");
         assert_eq!(Palette::choose(ColorChoice::Never, true), Palette::PLAIN);

@@ -8,7 +8,7 @@ use super::time_text::{duration, utc};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
-    ThresholdMetric, Verdict,
+    ThresholdMetric, Verdict, one_line,
 };
 use crate::report::ManualCorrection;
 use crate::store::Project;
@@ -106,7 +106,7 @@ impl PairPage<'_> {
             Some(failed) => format!(
                 "{}  {} ({}, at {}, {})\n",
                 self.palette.paint(Tone::Bad, "failed"),
-                failed.failure.message,
+                one_line(&failed.failure.message),
                 failed.failure.class,
                 failed.stage,
                 utc(failed.at)

@@ -10,11 +10,11 @@ use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::output;
-use super::screen::{CLEAR, Palette, Tone};
+use super::screen::{Palette, Tone, clear_code};
 use super::table::{columns, count};
 use super::verdict::reviewer_name;
 use crate::catalog::{StageCounts, StatusCounts};
-use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
+use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict, one_line};
 use crate::runner;
 use crate::store::RunLock;
 
@@ -103,7 +103,7 @@ fn print_status(
     if context.global.json {
         let json = status.json(args.failed)?;
         if args.watch {
-            output::print(&json.to_string())?;
+            output::print_json_text(&json.to_string())?;
         } else {
             output::print_json(&json)?;
         }
@@ -111,7 +111,7 @@ fn print_status(
         let dir = context.dir().display().to_string();
         let mut text = screen(status, &dir, context.stdout);
         if args.watch && std::io::stdout().is_terminal() {
-            text.insert_str(0, CLEAR);
+            text.insert_str(0, &clear_code());
         }
         output::print(&text)?;
         for command in next_steps(status) {
@@ -154,7 +154,7 @@ fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
     let done = status.jobs(JobStatus::Done);
     let pairs = status.counts.pairs;
     let mut parts = vec![
-        dir.to_owned(),
+        one_line(dir).into_owned(),
         count(pairs, "pair"),
         palette.paint(Tone::Good, format!("{done} done")),
     ];

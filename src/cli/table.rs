@@ -2,10 +2,13 @@
 
 use unicode_width::UnicodeWidthStr;
 
+use super::screen::terminal_line;
+
 /// Formats rows as columns two spaces apart, without trailing blanks. `aligns` has one character per column: `<` for
 /// left and `>` for right.
 pub(super) fn columns(rows: impl IntoIterator<Item = Vec<String>>, aligns: &str) -> String {
-    let rows: Vec<Vec<String>> = rows.into_iter().collect();
+    let one_line = |row: Vec<String>| row.iter().map(|cell| terminal_line(cell)).collect();
+    let rows: Vec<Vec<String>> = rows.into_iter().map(one_line).collect();
     let width_of_column = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column));
         cells.map(|cell| width(cell)).max().unwrap_or(0)
@@ -50,7 +53,10 @@ pub(super) fn count(number: u64, noun: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use clap::ColorChoice;
+
     use super::{columns, count, width};
+    use crate::cli::screen::{Palette, Tone};
 
     #[test]
     fn columns_line_up_whatever_the_colours_and_scripts() {
@@ -58,7 +64,7 @@ mod tests {
             vec!["a".to_owned(), "永".to_owned(), "1".to_owned()],
             vec![
                 "bb".to_owned(),
-                "\u{1b}[31mx\u{1b}[0m".to_owned(),
+                Palette::choose(ColorChoice::Always, false).paint(Tone::Bad, "x"),
                 "10".to_owned(),
             ],
             // Two Vietnamese letters: one as a single character, one as a base letter with two combining marks.
@@ -71,6 +77,15 @@ mod tests {
         let text = columns(rows, "<<>");
         let ends: Vec<usize> = text.lines().map(width).collect();
         assert_eq!(ends, [12, 12, 12]);
+    }
+
+    #[test]
+    fn a_cell_cannot_add_lines_or_hidden_characters() {
+        let rows = [
+            vec!["a\nnext: rm".to_owned(), "1".to_owned()],
+            vec!["\u{202e}".to_owned(), "10".to_owned()],
+        ];
+        assert_eq!(columns(rows, "<>"), "a next: rm   1\n\\u{202e}    10\n");
     }
 
     #[test]

@@ -200,7 +200,7 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
     catalog.close().await;
     if context.global.json {
         for event in &events {
-            output::print(&serde_json::to_string(event)?)?;
+            output::print_json_text(&serde_json::to_string(event)?)?;
         }
     } else if events.is_empty() {
         context.info("no verdicts yet");

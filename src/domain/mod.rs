@@ -35,7 +35,7 @@ pub use outcome::{
     PoseFeatures, RegisterOutcome, ReliefHeights, Scores, SideEvidence, ThresholdChoice,
 };
 pub use review_order::ReviewOrder;
-pub use sanitize::sanitize;
+pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};

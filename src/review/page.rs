@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, html};
 use super::i18n::Language;
 use super::keys::ACTIONS;
 use super::options::QueueOptions;
-use crate::domain::{Reason, ReviewOrder};
+use crate::domain::{Reason, ReviewOrder, one_line};
 
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
@@ -45,7 +45,11 @@ pub(super) fn token_used(language: Language) -> Markup {
 
 /// Returns the review page.
 pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
-    let title = format!("{} · {}", language.translate("title"), options.reviewer);
+    let title = format!(
+        "{} · {}",
+        language.translate("title"),
+        one_line(&options.reviewer)
+    );
     let head = html! {
         link rel="stylesheet" href="/assets/review.css";
         link rel="icon" href="/assets/icon.svg";
@@ -92,7 +96,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             span.spacer {}
             span #pace {}
             span #saved .saved role="status" { (language.translate("saved")) }
-            span { (language.translate("reviewer")) ": " b { (options.reviewer) } }
+            span { (language.translate("reviewer")) ": " b { (one_line(&options.reviewer)) } }
             a #language href={ "/?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
                 (language.translate("other_language"))
             }

@@ -4,6 +4,7 @@ use super::comparison_tables::{comparisons, score_comparisons};
 use super::report_tables::{headline, tables};
 use super::risk_coverage_tables::full_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
+use crate::domain::{one_line, visible};
 use crate::report::model::Report;
 
 /// Returns the report as LaTeX, for `\input`.
@@ -83,7 +84,7 @@ fn line(cells: impl Iterator<Item = String>) -> String {
 
 /// Returns text that cannot end its comment line.
 fn comment(text: &str) -> String {
-    text.replace(['\n', '\r'], " ")
+    one_line(text).into_owned()
 }
 
 /// Escapes text so that LaTeX shows it unchanged.
@@ -99,7 +100,8 @@ fn escape(text: &str) -> String {
         '\n' | '\r' => " ".to_owned(),
         other => other.to_string(),
     };
-    text.chars().map(escape).collect()
+    // Before the other escapes: LaTeX would take the backslash of a visible escape for a command.
+    visible(text).chars().map(escape).collect()
 }
 
 #[cfg(test)]

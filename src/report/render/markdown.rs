@@ -4,6 +4,7 @@ use super::comparison_tables::{comparison_sentences, comparisons, score_comparis
 use super::report_tables::{headline, tables};
 use super::risk_coverage_tables::full_tables;
 use super::table::{ColumnFormat, Table};
+use crate::domain::one_line;
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
@@ -70,10 +71,10 @@ fn failures(group: &FailureGroup) -> String {
 fn escape(text: &str) -> String {
     let escape = |c| match c {
         '\\' | '`' | '*' | '_' | '|' | '<' | '>' | '[' | ']' | '#' | '~' => format!("\\{c}"),
-        '\n' | '\r' => " ".to_owned(),
         other => other.to_string(),
     };
-    text.chars().map(escape).collect()
+    // Before the other escapes, which keep the backslash of a visible escape.
+    one_line(text).chars().map(escape).collect()
 }
 
 #[cfg(test)]

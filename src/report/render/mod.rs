@@ -15,7 +15,7 @@ mod text;
 
 use super::gallery::Gallery;
 use super::model::Report;
-use crate::domain::enum_names;
+use crate::domain::{enum_names, visible, visible_json};
 
 pub use agreement_text::agreement_text;
 pub use html::{Cover, MAX_PAGE_BYTES, page};
@@ -42,16 +42,18 @@ enum_names! {
     Text = "text", Json = "json", Csv = "csv", Markdown = "markdown", Latex = "latex", Html = "html",
 }
 
-/// Returns the report in a format, with a newline at the end. For an HTML page with images, use [`page`].
+/// Returns the report in a format, with a newline at the end. Hidden characters of names and messages become visible.
+/// For an HTML page with images, use [`page`].
 pub fn render(report: &Report, format: ReportFormat) -> String {
-    match format {
+    let text = match format {
         ReportFormat::Text => text::render(report),
-        ReportFormat::Json => json(report),
+        ReportFormat::Json => return visible_json(&json(report)).into_owned(),
         ReportFormat::Csv => csv::render(report),
         ReportFormat::Markdown => markdown::render(report),
         ReportFormat::Latex => latex::render(report),
         ReportFormat::Html => page(report, &Gallery::default(), &Cover::default()),
-    }
+    };
+    visible(&text).into_owned()
 }
 
 /// Returns the report as indented JSON.

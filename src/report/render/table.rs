@@ -1,5 +1,6 @@
 //! A table of text cells, which the text, Markdown, LaTeX and HTML renderers share.
 
+use crate::domain::one_line;
 use crate::report::number_format::NumberStyle::{self, Count, Share};
 use crate::report::number_format::{format_count, format_number};
 
@@ -123,7 +124,7 @@ impl<T> TableBuilder<T> {
     ) -> Self {
         self.columns.push(TableColumn { header, format });
         for (row, item) in self.rows.iter_mut().zip(&self.items) {
-            row.push(cell(item));
+            row.push(cell(item).map(|text| one_line(&text).into_owned()));
         }
         self
     }

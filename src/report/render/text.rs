@@ -4,6 +4,7 @@ use super::comparison_tables::{comparison_sentences, score_comparisons};
 use super::report_tables::{headline, tables};
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
+use crate::domain::one_line;
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::NumberStyle::PValue;
 use crate::report::number_format::{format_count, format_number};
@@ -100,7 +101,9 @@ fn failures(group: &FailureGroup) -> String {
         group.class
     )];
     let listed = group.pairs.iter().take(MAX_LISTED);
-    lines.extend(listed.map(|pair| format!("  {}  {}: {}\n", pair.id, pair.stage, pair.error)));
+    lines.extend(
+        listed.map(|pair| format!("  {}  {}: {}\n", pair.id, pair.stage, one_line(&pair.error))),
+    );
     let more = group.count.saturating_sub(MAX_LISTED as u64);
     lines.extend((more > 0).then(|| format!("  and {} more\n", format_count(more))));
     lines.concat()

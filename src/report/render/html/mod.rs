@@ -9,6 +9,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::album::Album;
 use super::report_tables::headline;
+use crate::domain::visible;
 use crate::report::gallery::Gallery;
 use crate::report::model::Report;
 
@@ -35,7 +36,7 @@ pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
     let max_image_bytes = MAX_PAGE_BYTES.saturating_sub(without_images.len() + RESERVED_BYTES);
     let mut page = document(report, &Album::new(gallery, max_image_bytes), cover).into_string();
     page.push('\n');
-    page
+    visible(&page).into_owned()
 }
 
 fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
