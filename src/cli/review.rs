@@ -115,16 +115,25 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let signals = signals::watch(&stop)?;
     let drain = stop.clone();
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
-    tokio::select! {
-        served = served => served?,
+    let cut_off = tokio::select! {
+        cut_off = served => cut_off,
         // After a second signal, do not wait for open connections. Acknowledged answers are already stored.
-        () = stop.reached(StopLevel::Now) => {}
-    }
+        () = stop.reached(StopLevel::Now) => 1,
+    };
     signals.abort();
     catalog.close().await;
-    context.info("the page is closed; every answer is stored");
+    context.info(closing_line(cut_off == 0));
     context.next("report");
     Ok(ExitCode::Done)
+}
+
+/// Returns the last line. The browser keeps each answer until the server acknowledges it, and sends it again.
+const fn closing_line(is_complete: bool) -> &'static str {
+    if is_complete {
+        "the page is closed; every answer is stored"
+    } else {
+        "the page is closed; every acknowledged answer is stored, and the browser keeps the rest for the next start"
+    }
 }
 
 fn queue_options(args: &ReviewArgs) -> QueueOptions {
@@ -148,7 +157,7 @@ fn queue_options(args: &ReviewArgs) -> QueueOptions {
 /// Reports that there is nothing to adjudicate.
 fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
-        output::print(&json!({"schema": 1, "url": null}).to_string())?;
+        output::print_json_text(&json!({"schema": 1, "url": null}).to_string())?;
     }
     let reviewer = &args.reviewer;
     context.info(&format!(
@@ -178,7 +187,7 @@ fn announce(
 ) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
     let (url, address) = (page.url(), page.address());
     if context.global.json {
-        output::print(&json!({"schema": 1, "url": url}).to_string())?;
+        output::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
     } else {
         output::print(&url)?;
     }

@@ -4,10 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::answer::{InvalidInput, check_event, check_note};
 use super::item::ReviewItem;
-use super::item_images::{IMAGE_SIDE, ItemImages, ItemInputs};
+use super::item_images::{IMAGE_SIDE, ItemImages};
 use crate::catalog::ManualAlignment;
 use crate::domain::Affine2;
-use crate::raster::{MaskOverlap, warp_mask};
 use crate::report::ManualCorrection;
 
 /// Accepted scale of the relief relative to the image.
@@ -43,24 +42,14 @@ pub(super) fn start(
     images: &ItemImages,
     previous: Option<&ManualAlignment>,
 ) -> EditorStart {
-    let view = images.inputs.view();
+    let view = images.view;
     let in_view = |map: &Affine2| view.from_print().after(map);
     let print_from_view = view.from_print().inverse();
     EditorStart {
         view_from_depth: in_view(&item.view.print_from_depth),
         previous: previous.map(|made| in_view(&made.print_from_depth)),
-        canvas_from_view: print_from_view.map(|map| images.inputs.canvas.from_print.after(&map)),
+        canvas_from_view: print_from_view.map(|map| images.canvas_from_print.after(&map)),
     }
-}
-
-/// Computes the overlap of an item's masks under `print_from_depth`, with the method used to score results.
-pub(super) fn mask_overlap(images: &ItemImages, print_from_depth: &Affine2) -> MaskOverlap {
-    let ItemInputs {
-        canvas, strokes, ..
-    } = &images.inputs;
-    let map = canvas.from_print.after(print_from_depth);
-    let (width, height) = (canvas.print_mask.width(), canvas.print_mask.height());
-    warp_mask(strokes, &map, width, height).overlap(&canvas.print_mask)
 }
 
 /// A manual alignment as the page shows it.
@@ -100,7 +89,7 @@ impl AlignmentBody {
         let is_finite = rows.as_flattened().iter().all(|n| n.is_finite());
         let [x, y] = rows.map(|row| row[2]);
         let is_near = x.abs().max(y.abs()) <= 1000.0 * IMAGE_SIDE as f64;
-        let print_from_view = images.inputs.view().from_print().inverse();
+        let print_from_view = images.view.from_print().inverse();
         let map = print_from_view.map(|map| map.after(&self.view_from_depth));
         match map {
             Some(map) if is_finite && is_near && SCALES.contains(&map.scale()) => Ok(map),

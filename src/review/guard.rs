@@ -2,7 +2,9 @@
 //! need the session cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token.
 
 use std::sync::Arc;
+use std::time::Duration;
 
+use axum::body::to_bytes;
 use axum::extract::{Request, State};
 use axum::http::header::AsHeaderName;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
@@ -12,7 +14,9 @@ use axum::response::{IntoResponse as _, Response};
 use super::state::ServerState;
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
-pub(super) const BODY_LIMIT: usize = 16 * 1024;
+const BODY_LIMIT: usize = 16 * 1024;
+/// Maximum time in which the body arrives.
+const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Request header that carries the CSRF token.
 pub(super) const CSRF_HEADER: &str = "x-csrf-token";
 /// Path that accepts the one-time token.
@@ -65,14 +69,29 @@ const WRONG_TOKEN: Rejection = (
     "the server was restarted; reload the page",
 );
 
+/// The body is too large.
+const TOO_LARGE: Rejection = (
+    StatusCode::PAYLOAD_TOO_LARGE,
+    "a request may have at most 16 KiB",
+);
+/// The body did not arrive in time.
+const TOO_SLOW: Rejection = (
+    StatusCode::REQUEST_TIMEOUT,
+    "the request took too long to arrive",
+);
+
 /// Rejects unauthorised requests and adds the security headers to every response.
 pub(super) async fn guard(
     State(state): State<Arc<ServerState>>,
     request: Request,
     next: Next,
 ) -> Response {
-    let mut response = match check(&state, &request) {
-        Ok(()) => next.run(request).await,
+    let checked = match check(&state, &request) {
+        Ok(()) => with_whole_body(request).await,
+        Err(rejection) => Err(rejection),
+    };
+    let mut response = match checked {
+        Ok(request) => next.run(request).await,
         Err(rejection) => rejection.into_response(),
     };
     let headers = response.headers_mut();
@@ -111,6 +130,17 @@ fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
         return Err(WRONG_TOKEN);
     }
     Ok(())
+}
+
+/// Reads the body, so that a handler that has begun does not wait for the client.
+async fn with_whole_body(request: Request) -> Result<Request, Rejection> {
+    let (head, body) = request.into_parts();
+    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, BODY_LIMIT)).await {
+        Ok(Ok(body)) => Ok(Request::from_parts(head, body.into())),
+        // If the client closed the connection, this reason is wrong, but nobody reads it.
+        Ok(Err(_)) => Err(TOO_LARGE),
+        Err(_) => Err(TOO_SLOW),
+    }
 }
 
 fn text(headers: &HeaderMap, name: impl AsHeaderName) -> Option<&str> {

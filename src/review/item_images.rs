@@ -1,24 +1,27 @@
 //! Images of an item as PNG, rendered once and cached. Attention checks are rendered like results.
+//!
+//! The page never shows a print larger than [`IMAGE_SIDE`] pixels, also when it zooms in. So only the rendered images are
+//! cached. Prints are decoded one at a time, and dropped once their image is rendered.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use serde::Deserialize;
-use tokio::sync::{Mutex, OnceCell};
+use tokio::sync::{Mutex, OnceCell, Semaphore};
 
 use super::item::ReviewItem;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Affine2, Stage};
 use crate::export::pictures::{PrintView, shaded};
 use crate::export::{SourcePrint, SourcePrintError};
-use crate::raster::{self, DepthMap, Mask, png_mask, png_rgb8};
+use crate::raster::{self, DepthMap, Mask, MaskOverlap, png_mask, png_rgb8, warp_mask};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
 /// Longer side of an image in pixels.
 pub(super) const IMAGE_SIDE: usize = 640;
-/// Number of items whose images are cached.
-const CACHED_ITEMS: usize = 48;
+/// Maximum number of bytes of the cached images. Most items have 100 to 500 KB.
+const MAX_CACHED_BYTES: usize = 64 << 20;
 
 /// One of the images of an item, by its name in URLs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -56,31 +59,21 @@ pub(super) enum ImageError {
     Stopped(#[from] tokio::task::JoinError),
 }
 
-/// The canvas on which the scores of a pair are computed.
+/// The depth map of an item, and the canvas on which its scores are computed.
 #[derive(Debug)]
-pub(super) struct ScoreCanvas {
-    pub(super) print_mask: Mask,
-    pub(super) from_print: Affine2,
+pub(super) struct AlignmentInputs {
+    canvas_mask: Mask,
+    canvas_from_print: Affine2,
+    depth: DepthMap,
+    strokes: Mask,
 }
 
-/// Everything an item shows, read from the project.
-#[derive(Debug)]
-pub(super) struct ItemInputs {
-    pub(super) print: SourcePrint,
-    print_mask: Mask,
-    pub(super) canvas: ScoreCanvas,
-    pub(super) depth: DepthMap,
-    pub(super) strokes: Mask,
-}
-
-impl ItemInputs {
-    fn read(
-        project: &Project,
-        pair: &PairResults,
-        item: &ReviewItem,
-        limits: &raster::ImageLimits,
-    ) -> Result<Self, ImageError> {
-        let aligned = PairArtifacts::new(project, pair);
+impl AlignmentInputs {
+    /// Reads the inputs of an item.
+    ///
+    /// # Errors
+    /// Returns an error if an artifact cannot be read, or if the pair has a new result.
+    fn read(aligned: &PairArtifacts<'_>, item: &ReviewItem) -> Result<Self, ImageError> {
         let hashes = (
             aligned.stage(Stage::Depth)?.result_hash,
             aligned.stage(Stage::Normalize)?.print_hash,
@@ -90,27 +83,36 @@ impl ItemInputs {
         }
         let depth = aligned.depth()?;
         Ok(Self {
-            print: SourcePrint::read(project, pair, limits)?,
-            print_mask: aligned.print_mask()?,
-            canvas: ScoreCanvas {
-                print_mask: aligned.canvas_print_mask()?,
-                from_print: aligned.canvas_from_print()?,
-            },
+            canvas_mask: aligned.canvas_print_mask()?,
+            canvas_from_print: aligned.canvas_from_print()?,
             strokes: depth.stroke_mask(item.view.level),
             depth,
         })
     }
 
-    /// Returns the frame of the rendered images.
-    pub(super) fn view(&self) -> PrintView {
-        PrintView::of_side(&self.print.picture, IMAGE_SIDE)
+    /// Computes the overlap of the masks under `print_from_depth`, with the method used to score results.
+    pub(super) fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
+        let map = self.canvas_from_print.after(print_from_depth);
+        let (width, height) = (self.canvas_mask.width(), self.canvas_mask.height());
+        warp_mask(&self.strokes, &map, width, height).overlap(&self.canvas_mask)
+    }
+
+    /// Returns the shaded relief in the depth map's frame.
+    fn relief(&self) -> Vec<u8> {
+        let slope = self.depth.scale.height_per_level / self.depth.scale.mesh_unit_per_px;
+        png_rgb8(&shaded(&self.depth.levels, slope))
     }
 }
 
-/// The encoded images of an item, and what they were rendered from.
+/// The encoded images of an item, and their frame.
 #[derive(Debug)]
 pub(super) struct ItemImages {
-    pub(super) inputs: ItemInputs,
+    /// Frame of the images.
+    pub(super) view: PrintView,
+    /// Print pixels to pixels of the canvas on which scores are computed.
+    pub(super) canvas_from_print: Affine2,
+    /// Scores of the alignment that the item shows.
+    pub(super) scores: MaskOverlap,
     print: Vec<u8>,
     print_mask: Vec<u8>,
     relief: Vec<u8>,
@@ -118,32 +120,35 @@ pub(super) struct ItemImages {
 }
 
 impl ItemImages {
-    fn render(inputs: ItemInputs, print_from_depth: &Affine2) -> Self {
-        let view = inputs.view();
-        Self {
-            print: png_rgb8(&view.print(&inputs.print.picture)),
-            print_mask: png_mask(&view.mask(&inputs.print_mask, &Affine2::IDENTITY)),
+    fn render(
+        project: &Project,
+        pair: &PairResults,
+        item: &ReviewItem,
+        limits: &raster::ImageLimits,
+    ) -> Result<Self, ImageError> {
+        let aligned = PairArtifacts::new(project, pair);
+        let inputs = AlignmentInputs::read(&aligned, item)?;
+        let (view, print) = {
+            let source = SourcePrint::read(project, pair, limits)?;
+            let view = PrintView::of_side(&source.picture, IMAGE_SIDE);
+            (view, png_rgb8(&view.print(&source.picture)))
+        };
+        let print_from_depth = &item.view.print_from_depth;
+        let print_mask = view.mask(&aligned.print_mask()?, &Affine2::IDENTITY);
+        Ok(Self {
+            view,
+            canvas_from_print: inputs.canvas_from_print,
+            scores: inputs.mask_overlap(print_from_depth),
+            print,
+            print_mask: png_mask(&print_mask),
             relief: png_rgb8(&view.relief(&inputs.depth, print_from_depth)),
             depth_mask: png_mask(&view.mask(&inputs.strokes, print_from_depth)),
-            inputs,
-        }
+        })
     }
 
-    /// Returns an image as PNG. Layers for manual alignment are rendered on demand, because they are rarely needed.
-    pub(super) fn layer(&self, layer: ImageLayer) -> Vec<u8> {
-        match layer {
-            ImageLayer::Print => self.print.clone(),
-            ImageLayer::PrintMask => self.print_mask.clone(),
-            ImageLayer::Relief => self.relief.clone(),
-            ImageLayer::DepthMask => self.depth_mask.clone(),
-            ImageLayer::DepthFrameRelief => {
-                let depth = &self.inputs.depth;
-                let slope = depth.scale.height_per_level / depth.scale.mesh_unit_per_px;
-                png_rgb8(&shaded(&depth.levels, slope))
-            }
-            ImageLayer::DepthFrameMask => png_mask(&self.inputs.strokes),
-            ImageLayer::CanvasMask => png_mask(&self.inputs.canvas.print_mask),
-        }
+    /// Returns the number of bytes of the images.
+    const fn bytes(&self) -> usize {
+        self.print.len() + self.print_mask.len() + self.relief.len() + self.depth_mask.len()
     }
 }
 
@@ -153,29 +158,58 @@ pub(super) struct ImageCache {
     catalog: Catalog,
     project: Project,
     limits: raster::ImageLimits,
-    slots: Mutex<CacheSlots>,
+    slots: Mutex<CacheSlots<ItemImages>>,
+    /// Permits one item at a time to read its print or its artifacts.
+    reading: Arc<Semaphore>,
 }
+
+/// Values that are created once per item.
+type Slot<T> = Arc<OnceCell<Arc<T>>>;
 
 /// Cache entries by item id. The oldest entry is evicted first.
-#[derive(Debug, Default)]
-struct CacheSlots {
-    images: BTreeMap<String, Arc<OnceCell<Arc<ItemImages>>>>,
-    /// Item ids, oldest first.
-    order: VecDeque<String>,
+#[derive(Debug)]
+struct CacheSlots<T> {
+    slots: BTreeMap<String, Slot<T>>,
+    /// Ids of items with a value and the bytes of the value, oldest first.
+    stored: VecDeque<(String, usize)>,
 }
 
-impl CacheSlots {
-    /// Returns the entry of an item, evicting the oldest entry for a new one.
-    fn entry(&mut self, id: &str) -> Arc<OnceCell<Arc<ItemImages>>> {
-        if !self.images.contains_key(id) {
-            self.order.push_back(id.to_owned());
-            if self.order.len() > CACHED_ITEMS
-                && let Some(oldest) = self.order.pop_front()
-            {
-                self.images.remove(&oldest);
-            }
+impl<T> Default for CacheSlots<T> {
+    fn default() -> Self {
+        Self {
+            slots: BTreeMap::new(),
+            stored: VecDeque::new(),
         }
-        Arc::clone(self.images.entry(id.to_owned()).or_default())
+    }
+}
+
+impl<T> CacheSlots<T> {
+    /// Returns the entry of an item, which may have no value yet.
+    fn entry(&mut self, id: &str) -> Slot<T> {
+        Arc::clone(self.slots.entry(id.to_owned()).or_default())
+    }
+
+    /// Records the bytes of a new value, and evicts the oldest values that do not fit with it.
+    fn add(&mut self, id: &str, bytes: usize) {
+        self.stored.push_back((id.to_owned(), bytes));
+        let mut sum: usize = self.stored.iter().map(|(_, bytes)| bytes).sum();
+        while sum > MAX_CACHED_BYTES
+            && let Some((oldest, bytes)) = self.stored.pop_front()
+        {
+            self.slots.remove(&oldest);
+            sum -= bytes;
+        }
+    }
+
+    /// Removes an entry without a value, unless another request waits for it.
+    fn remove_failed(&mut self, id: &str, slot: Slot<T>) {
+        drop(slot);
+        if let Some(slot) = self.slots.get(id)
+            && slot.get().is_none()
+            && Arc::strong_count(slot) == 1
+        {
+            self.slots.remove(id);
+        }
     }
 }
 
@@ -186,7 +220,28 @@ impl ImageCache {
             project,
             limits,
             slots: Mutex::default(),
+            reading: Arc::new(Semaphore::new(1)),
         }
+    }
+
+    /// Returns an image as PNG. Layers for manual alignment are rendered on demand, because they are rarely needed.
+    ///
+    /// # Errors
+    /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
+    pub(super) async fn layer(
+        &self,
+        item: &Arc<ReviewItem>,
+        layer: ImageLayer,
+    ) -> Result<Vec<u8>, ImageError> {
+        Ok(match layer {
+            ImageLayer::Print => self.of(item).await?.print.clone(),
+            ImageLayer::PrintMask => self.of(item).await?.print_mask.clone(),
+            ImageLayer::Relief => self.of(item).await?.relief.clone(),
+            ImageLayer::DepthMask => self.of(item).await?.depth_mask.clone(),
+            ImageLayer::DepthFrameRelief => self.alignment_inputs(item).await?.relief(),
+            ImageLayer::DepthFrameMask => png_mask(&self.alignment_inputs(item).await?.strokes),
+            ImageLayer::CanvasMask => png_mask(&self.alignment_inputs(item).await?.canvas_mask),
+        })
     }
 
     /// Returns the images of an item. Concurrent requests for one item share one rendering.
@@ -194,19 +249,52 @@ impl ImageCache {
     /// # Errors
     /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
     pub(super) async fn of(&self, item: &Arc<ReviewItem>) -> Result<Arc<ItemImages>, ImageError> {
-        let entry = self.slots.lock().await.entry(&item.id);
-        let images = entry.get_or_try_init(|| self.render(item)).await?;
-        Ok(Arc::clone(images))
+        let slot = self.slots.lock().await.entry(&item.id);
+        let render = async || {
+            let limits = self.limits;
+            let render = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
+                ItemImages::render(project, pair, item, &limits)
+            };
+            let images = Arc::new(self.read(item, render).await?);
+            self.slots.lock().await.add(&item.id, images.bytes());
+            Ok(images)
+        };
+        let images = slot.get_or_try_init(render).await.map(Arc::clone);
+        if images.is_err() {
+            self.slots.lock().await.remove_failed(&item.id, slot);
+        }
+        images
     }
 
-    async fn render(&self, item: &Arc<ReviewItem>) -> Result<Arc<ItemImages>, ImageError> {
+    /// Reads what a manual alignment of an item needs.
+    ///
+    /// # Errors
+    /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
+    pub(super) async fn alignment_inputs(
+        &self,
+        item: &Arc<ReviewItem>,
+    ) -> Result<AlignmentInputs, ImageError> {
+        let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
+            AlignmentInputs::read(&PairArtifacts::new(project, pair), item)
+        };
+        self.read(item, read).await
+    }
+
+    /// Calls `read` on another thread with the current results of the item's pair, for one item at a time.
+    async fn read<T: Send + 'static>(
+        &self,
+        item: &Arc<ReviewItem>,
+        read: impl FnOnce(&Project, &PairResults, &ReviewItem) -> Result<T, ImageError> + Send + 'static,
+    ) -> Result<T, ImageError> {
+        let permit = Arc::clone(&self.reading).acquire_owned().await;
+        let permit = permit.map_err(|_closed| ImageError::Gone)?;
         let found = self.catalog.pair(&item.pair).await?;
         let pair = found.ok_or(ImageError::Gone)?.results;
-        let (project, limits, item) = (self.project.clone(), self.limits, Arc::clone(item));
+        let (project, item) = (self.project.clone(), Arc::clone(item));
         tokio::task::spawn_blocking(move || {
-            let inputs = ItemInputs::read(&project, &pair, &item, &limits)?;
-            let images = ItemImages::render(inputs, &item.view.print_from_depth);
-            Ok(Arc::new(images))
+            // A task continues after its client has left, so the task holds the permit.
+            let _permit = permit;
+            read(&project, &pair, &item)
         })
         .await?
     }
@@ -214,7 +302,9 @@ impl ImageCache {
 
 #[cfg(test)]
 mod tests {
-    use super::{CACHED_ITEMS, CacheSlots, ImageLayer};
+    use std::sync::Arc;
+
+    use super::{CacheSlots, ImageLayer, MAX_CACHED_BYTES};
 
     #[test]
     fn layers_are_found_by_name_and_nothing_else_is() {
@@ -230,13 +320,26 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_entry_is_evicted() {
-        let mut slots = CacheSlots::default();
-        for i in 0..=CACHED_ITEMS {
-            slots.entry(&i.to_string());
+    fn the_oldest_values_are_evicted_if_all_have_too_many_bytes() {
+        let mut slots = CacheSlots::<()>::default();
+        let half = MAX_CACHED_BYTES / 2;
+        for (id, bytes) in [("a", 1), ("b", half), ("c", half)] {
+            slots.entry(id).set(Arc::new(())).expect("a new entry");
+            slots.add(id, bytes);
         }
-        slots.entry("1");
-        assert_eq!(slots.images.len(), CACHED_ITEMS);
-        assert!(!slots.images.contains_key("0") && slots.images.contains_key("1"));
+        let ids = |slots: &CacheSlots<()>| slots.slots.keys().cloned().collect::<Vec<_>>();
+        assert_eq!(ids(&slots), ["b", "c"]);
+        slots.add("c", MAX_CACHED_BYTES + 1);
+        assert!(slots.slots.is_empty() && slots.stored.is_empty());
+    }
+
+    #[test]
+    fn an_entry_without_value_is_removed_unless_another_request_waits_for_it() {
+        let mut slots = CacheSlots::<()>::default();
+        let (first, second) = (slots.entry("a"), slots.entry("a"));
+        slots.remove_failed("a", first);
+        assert_eq!(slots.slots.len(), 1);
+        slots.remove_failed("a", second);
+        assert!(slots.slots.is_empty());
     }
 }

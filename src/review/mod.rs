@@ -7,6 +7,8 @@ mod alignment_editor;
 mod answer;
 mod assets;
 mod check_items;
+mod connection;
+mod connections;
 mod guard;
 mod history;
 mod i18n;

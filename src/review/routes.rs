@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
-use axum::extract::{DefaultBodyLimit, Path, RawQuery, State};
+use axum::extract::{Path, RawQuery, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use axum::routing::{get, post};
@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
 use super::answer::{AnswerBody, InvalidInput, UndoBody};
 use super::assets;
-use super::guard::{BODY_LIMIT, START, guard};
+use super::guard::{START, guard};
 use super::history::ReviewerHistory;
 use super::i18n::Language;
 use super::item::ReviewItem;
@@ -23,7 +23,7 @@ use super::page;
 use super::review_queue::QueueError;
 use super::state::ServerState;
 use crate::catalog::{CatalogError, ManualAlignment};
-use crate::domain::{PairName, ReviewOrder, Stage};
+use crate::domain::{PairName, ReviewOrder, Stage, one_line};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// Returns the router with all routes behind the guard.
@@ -41,7 +41,6 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
-        .layer(DefaultBodyLimit::max(BODY_LIMIT))
         .layer(middleware::from_fn_with_state(Arc::clone(state), guard))
         .with_state(Arc::clone(state))
 }
@@ -181,9 +180,9 @@ async fn image(
     let item = served_item(&state, &id)?;
     let layer: Option<ImageLayer> = serde_json::from_value(layer.into()).ok();
     let layer = layer.ok_or(ApiError::NoItem)?;
-    let images = state.images.of(&item).await?;
+    let png = state.images.layer(&item, layer).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
-    Ok((kind, images.layer(layer)).into_response())
+    Ok((kind, png).into_response())
 }
 
 /// Returns the pair, metrics and scores of an answered item. Attention checks look like results.
@@ -194,7 +193,7 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
         return Err(ApiError::NotAnswered);
     }
     let images = state.images.of(&item).await?;
-    let scores = alignment_editor::mask_overlap(&images, &item.view.print_from_depth);
+    let scores = images.scores;
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
@@ -217,7 +216,8 @@ async fn other_verdicts(
     for event in log {
         let is_other = event.reviewer != state.options.queue.reviewer && event.undone_at.is_none();
         let verdict = json!({
-            "reviewer": event.reviewer, "verdict": event.verdict, "reason": event.reason, "note": event.note,
+            "reviewer": one_line(&event.reviewer), "verdict": event.verdict, "reason": event.reason,
+            "note": event.note.as_deref().map(one_line),
         });
         if is_other && is_on_item(event.result_hash) && !verdicts.contains(&verdict) {
             verdicts.push(verdict);
@@ -268,7 +268,8 @@ async fn align(
     let item = served_item(&state, &body.item)?;
     let images = state.images.of(&item).await?;
     let print_from_depth = body.print_from_depth(&images)?;
-    let scores = alignment_editor::mask_overlap(&images, &print_from_depth);
+    let inputs = state.images.alignment_inputs(&item).await?;
+    let scores = inputs.mask_overlap(&print_from_depth);
     let pair = state
         .catalog
         .pair(&item.pair)

@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use tokio::net::TcpListener;
 
+use super::connection::ConnectionLimits;
+use super::connections;
 use super::guard::START;
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
@@ -36,9 +38,6 @@ pub enum ReviewError {
     /// The catalog cannot be read.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
-    /// The server failed.
-    #[error("the review server stopped: {0}")]
-    Serve(std::io::Error),
 }
 
 /// A server that is bound and ready to serve.
@@ -118,19 +117,11 @@ impl ReviewServer {
         self.counts
     }
 
-    /// Serves requests until `stop` completes.
-    ///
-    /// # Errors
-    /// Returns an error if the socket fails.
-    pub async fn serve(
-        self,
-        stop: impl Future<Output = ()> + Send + 'static,
-    ) -> Result<(), ReviewError> {
+    /// Serves requests until `stop` completes, and then at most two seconds longer. Returns the number of requests that
+    /// were cut off without a response.
+    pub async fn serve(self, stop: impl Future<Output = ()>) -> usize {
         let router = routes::router(&self.state);
-        axum::serve(self.listener, router)
-            .with_graceful_shutdown(stop)
-            .await
-            .map_err(ReviewError::Serve)
+        connections::serve(self.listener, router, ConnectionLimits::system(), stop).await
     }
 }
 

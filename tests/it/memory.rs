@@ -17,7 +17,7 @@ const PIXELS: usize = 5_000_000;
 const MEMORY_MIB: u64 = 400;
 
 /// Scales a print up to nearly [`PIXELS`] pixels.
-fn enlarge(path: &Path) {
+pub(crate) fn enlarge(path: &Path) {
     let bytes = std::fs::read(path).expect("a print");
     let small = decode(&bytes, &ImageLimits::SUGGESTED)
         .expect("a picture")

@@ -128,6 +128,16 @@ impl Page {
         page
     }
 
+    /// Returns the process id of the server.
+    pub(crate) fn pid(&self) -> rustix::process::Pid {
+        rustix::process::Pid::from_child(&self.child)
+    }
+
+    /// Waits for the server to end and returns its exit code.
+    pub(crate) fn exit_code(&mut self) -> Option<i32> {
+        self.child.wait().expect("an end").code()
+    }
+
     /// Kills the server as by `kill -9`.
     pub(crate) fn kill(&mut self) {
         self.child.kill().expect("killed");

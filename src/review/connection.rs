@@ -1,0 +1,181 @@
+//! Serves one connection of the review page within time limits.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use axum::Router;
+use axum::extract::Request;
+use axum::response::Response;
+use hyper::body::Incoming;
+use hyper::server::conn::http1;
+use hyper::service::Service;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
+use rustix::process::{Resource, getrlimit};
+use tokio::net::TcpStream;
+use tokio::sync::{Notify, watch};
+use tokio::time::Instant;
+
+/// Limits on the connections of a server.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ConnectionLimits {
+    /// Maximum number of open connections.
+    pub(super) connections: usize,
+    /// Maximum time until the header of the next request is complete. This limits idle connections as well.
+    pub(super) header: Duration,
+    /// Maximum time from the response to the next request. This limits clients that do not read the response.
+    pub(super) response: Duration,
+    /// Maximum time that the shutdown waits for a response.
+    pub(super) shutdown: Duration,
+    /// Maximum time that the shutdown waits for the rest of a request's header.
+    pub(super) shutdown_header: Duration,
+}
+
+impl ConnectionLimits {
+    /// Returns the limits for this process. At most a quarter of its file descriptors are used for connections.
+    pub(super) fn system() -> Self {
+        let descriptors = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+        Self {
+            connections: (descriptors / 4).clamp(4, 128) as usize,
+            header: Duration::from_secs(15),
+            response: Duration::from_mins(1),
+            shutdown: Duration::from_secs(2),
+            shutdown_header: Duration::from_millis(300),
+        }
+    }
+}
+
+/// How a connection ended.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum ConnectionEnd {
+    /// No request was in progress.
+    Closed,
+    /// The shutdown ended a request that took too long.
+    CutOff,
+}
+
+/// What a connection is doing.
+#[derive(Debug)]
+pub(super) struct Activity {
+    /// Start of the idle time, or `None` while a request is served.
+    idle_since: Mutex<Option<Instant>>,
+    /// Notified if the connection must close once it is idle.
+    pub(super) close: Notify,
+    /// Notified if this connection becomes idle.
+    idle: Arc<Notify>,
+}
+
+impl Activity {
+    pub(super) fn new(idle: Arc<Notify>) -> Self {
+        Self {
+            idle_since: Mutex::new(Some(Instant::now())),
+            close: Notify::new(),
+            idle,
+        }
+    }
+
+    /// Returns the start of the idle time, or `None` while a request is served.
+    pub(super) fn idle_since(&self) -> Option<Instant> {
+        *self.lock()
+    }
+
+    /// Marks the connection as busy until the returned value is dropped.
+    fn begin(self: &Arc<Self>) -> RequestInProgress {
+        *self.lock() = None;
+        RequestInProgress(Arc::clone(self))
+    }
+
+    /// Completes if the connection has been idle for `limit`.
+    async fn idle_for(&self, limit: Duration) {
+        loop {
+            let end = self.idle_since().unwrap_or_else(Instant::now) + limit;
+            tokio::time::sleep_until(end).await;
+            if self.idle_since().is_some_and(|since| since + limit <= end) {
+                return;
+            }
+        }
+    }
+
+    /// Locks the state. A poisoned lock is ignored, because each change is a single assignment.
+    fn lock(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.idle_since
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A request that a connection serves.
+#[derive(Debug)]
+struct RequestInProgress(Arc<Activity>);
+
+impl Drop for RequestInProgress {
+    fn drop(&mut self) {
+        *self.0.lock() = Some(Instant::now());
+        self.0.idle.notify_one();
+    }
+}
+
+/// Serves one connection until the client closes it, it is idle for too long, or the server needs room or stops.
+pub(super) async fn serve_connection(
+    stream: TcpStream,
+    router: Router,
+    activity: Arc<Activity>,
+    limits: ConnectionLimits,
+    mut stopping: watch::Receiver<()>,
+) -> ConnectionEnd {
+    let service = RequestCounter {
+        service: TowerToHyperService::new(router),
+        activity: Arc::clone(&activity),
+    };
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new())
+        .header_read_timeout(limits.header);
+    let served = http.serve_connection(TokioIo::new(stream), service);
+    tokio::pin!(served);
+    loop {
+        tokio::select! {
+            // Errors concern only this client, which may have closed the connection at any time.
+            _ = served.as_mut() => return ConnectionEnd::Closed,
+            () = activity.idle_for(limits.response) => return ConnectionEnd::Closed,
+            // The connection is polled only here, so no request can begin between the check and the return.
+            () = activity.close.notified() => if activity.idle_since().is_some() {
+                return ConnectionEnd::Closed;
+            },
+            _ = stopping.changed() => break,
+        }
+    }
+    served.as_mut().graceful_shutdown();
+    let busy = activity.idle_since().is_none();
+    let limit = if busy {
+        limits.shutdown
+    } else {
+        limits.shutdown_header
+    };
+    match tokio::time::timeout(limit, served).await {
+        Err(_) if activity.idle_since().is_none() => ConnectionEnd::CutOff,
+        Ok(_) | Err(_) => ConnectionEnd::Closed,
+    }
+}
+
+/// Marks a connection as busy while its service creates a response.
+#[derive(Debug)]
+struct RequestCounter {
+    service: TowerToHyperService<Router>,
+    activity: Arc<Activity>,
+}
+
+impl Service<Request<Incoming>> for RequestCounter {
+    type Response = Response;
+    type Error = std::convert::Infallible;
+    type Future = futures_util::future::BoxFuture<'static, Result<Response, Self::Error>>;
+
+    fn call(&self, request: Request<Incoming>) -> Self::Future {
+        let in_progress = self.activity.begin();
+        let response = self.service.call(request);
+        Box::pin(async move {
+            let response = response.await;
+            drop(in_progress);
+            response
+        })
+    }
+}
