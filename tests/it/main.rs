@@ -2,6 +2,8 @@
 
 mod accessible;
 mod agreement;
+#[cfg(target_os = "linux")]
+mod attacks;
 mod backup;
 mod browser;
 mod check;
@@ -48,6 +50,8 @@ mod review_browser;
 mod review_data;
 mod review_guard;
 mod review_kill;
+#[cfg(target_os = "linux")]
+mod review_load;
 mod review_page;
 mod sample_files;
 mod semi_real;
@@ -56,6 +60,7 @@ mod shim;
 mod snapshots;
 mod source_text;
 mod style;
+mod terminal;
 mod test_size;
 mod tiff_file;
 mod tiff_kinds;
