@@ -27,14 +27,6 @@ pub struct Catalog {
 }
 
 impl Catalog {
-    /// Opens the catalog, or creates it.
-    ///
-    /// # Errors
-    /// Returns an error if the file is not a catalog or is on a network file system, or if the database fails.
-    pub async fn create(path: &Path) -> Result<Self> {
-        Self::with_writer(path, true, CommitDelay::new()).await
-    }
-
     /// Opens an existing catalog for reading and writing.
     ///
     /// # Errors
@@ -56,12 +48,13 @@ impl Catalog {
         })
     }
 
+    /// Opens an existing file. If `allow_empty` is set, the file may have no bytes.
     pub(crate) async fn with_writer(
         path: &Path,
-        create: bool,
+        allow_empty: bool,
         delay: Arc<CommitDelay>,
     ) -> Result<Self> {
-        let conn = open::write_conn(path, create).await?;
+        let conn = open::write_conn(path, allow_empty).await?;
         let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();

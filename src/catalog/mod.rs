@@ -7,6 +7,7 @@
 mod audit;
 mod db;
 mod handle;
+mod new_catalog;
 mod queue;
 mod records;
 #[cfg(test)]
@@ -18,6 +19,7 @@ pub use db::error::{CatalogError, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
 pub use handle::Catalog;
+pub use new_catalog::NewCatalog;
 pub use queue::claim::ClaimRequest;
 pub use queue::counters::JobCounts;
 pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};

@@ -65,7 +65,8 @@ impl Catalog {
 
     /// Creates a catalog whose writer delays deferrable requests for an hour.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
-        Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
+        Self::create(path).await?.close().await;
+        Self::with_writer(path, false, CommitDelay::of(Duration::from_hours(1))).await
     }
 
     /// Keeps the writer busy until the sender is used or dropped.

@@ -143,6 +143,9 @@ async fn rows_and_files(
             summary.count(check, options.repair);
         }
     }
+    if options.repair {
+        catalog.remove_stale_files();
+    }
     if !options.in_use {
         unreferenced_files(project, named, options.repair, summary).await?;
     }

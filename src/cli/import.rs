@@ -1,6 +1,7 @@
 //! `import`: adds pairs of meshes and prints to the project, and creates the project if there is none.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -9,11 +10,11 @@ use tokio::sync::mpsc;
 
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
-use super::files::{self, remove_database};
+use super::files;
 use super::manifest_file::Listing;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
-use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
+use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary, NewCatalog};
 use crate::domain::{LengthUnit, PairName};
 use crate::manifest::{ManifestRow, RowIds};
 use crate::store::Project;
@@ -80,10 +81,12 @@ pub(super) async fn import_pairs(
     };
     let project = Project::at(&dir);
     let truths = stored_truths(truths, &project)?;
-    let before = StateBefore::of(&project);
-    let stored = store(&project, listing, truths).await;
+    let list = Arc::new(ImportList { listing, truths });
+    let missing_dirs = missing_dirs(&dir);
+    let stored = store(&project, &list).await;
     if stored.is_err() {
-        before.restore(&project);
+        // Fails, as it should, if another process put something there.
+        let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
     }
     let (summary, truths, missing) = stored?;
     Ok(ImportOutcome {
@@ -94,20 +97,71 @@ pub(super) async fn import_pairs(
     })
 }
 
-/// Stores the list. Returns what changed, how many true alignments were stored, and a message for each missing file.
-async fn store(
-    project: &Project,
+/// What to import.
+struct ImportList {
     listing: Listing,
     truths: Vec<(PairName, Value)>,
-) -> anyhow::Result<(ImportSummary, u64, Vec<String>)> {
-    Project::create(project.dir())?;
+}
+
+/// What an import changed, the number of true alignments stored, and a line per missing file.
+type StoredList = (ImportSummary, u64, Vec<String>);
+
+/// Returns the missing directories of a path, the deepest first.
+fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
+    let missing = dir.ancestors().take_while(|dir| !dir.exists());
+    missing
+        .filter(|dir| !dir.as_os_str().is_empty())
+        .map(ToOwned::to_owned)
+        .collect()
+}
+
+/// Stores the list in the project. A new project appears only when its catalog holds the list.
+async fn store(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<StoredList> {
+    while let Some(new) = begin(project).await? {
+        let stored = store_in(new.catalog(), project, list).await;
+        if stored.is_err() {
+            new.discard().await;
+            return stored;
+        }
+        if new.place().await? {
+            return stored;
+        }
+        // Another process created the project meanwhile, so the list is imported into that project.
+    }
     let catalog = Catalog::create(&project.catalog_path()).await?;
-    let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
-    let owned = project.clone();
-    let sent = tokio::task::spawn_blocking(move || send_rows(listing, &owned, &sender));
-    let stored = catalog.import_all(rows, truths, now()).await;
+    let stored = store_in(&catalog, project, list).await;
     catalog.close().await;
-    // If a row fails, the catalog only reports that the list ended early. Return the row's error first.
+    stored
+}
+
+/// Begins a catalog if the project has none. Tries again if another import that failed removes the directory meanwhile.
+async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+    const ATTEMPTS: usize = 20;
+    for _ in 1..ATTEMPTS {
+        let begun = try_begin(project).await;
+        if begun.is_ok() || project.dir().exists() {
+            return begun;
+        }
+    }
+    try_begin(project).await
+}
+
+async fn try_begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+    Project::create(project.dir())?;
+    Ok(NewCatalog::begin(&project.catalog_path()).await?)
+}
+
+/// Imports the list into a catalog.
+async fn store_in(
+    catalog: &Catalog,
+    project: &Project,
+    list: &Arc<ImportList>,
+) -> anyhow::Result<StoredList> {
+    let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
+    let (project, shared) = (project.clone(), Arc::clone(list));
+    let sent = tokio::task::spawn_blocking(move || send_rows(&shared.listing, &project, &sender));
+    let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
+    // If a row fails, the catalog only reports that the list ended early, so the row's error is returned first.
     let missing = sent
         .await
         .context("the task that reads the list stopped")??;
@@ -117,7 +171,7 @@ async fn store(
 
 /// Sends the rows to the catalog in chunks. Returns a message for each missing file.
 fn send_rows(
-    listing: Listing,
+    listing: &Listing,
     project: &Project,
     sender: &mpsc::Sender<ImportChunk>,
 ) -> anyhow::Result<Vec<String>> {
@@ -140,32 +194,6 @@ fn send_rows(
         let _ = sender.blocking_send(last);
     }
     Ok(missing)
-}
-
-/// Whether directory and catalog existed before an import. A failed import removes what it created.
-struct StateBefore {
-    dir: bool,
-    catalog: bool,
-}
-
-impl StateBefore {
-    fn of(project: &Project) -> Self {
-        Self {
-            dir: project.dir().exists(),
-            catalog: project.catalog_path().exists(),
-        }
-    }
-
-    /// Removes the catalog and the directory if the import created them. If removing fails, an empty project remains.
-    fn restore(&self, project: &Project) {
-        if !self.catalog {
-            remove_database(&project.catalog_path());
-        }
-        if !self.dir {
-            // Fails unless the directory is empty.
-            let _ = std::fs::remove_dir(project.dir());
-        }
-    }
 }
 
 fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {

@@ -108,20 +108,19 @@ impl Listing {
     }
 
     /// Calls `each` for every row, with a message for each missing file. Paths include the manifest's directory.
-    pub(super) fn rows(self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
-        let label = self.row_label;
+    pub(super) fn rows(&self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
         let mut each = |row: ManifestRow| {
-            let missing = missing_files(&label, &row);
+            let missing = missing_files(&self.row_label, &row);
             each(row, missing);
         };
-        match self.source {
-            ListingSource::Folders(rows) => rows.into_iter().for_each(each),
+        match &self.source {
+            ListingSource::Folders(rows) => rows.iter().cloned().for_each(each),
             ListingSource::List {
                 bytes,
                 parse,
                 folder,
             } => {
-                let parsed = parse(&bytes, &mut |mut row| {
+                let parsed = parse(bytes, &mut |mut row| {
                     row.mesh = folder.join(&row.mesh);
                     row.print = folder.join(&row.print);
                     each(row);

@@ -76,13 +76,13 @@ const OF_THE_FILES: &[(Fault, End)] = &[
 
 /// Faults of an import into a new project.
 const OF_AN_IMPORT: &[(Fault, End)] = &[
-    (Fault::once("open", "p/catalog.sqlite*", EIO), End::Either),
+    (Fault::once("open", "p/*catalog.sqlite*", EIO), End::Either),
     (
-        Fault::once("write", "p/catalog.sqlite*", ENOSPC),
+        Fault::once("write", "p/*catalog.sqlite*", ENOSPC),
         End::Either,
     ),
     (Fault::once("write", "*", ENOSPC).and_later(), End::Either),
-    (Fault::half("p/catalog.sqlite*"), End::Succeeds),
+    (Fault::half("p/*catalog.sqlite*"), End::Succeeds),
     (Fault::once("sync", "*", EIO), End::Either),
     (Fault::once("sync", "*", EIO).and_later(), End::Either),
 ];

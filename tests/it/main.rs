@@ -9,6 +9,7 @@ mod browser;
 mod check;
 mod cli;
 mod corruption;
+mod creation;
 #[cfg(target_os = "linux")]
 mod crowd;
 #[path = "../support/decoy.rs"]

@@ -53,6 +53,11 @@ pub enum CatalogError {
     /// The file cannot be created.
     #[error("{0} cannot be created: its folder is not writable, or the disk reported an error")]
     NotCreated(PathBuf),
+    /// There is a write-ahead log or journal, but no catalog.
+    #[error(
+        "{0} holds changes of a catalog that is not there; put that catalog back, or move this file away if the catalog was removed on purpose"
+    )]
+    LogAlone(PathBuf),
     /// The file or its directory is read-only.
     #[error(
         "{0} cannot be written to; status, show, report and export still work, other commands need a writable copy"

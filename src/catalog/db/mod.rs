@@ -13,4 +13,5 @@ pub(crate) mod open;
 pub(crate) mod request;
 pub(crate) mod rows;
 pub(crate) mod script;
+pub(crate) mod unplaced;
 pub(crate) mod writer;

@@ -38,16 +38,17 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// Opens the write connection. If `create` is set, creates a missing file. Creates a missing schema in any case.
-pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
+/// Opens the write connection. If `allow_empty` is set, the file may have no bytes. Creates a missing schema.
+pub(crate) async fn write_conn(path: &Path, allow_empty: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
-    check_file(path, create)?;
-    let is_new = create && !path.exists();
-    let connected = retry_while_busy!(path, connect(path, create).await);
-    let mut conn = connected.map_err(|error| match error.kind() {
-        Some(CatalogErrorKind::CannotOpen) if is_new => CatalogError::NotCreated(path.to_owned()),
-        _ if is_read_only(&error) => CatalogError::NotWritable(path.to_owned()),
-        _ => unreadable(path, error),
+    check_file(path, allow_empty)?;
+    let connected = retry_while_busy!(path, connect(path).await);
+    let mut conn = connected.map_err(|error| {
+        if is_read_only(&error) {
+            CatalogError::NotWritable(path.to_owned())
+        } else {
+            unreadable(path, error)
+        }
     })?;
     for (name, wanted) in [
         ("journal_mode", "wal"),
@@ -69,10 +70,9 @@ pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnec
     Ok(conn)
 }
 
-async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
+async fn connect(path: &Path) -> Result<SqliteConnection> {
     // Automatic checkpoints would delay commits. The writer task checkpoints the write-ahead log instead.
     let mut conn = options(path)
-        .create_if_missing(create)
         .journal_mode(SqliteJournalMode::Wal)
         .pragma("wal_autocheckpoint", "0")
         .pragma("journal_size_limit", "67108864")
@@ -132,29 +132,35 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
 
 /// Checks the file, because SQLite would treat an empty file as a new database. Does not open the file: closing it
 /// again would drop the locks of this process's connections.
-fn check_file(path: &Path, create: bool) -> Result<()> {
+fn check_file(path: &Path, allow_empty: bool) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
-        Ok(meta) if meta.len() == 0 && !create => Err(CatalogError::Empty(path.to_owned())),
+        Ok(meta) if meta.len() == 0 && !allow_empty => Err(CatalogError::Empty(path.to_owned())),
         Ok(_) => Ok(()),
-        Err(_) if create => Ok(()),
         Err(_) => Err(CatalogError::Missing(path.to_owned())),
     }
 }
 
-/// Creates the schema in a new database.
+/// Creates the schema in a database without tables. Other processes see the whole schema or none of it.
 async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
-    match identity(conn).await? {
-        Identity::Current => return Ok(()),
-        Identity::Uninitialized => {}
-        Identity::Other(number) => return Err(wrong_identity(path, number)),
+    let found = identity(conn).await?;
+    if found != Identity::Uninitialized {
+        return require_current(path, found);
     }
-    let outcome = MIGRATOR.run(&mut *conn).await;
-    // The migration fails if another process creates the schema at the same time. Then the database is ready anyway.
-    if identity(conn).await? == Identity::Current {
-        return Ok(());
+    let mut transaction = conn.begin_with("BEGIN IMMEDIATE").await?;
+    // Another process may have created the schema before this transaction began.
+    match read_identity(&mut transaction).await? {
+        Identity::Uninitialized => MIGRATOR.run(&mut *transaction).await?,
+        found => return require_current(path, found),
     }
-    Ok(outcome?)
+    Ok(transaction.commit().await?)
+}
+
+fn require_current(path: &Path, found: Identity) -> Result<()> {
+    match found {
+        Identity::Other(number) => Err(wrong_identity(path, number)),
+        Identity::Current | Identity::Uninitialized => Ok(()),
+    }
 }
 
 /// What kind of database a file holds.
@@ -168,8 +174,16 @@ pub(crate) enum Identity {
     Other((i64, i64)),
 }
 
-/// Reads application id and version.
+/// Reads application id, version and whether there are tables, all as of one moment.
 pub(crate) async fn identity(conn: &mut SqliteConnection) -> Result<Identity> {
+    let mut transaction = conn.begin().await?;
+    let found = read_identity(&mut transaction).await?;
+    transaction.commit().await?;
+    Ok(found)
+}
+
+/// Reads the identity in an open transaction.
+async fn read_identity(conn: &mut SqliteConnection) -> Result<Identity> {
     let id = sqlx::query_scalar("PRAGMA application_id")
         .fetch_one(&mut *conn)
         .await?;

@@ -1,0 +1,149 @@
+//! The file of a catalog that is being created. It has a hidden name until the catalog is complete.
+//!
+//! Every creator holds a shared lock on the folder. A process that gets the exclusive lock knows that no creator works
+//! there, so all hidden files are left from creators that were killed.
+
+use std::fs::{File, Permissions};
+use std::io;
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+
+use tempfile::TempPath;
+
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::lock_owner::sidecar;
+
+/// A catalog file under a hidden name. The file is removed when this value is dropped.
+#[derive(Debug)]
+pub(crate) struct UnplacedFile {
+    file: TempPath,
+    sidecars: HiddenSidecars,
+    target: PathBuf,
+    /// The folder, with the shared lock.
+    folder: File,
+}
+
+/// Removes the files that SQLite keeps beside a hidden file, when it is dropped.
+#[derive(Debug)]
+struct HiddenSidecars(PathBuf);
+
+impl Drop for HiddenSidecars {
+    fn drop(&mut self) {
+        for ending in ["-wal", "-shm", "-journal"] {
+            // SQLite has usually removed it. A file that stays is removed by the next creation.
+            let _ = std::fs::remove_file(sidecar(&self.0, ending));
+        }
+    }
+}
+
+impl UnplacedFile {
+    /// Creates an empty file beside `target`, and removes the files of creators that were killed.
+    ///
+    /// # Errors
+    /// Returns an error if the folder is not writable, or holds a log without its catalog. SQLite would read that log
+    /// as a part of the new catalog.
+    pub(crate) fn create(target: &Path) -> Result<Self> {
+        for ending in ["-wal", "-journal"] {
+            let log = sidecar(target, ending);
+            let has_content = std::fs::metadata(&log).is_ok_and(|meta| meta.len() > 0);
+            // The log is looked for first, because another process may create the catalog and its log meanwhile.
+            if has_content && !target.exists() {
+                return Err(CatalogError::LogAlone(log));
+            }
+        }
+        let not_created = || CatalogError::NotCreated(target.to_owned());
+        let folder = File::open(folder_of(target)).or(Err(not_created()))?;
+        remove_if_stale(target, &folder);
+        // A file system without locks refuses the exclusive lock too, so that nobody removes files there.
+        let _ = folder.lock_shared();
+        let file = tempfile::Builder::new()
+            .prefix(&hidden_prefix(target))
+            .permissions(Permissions::from_mode(0o644))
+            .tempfile_in(folder_of(target))
+            .or(Err(not_created()))?
+            .into_temp_path();
+        Ok(Self {
+            sidecars: HiddenSidecars(file.to_path_buf()),
+            file,
+            target: target.to_owned(),
+            folder,
+        })
+    }
+
+    /// Returns the hidden path.
+    pub(crate) fn path(&self) -> &Path {
+        &self.file
+    }
+
+    /// Gives the file its name durably, unless that name is taken. Returns whether the file got the name. No connection
+    /// may be open.
+    ///
+    /// # Errors
+    /// Returns an error if SQLite left part of the content in the log, or the disk returns an error.
+    pub(crate) fn place(self) -> Result<bool> {
+        let Self { file, target, .. } = &self;
+        let io_error = |source| CatalogError::Io {
+            path: target.clone(),
+            source,
+        };
+        let log = std::fs::metadata(sidecar(file, "-wal"));
+        if log.is_ok_and(|log| log.len() > 0) {
+            return Err(CatalogError::NotCreated(target.clone()));
+        }
+        let synced = File::open(file).and_then(|file| file.sync_all());
+        synced.map_err(io_error)?;
+        let Self {
+            file,
+            sidecars: _sidecars,
+            target,
+            folder,
+        } = self;
+        let io_error = |source| CatalogError::Io {
+            path: target.clone(),
+            source,
+        };
+        match file.persist_noclobber(&target) {
+            Ok(()) => {
+                folder.sync_all().map_err(io_error)?;
+                Ok(true)
+            }
+            Err(refused) if refused.error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+            Err(refused) => Err(io_error(refused.error)),
+        }
+    }
+}
+
+/// Removes the hidden files beside a catalog, if no process is creating a catalog there.
+pub(crate) fn remove_stale(catalog: &Path) {
+    if let Ok(folder) = File::open(folder_of(catalog)) {
+        remove_if_stale(catalog, &folder);
+    }
+}
+
+fn remove_if_stale(catalog: &Path, folder: &File) {
+    if folder.try_lock().is_err() {
+        return;
+    }
+    let prefix = hidden_prefix(catalog);
+    let entries = std::fs::read_dir(folder_of(catalog)).into_iter().flatten();
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        if name.to_string_lossy().starts_with(&prefix) {
+            // A file that cannot be removed does no harm.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+    // Dropping the file unlocks it too.
+    let _ = folder.unlock();
+}
+
+/// Returns the start of the hidden names for a catalog.
+fn hidden_prefix(catalog: &Path) -> String {
+    let name = catalog.file_name().unwrap_or_default();
+    format!(".{}.mocban-new-", name.to_string_lossy())
+}
+
+fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
