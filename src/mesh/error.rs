@@ -46,6 +46,20 @@ pub enum MeshError {
         /// Count in the header.
         want: u64,
     },
+    /// The file holds more than its header says.
+    #[error(
+        "the {format} holds {have} {what}, but its header says {want}; save it again with the right count"
+    )]
+    Uncounted {
+        /// Format and encoding.
+        format: &'static str,
+        /// What is not counted, plural.
+        what: &'static str,
+        /// Complete ones.
+        have: u64,
+        /// Count in the header.
+        want: u64,
+    },
     /// The file ends early, and no count says how much is missing.
     #[error("the {format} is truncated: it ends after {have} facets without {missing}")]
     EndMissing {

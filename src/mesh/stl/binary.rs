@@ -65,7 +65,7 @@ fn truncated(have: u64, count: u32) -> MeshError {
     }
 }
 
-/// Reads a binary STL. Ignores normals, attributes and bytes after the last triangle.
+/// Reads a binary STL. Ignores normals, attributes, and less than one triangle of bytes at the end.
 pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
         format: FORMAT,
@@ -77,6 +77,14 @@ pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, Mes
     let have = rows.len() as u64;
     if have < u64::from(count) {
         return Err(truncated(have, count));
+    }
+    if have > u64::from(count) {
+        return Err(MeshError::Uncounted {
+            format: FORMAT,
+            what: "triangles",
+            have,
+            want: u64::from(count),
+        });
     }
     let mut facets = FacetBuffer::with_capacity(count, limits)?;
     facets.push(&rows[..count as usize])?;

@@ -55,6 +55,30 @@ mod tests {
     }
 
     #[test]
+    fn triangles_that_the_header_does_not_count_are_refused() {
+        for (count, header) in [(1, b"solid a".as_slice()), (0, b"\0")] {
+            let mut bytes = binary(header, &CORNERS);
+            bytes[80] = count;
+            let error = open(&bytes).expect_err("a wrong count");
+            let wanted = format!(
+                "the binary STL holds 2 triangles, but its header says {count}; save it again with the right count"
+            );
+            assert_eq!(error.to_string(), wanted);
+        }
+    }
+
+    /// A text after the last solid is no word of the format; several solids are one mesh.
+    #[test]
+    fn ascii_text_after_the_last_solid_is_refused_by_its_line() {
+        let error = open(format!("{ASCII}made by a scanner\n").as_bytes()).expect_err("text");
+        let text = error.to_string();
+        assert!(
+            text.starts_with("line 11: ") && text.contains("made"),
+            "{text}"
+        );
+    }
+
+    #[test]
     fn truncated_binary_reports_both_counts() {
         for header in [b"solid a".as_slice(), b"\0", b"text header"] {
             let bytes = binary(header, &CORNERS);
