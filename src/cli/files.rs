@@ -7,7 +7,7 @@ use crate::domain::sanitize;
 use crate::store::read_file_or_pipe;
 
 /// Longest list that is read, in bytes.
-const MAX_LIST_BYTES: u64 = 1 << 30;
+const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {

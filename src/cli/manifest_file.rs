@@ -167,12 +167,16 @@ impl SimilarIds {
 
 fn missing_files(label: &str, row: &ManifestRow) -> Vec<String> {
     let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
-    let missing = files.filter(|(_, path)| !path.exists());
     let line = |(kind, path): (&str, &PathBuf)| {
+        let problem = match path.try_exists() {
+            Ok(true) => return None,
+            Ok(false) => "does not exist".to_owned(),
+            Err(error) => format!("cannot be read: {error}"),
+        };
         let (path, line, name) = (path.display(), row.line, &row.name);
-        format!("{label} {line}: {kind} {path} of {name} does not exist")
+        Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
     };
-    missing.map(line).collect()
+    files.filter_map(line).collect()
 }
 
 /// Lists the files of a directory, without its subdirectories.

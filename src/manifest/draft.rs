@@ -95,6 +95,7 @@ fn complete(
             reasons.push(format!("{column} is empty"));
         }
     }
+    check_lengths(&draft, reasons);
     let unit = draft
         .cells
         .remove("unit")
@@ -117,6 +118,33 @@ fn complete(
         meta: draft.meta,
     })
 }
+
+/// Records cells that are too long. The catalog keeps all of them, and pages and reports show them.
+fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
+    let cells = draft.cells.iter().map(|(name, cell)| (*name, cell.len()));
+    let meta = draft.meta.iter().map(|(name, value)| {
+        let len = value
+            .as_str()
+            .map_or_else(|| value.to_string().len(), str::len);
+        (name.as_str(), name.len() + len)
+    });
+    for (name, len) in cells.chain(meta) {
+        let max = match name {
+            "mesh" | "print" => MAX_PATH_BYTES,
+            _ => MAX_CELL_BYTES,
+        };
+        if len > max {
+            reasons.push(format!(
+                "{name:.40} has {len} bytes, over the limit of {max}"
+            ));
+        }
+    }
+}
+
+/// Longest path in bytes; the system accepts no longer one.
+const MAX_PATH_BYTES: usize = 4096;
+/// Longest other cell in bytes.
+const MAX_CELL_BYTES: usize = 1 << 16;
 
 /// Returns a value, or records why it is not valid.
 fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {

@@ -1,6 +1,10 @@
 //! JSON Lines lists: one object per line.
 
-use serde_json::{Map, Value};
+use std::collections::BTreeSet;
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
+use serde_json::Value;
 
 use super::draft::{DraftRow, RowCollector};
 use super::error::ManifestError;
@@ -43,11 +47,15 @@ pub fn read_jsonl(
 fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
-    let object: Map<String, Value> =
-        serde_json::from_str(text).map_err(|error| not_an_object(&error))?;
+    let JsonEntries(object) = serde_json::from_str(text).map_err(|error| not_an_object(&error))?;
     let mut draft = DraftRow::new(line);
+    let mut keys = BTreeSet::new();
     for (key, value) in object {
-        match (known_column(key.trim()), value) {
+        let known = known_column(key.trim());
+        if !keys.insert(known.map_or_else(|| key.clone(), ToOwned::to_owned)) {
+            return Err(format!("the key {key:?} is given twice"));
+        }
+        match (known, value) {
             (_, Value::Null) => {}
             (Some(name), value) => {
                 draft.cells.insert(name, cell(name, value)?);
@@ -58,6 +66,34 @@ fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
         }
     }
     Ok(draft)
+}
+
+/// The keys and values of a JSON object in their order. Unlike a map, it keeps keys that are given twice.
+struct JsonEntries(Vec<(String, Value)>);
+
+impl<'de> Deserialize<'de> for JsonEntries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(EntriesVisitor)
+    }
+}
+
+/// Collects the entries of an object.
+struct EntriesVisitor;
+
+impl<'de> Visitor<'de> for EntriesVisitor {
+    type Value = JsonEntries;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a map")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<JsonEntries, A::Error> {
+        let mut entries = Vec::new();
+        while let Some(entry) = map.next_entry()? {
+            entries.push(entry);
+        }
+        Ok(JsonEntries(entries))
+    }
 }
 
 /// Returns a cell's value as text. Numbers are accepted, because ids are often numbers.
@@ -112,6 +148,24 @@ mod tests {
         let meta = &rows.expect("parses")[0].meta;
         assert_eq!(meta["year"], 1872);
         assert_eq!(meta["tags"][0], "x");
+    }
+
+    #[test]
+    fn a_key_that_is_given_twice_is_refused_with_its_line() {
+        let good = r#"{"id":"a","mesh":"m","print":"p"}"#;
+        for (twice, key) in [
+            (r#"{"id":"b","mesh":"m","print":"p","id":"c"}"#, "id"),
+            (r#"{"id":"b","mesh":"m","print":"p","ID":"c"}"#, "ID"),
+            (r#"{"id":"b","mesh":"m","mesh":null,"print":"p"}"#, "mesh"),
+            (
+                r#"{"id":"b","mesh":"m","print":"p","folio":1,"folio":1}"#,
+                "folio",
+            ),
+        ] {
+            let refusal = parse(&format!("{good}\n{twice}\n")).expect_err("refused");
+            let wanted = format!("line 2: the key \"{key}\" is given twice");
+            assert_eq!(refusal.to_string(), wanted);
+        }
     }
 
     #[test]
