@@ -3,6 +3,9 @@
 use std::error::Error;
 use std::path::Path;
 
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
+
 use super::exit::{ExitCode, Refusal};
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, lock_owner};
 use crate::config::ConfigError;
@@ -46,8 +49,40 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
 
 /// Returns the message for an error: the explanation of a catalog error, or otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
+    if is_out_of_files(error) {
+        return format!(
+            "this process may open only {} files at a time; raise the limit with `ulimit -n 256` and try again",
+            max_open_files()
+        );
+    }
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     explained.unwrap_or_else(|| join_causes(error))
+}
+
+/// Most files that a command needs open at the same time, rounded up.
+const FILES_NEEDED: u64 = 64;
+
+/// Returns the number of files that this process may have open at the same time.
+fn max_open_files() -> u64 {
+    getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
+}
+
+/// Returns whether a command failed because it may not open more files. `SQLite` does not say why it cannot open a file,
+/// so a low limit counts as the reason.
+fn is_out_of_files(error: &anyhow::Error) -> bool {
+    let mut system_errors = error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>());
+    let too_many = Some(Errno::MFILE.raw_os_error());
+    if system_errors.any(|error| error.raw_os_error() == too_many) {
+        return true;
+    }
+    let is_unopened = catalog_error(error).is_some_and(|error| {
+        use CatalogErrorKind::{CannotOpen, ReadOnly};
+        matches!(error, CatalogError::NotWritable(_))
+            || matches!(error.kind(), Some(CannotOpen | ReadOnly))
+    });
+    is_unopened && max_open_files() < FILES_NEEDED
 }
 
 /// Joins the chain of causes. A cause that the text already quotes is left out.

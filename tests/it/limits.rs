@@ -1,6 +1,6 @@
 //! Pairs that kill their process, hang, or need too much memory, and runs in which too many pairs fail.
 
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 use mocban::domain::{FailureClass, JobStatus};
 use mocban::store::Project;
@@ -156,4 +156,23 @@ fn pairs_larger_than_the_memory_limit_run_one_at_a_time() {
     assert!(pairs(&project).iter().all(|pair| pair.attempt == 1));
     let refused = call(&mut run(&project, &["--memory", "much"])).expect(2);
     assert!(refused.err.contains("such as 4G"), "{}", refused.err);
+}
+
+/// `SQLite` reports only that it cannot open a file.
+#[test]
+fn a_low_limit_of_open_files_is_named_as_the_reason() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "1");
+    let mut failed = 0;
+    for limit in (8..24).step_by(2) {
+        let command = run(&project, &["--rerun", "all"]);
+        let mut shell = Command::new("sh");
+        let script = format!("ulimit -n {limit}; exec \"$@\"");
+        shell.args(["-c", &script, "sh"]).arg(command.get_program());
+        let ended = call(shell.args(command.get_args()));
+        let is_named = ended.err.contains("ulimit -n");
+        assert!(ended.code == 0 || is_named, "{limit}: {}", ended.err);
+        failed += usize::from(ended.code != 0);
+    }
+    assert!(failed > 3, "{failed}");
 }
