@@ -203,7 +203,10 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
         format!("print threshold {threshold:.0} of 65535, {polarity}")
     };
     let texts: Vec<String> = found.inks.iter().map(text).collect();
-    texts.join("; or ")
+    let turned = found.print_turned.map_or_else(String::new, |orientation| {
+        format!("; turned upright by its EXIF orientation {orientation}")
+    });
+    format!("{}{turned}", texts.join("; or "))
 }
 
 fn metric_row(record: &MetricRecord) -> Vec<String> {

@@ -117,7 +117,7 @@ impl<'a> PairFiles<'a> {
         let files = self.files(ThresholdMetric::NlSsim);
         let canvas = self.artifacts.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
         let depth = self.artifacts.bytes(Stage::Depth, DEPTH)?;
-        write(root, &files.print, self.print.bytes())?;
+        write(root, &files.print, &self.print.upright_file())?;
         write(root, &files.print_mask, &png_mask(&self.print_mask))?;
         write(root, &files.depth, &depth)?;
         let sidecar = format!("{PAIRS}/{}/depth.json", self.name);

@@ -1,11 +1,12 @@
 //! Reads the print image of a pair and draws the images of a result.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
-use super::pictures::{PrintView, Rgb};
+use super::pictures::{PrintView, Rgb, eight_bits};
 use crate::catalog::PairResults;
 use crate::domain::{FileKind, Stage, ThresholdMetric};
-use crate::raster::{self, DecodeError, ImageLimits, PrintImage};
+use crate::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::store::{InputError, InputFile, Project, read_input};
 
@@ -59,14 +60,19 @@ impl SourcePrint {
         }
     }
 
-    /// Returns the content of the file.
-    pub(super) fn bytes(&self) -> &[u8] {
-        &self.file.bytes
+    /// Returns the image as a file whose stored pixels are upright: the file itself, or a PNG if the file has an EXIF
+    /// orientation, which some programs ignore.
+    pub(super) fn upright_file(&self) -> Cow<'_, [u8]> {
+        match self.picture.turned {
+            None => Cow::Borrowed(&self.file.bytes),
+            Some(_) => Cow::Owned(png_rgb8(&eight_bits(&self.picture))),
+        }
     }
 
     /// Returns the file name extension of its format.
     pub(super) fn extension(&self) -> &'static str {
-        match FileKind::of(self.bytes()) {
+        match FileKind::of(&self.file.bytes) {
+            _ if self.picture.turned.is_some() => "png",
             FileKind::Png => "png",
             FileKind::Jpeg => "jpg",
             FileKind::Tiff => "tif",

@@ -81,12 +81,14 @@ pub fn normalize(
     print: &Print,
     settings: &Settings,
 ) -> Result<Normalized, NormalizeError> {
-    match settings.pipeline.method {
+    let mut normalized = match settings.pipeline.method {
         AlignmentMethod::Default => normalize::normalize(depth, print, &settings.normalize),
         AlignmentMethod::Paper => {
             paper_method::normalize::normalize(depth, print, &settings.normalize)
         }
-    }
+    }?;
+    normalized.outcome.print_turned = print.image().turned;
+    Ok(normalized)
 }
 
 /// Aligns the depth map with the print and scores each metric's masks.

@@ -167,7 +167,7 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
         let paper = 52_000.0 - 40.0 * x as f64;
         [(paper - ink * 42_000.0) as u16; 3]
     });
-    (PrintImage { rgb }.into(), print_from_sheet)
+    (PrintImage::from(rgb).into(), print_from_sheet)
 }
 
 /// The default settings of all stages, at a smaller depth map.

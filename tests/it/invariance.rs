@@ -184,7 +184,7 @@ fn rotated_90(print: &PrintImage) -> (PrintImage, Affine2) {
     let (width, height) = (print.rgb.width(), print.rgb.height());
     let rgb = Grid::from_fn(height, width, |x, y| print.rgb.at(y, height - 1 - x));
     let motion = Affine2([[0.0, -1.0, (height - 1) as f64], [1.0, 0.0, 0.0]]);
-    (PrintImage { rgb }, motion)
+    (PrintImage::from(rgb), motion)
 }
 
 /// Rotates the print by a multiple of 90 degrees.
@@ -206,7 +206,7 @@ fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintIma
         from.unwrap_or([u16::MAX; 3])
     });
     let motion = Affine2::scale_shift(1.0, [left as f64, top as f64]);
-    (PrintImage { rgb }, motion)
+    (PrintImage::from(rgb), motion)
 }
 
 /// Tolerance of changes that leave the data of the stages equal, pixels.

@@ -28,6 +28,7 @@ mod hanging;
 mod hostile;
 #[cfg(target_os = "linux")]
 mod hostile_pairs;
+mod image_pages;
 mod invariance;
 mod kill;
 mod layers;

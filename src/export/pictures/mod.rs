@@ -8,5 +8,6 @@ mod sheet_layout;
 
 pub use overlay::PrintView;
 pub use paint::Rgb;
+pub(super) use paint::eight_bits;
 pub use relief::shaded;
 pub use sheet_layout::{ContactSheetCell, SHEET_WIDTH, contact_sheet, tile_side};

@@ -146,6 +146,7 @@ mod tests {
     fn blank_print() -> PrintImage {
         PrintImage {
             rgb: Grid::new(30, 30, [60_000; 3]),
+            turned: None,
         }
     }
 

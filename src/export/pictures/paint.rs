@@ -12,7 +12,7 @@ pub(super) const TEXT: [u8; 3] = [20, 20, 20];
 pub(super) const BACKGROUND: [u8; 3] = [255, 255, 255];
 
 /// Converts a decoded print to 8 bits per channel.
-pub(super) fn eight_bits(print: &PrintImage) -> Rgb {
+pub(in crate::export) fn eight_bits(print: &PrintImage) -> Rgb {
     let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
     print.rgb.map(|colour| colour.map(narrow))
 }
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn sixteen_bits_convert_back_to_eight() {
         let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
-        let narrow = eight_bits(&PrintImage { rgb });
+        let narrow = eight_bits(&PrintImage::from(rgb));
         assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
     }
 

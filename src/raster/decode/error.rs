@@ -37,6 +37,16 @@ pub enum DecodeError {
         /// Rows in the header.
         height: u32,
     },
+    /// A TIFF of several pages, of which not exactly one is a full page.
+    #[error(
+        "the TIFF image has {count} pages, {full} of them of full size; a print is one page: save it as its own file"
+    )]
+    Pages {
+        /// Pages that are not marked as a reduced copy or a mask of another page.
+        full: usize,
+        /// All pages.
+        count: usize,
+    },
     /// The file ends before the image does.
     #[error("the {} is truncated: it ends before the image does", .0.name())]
     Truncated(FileKind),

@@ -2,11 +2,14 @@
 
 mod error;
 mod limits;
+mod orientation;
 mod print_image;
 mod tiff;
+mod tiff_pages;
 
 use std::io::{BufRead, Cursor, Seek};
 
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::domain::FileKind;
@@ -20,8 +23,8 @@ pub use print_image::PrintImage;
 
 /// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.
 ///
-/// An EXIF orientation is not applied, so that print pixels mean the same to every program. The size in the header is
-/// checked before any pixel is decoded.
+/// The image is returned upright: an EXIF orientation is applied. The size in the header is checked before any pixel is
+/// decoded.
 ///
 /// ```
 /// use mocban::raster::{Grid, ImageLimits, decode, png_rgb8};
@@ -38,16 +41,30 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
     limits.check_bytes(bytes)?;
     let kind = FileKind::of(bytes);
     let format = format_of(kind)?;
-    if kind == FileKind::Png {
-        check_png_header(bytes, limits)?;
-    }
-    if kind == FileKind::Tiff
-        && let Some(rgb) = tiff::decode_uncommon(bytes, limits)?
-    {
-        return Ok(PrintImage { rgb });
-    }
-    let rgb = colours_on_white(&decode_pixels(bytes, format, kind, limits)?);
-    Ok(PrintImage { rgb })
+    let (rgb, orientation) = match kind {
+        FileKind::Tiff => {
+            let page = tiff_pages::find_print_page(bytes)?;
+            let bytes = page.reordered.as_deref().unwrap_or(bytes);
+            let rgb = match tiff::decode_uncommon(bytes, limits)? {
+                Some(rgb) => rgb,
+                None => colours_on_white(&decode_pixels(bytes, format, kind, limits)?.0),
+            };
+            (rgb, orientation::of_tag(page.orientation))
+        }
+        FileKind::Png => {
+            check_png_header(bytes, limits)?;
+            let (pixels, _) = decode_pixels(bytes, format, kind, limits)?;
+            (colours_on_white(&pixels), orientation::of_png(bytes))
+        }
+        _ => {
+            let (pixels, orientation) = decode_pixels(bytes, format, kind, limits)?;
+            (colours_on_white(&pixels), orientation)
+        }
+    };
+    Ok(PrintImage {
+        rgb: orientation::upright(rgb, orientation),
+        turned: Some(orientation.to_exif()).filter(|number| *number != 1),
+    })
 }
 
 /// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
@@ -76,12 +93,13 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
     limits.check_size(side(16)?, side(20)?)
 }
 
+/// Decodes the pixels as stored, and the orientation that the decoder finds.
 fn decode_pixels(
     bytes: &[u8],
     format: ImageFormat,
     kind: FileKind,
     limits: &ImageLimits,
-) -> Result<DynamicImage, DecodeError> {
+) -> Result<(DynamicImage, Orientation), DecodeError> {
     let whole = kind != FileKind::Jpeg || has_end_marker(bytes);
     let refused = |error: ImageError| {
         if whole {
@@ -94,13 +112,15 @@ fn decode_pixels(
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
-    let decoder = reader.into_decoder().map_err(refused)?;
+    let mut decoder = reader.into_decoder().map_err(refused)?;
     let (width, height) = decoder.dimensions();
     limits.check_size(width, height)?;
     if !whole {
         return Err(DecodeError::Truncated(kind));
     }
-    DynamicImage::from_decoder(decoder).map_err(refused)
+    let orientation = orientation::of_decoder(&mut decoder);
+    let pixels = DynamicImage::from_decoder(decoder).map_err(refused)?;
+    Ok((pixels, orientation))
 }
 
 fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {

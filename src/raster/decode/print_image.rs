@@ -9,6 +9,14 @@ use crate::raster::Grid;
 pub struct PrintImage {
     /// Colour of each pixel; a transparent pixel is white.
     pub rgb: Grid<[u16; 3]>,
+    /// EXIF orientation of the file (2 to 8), if its pixels were turned to make the image upright.
+    pub turned: Option<u8>,
+}
+
+impl From<Grid<[u16; 3]>> for PrintImage {
+    fn from(rgb: Grid<[u16; 3]>) -> Self {
+        Self { rgb, turned: None }
+    }
 }
 
 /// Composites a colour with the alpha `a` on white: `(c a + 65535 (65535 - a)) / 65535`, rounded.

@@ -9,6 +9,7 @@ use tiff::{TiffError, TiffResult};
 
 use super::error::broken;
 use super::print_image::on_white;
+use super::tiff_pages::TiffBytes;
 use super::{DecodeError, ImageLimits};
 use crate::domain::FileKind;
 use crate::raster::Grid;
@@ -118,32 +119,13 @@ fn tiff_error(error: &TiffError) -> DecodeError {
 /// original tag, the decoder rejects palettes, and images that have white as 0 and extra samples.
 fn declared_black_is_zero(bytes: &[u8]) -> Option<Vec<u8>> {
     const PHOTOMETRIC: u64 = 262;
-    const SHORT: u64 = 3;
-    let big_end = bytes.starts_with(b"MM");
-    let number = |at: usize, len: usize| {
-        let field = bytes.get(at..at.checked_add(len)?)?;
-        let add = |sum: u64, byte: &u8| sum << 8 | u64::from(*byte);
-        Some(if big_end {
-            field.iter().fold(0, add)
-        } else {
-            field.iter().rev().fold(0, add)
-        })
-    };
-    // Offsets and counts of a BigTIFF have eight bytes.
-    let (place, count, entry, value) = match number(2, 2)? {
-        43 => (number(8, 8)?, 8, 20, 12),
-        _ => (number(4, 4)?, 2, 12, 8),
-    };
-    let place = usize::try_from(place).ok()?;
-    let entries = usize::try_from(number(place, count)?).ok()?;
-    let first = place.checked_add(count)?;
-    let at = (0..entries)
-        .map_while(|nth| first.checked_add(nth.checked_mul(entry)?))
-        .take_while(|at| *at < bytes.len())
-        .find(|at| number(*at, 2) == Some(PHOTOMETRIC) && number(at + 2, 2) == Some(SHORT))?;
+    const BLACK_IS_ZERO: u16 = 1;
+    let file = TiffBytes::new(bytes)?;
+    let (at, len) = file.first_page()?.value_field(PHOTOMETRIC)?;
+    let value = file.short(BLACK_IS_ZERO);
     let mut changed = bytes.to_vec();
-    let field = changed.get_mut(at + value..at + value + 2)?;
-    field.copy_from_slice(if big_end { &[0, 1] } else { &[1, 0] });
+    let field = changed.get_mut(at..at + len)?;
+    (len == value.len()).then(|| field.copy_from_slice(&value))?;
     Some(changed)
 }
 

@@ -274,6 +274,7 @@ mod tests {
     fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {
         PrintImage {
             rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
+            turned: None,
         }
     }
 
@@ -327,6 +328,7 @@ mod tests {
                 let grey = plain * if stain(x, y) { 0.7 } else { 1.0 };
                 [grey as u16 * 257; 3]
             }),
+            turned: None,
         };
         let wrong = |ink: &InkMask| {
             let pixels = ink.mask.data().iter().enumerate();
@@ -370,6 +372,7 @@ mod tests {
         }
         let one = PrintImage {
             rgb: Grid::new(1, 1, [0; 3]),
+            turned: None,
         };
         assert!(matches!(
             read(&one),

@@ -17,7 +17,7 @@ use super::print::Print;
 use crate::raster::DepthMap;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 10;
+pub const REVISION: u32 = 11;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///

@@ -66,6 +66,7 @@ impl Normalized {
                 inks: hypotheses,
                 relief,
                 thresholds: Vec::new(),
+                print_turned: None,
             },
             prints,
         })
