@@ -13,10 +13,10 @@ use super::screen::{Palette, Screen};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
-    let (writer, to_file) = writer(global, screen)?;
+    let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
+    let (writer, to_file) = writer(global, screen, colours)?;
     let level = level(global.verbose, global.quiet, to_file);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(!to_file && colours.is_on())
@@ -29,11 +29,16 @@ pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bool)> {
+fn writer(
+    global: &Global,
+    screen: &Screen,
+    colours: Palette,
+) -> anyhow::Result<(BoxMakeWriter, bool)> {
     let Some(path) = &global.log_file else {
         let writer = LogWriter {
             screen: screen.clone(),
             format: global.log_format,
+            colours,
         };
         return Ok((BoxMakeWriter::new(move || writer.clone()), false));
     };
@@ -50,6 +55,7 @@ fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bo
 struct LogWriter {
     screen: Screen,
     format: LogFormat,
+    colours: Palette,
 }
 
 impl std::io::Write for LogWriter {
@@ -58,7 +64,8 @@ impl std::io::Write for LogWriter {
         let text = String::from_utf8_lossy(bytes);
         let line = text.trim_end_matches('\n');
         match self.format {
-            LogFormat::Text => self.screen.log_line(line),
+            LogFormat::Text if self.colours.is_on() => self.screen.log_line(line),
+            LogFormat::Text => self.screen.line(line),
             LogFormat::Json => self.screen.json_log_line(line),
         }
         Ok(bytes.len())

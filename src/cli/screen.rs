@@ -57,7 +57,7 @@ impl Screen {
         self.write(&visible_json(&value.to_string()));
     }
 
-    /// Writes a line of the log. Its writer escapes terminal codes of values, so the codes that are left are its own.
+    /// Writes a line of the log with colours. `tracing` escapes terminal codes of values and adds its own.
     pub(super) fn log_line(&self, text: &str) {
         self.line(&text.replace("\u{1b}[", &OWN_CODE));
     }

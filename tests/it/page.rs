@@ -4,6 +4,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -133,9 +134,16 @@ impl Page {
         rustix::process::Pid::from_child(&self.child)
     }
 
-    /// Waits for the server to end and returns its exit code.
+    /// Waits for the server to end and returns its exit code. Fails if the server does not end.
     pub(crate) fn exit_code(&mut self) -> Option<i32> {
-        self.child.wait().expect("an end").code()
+        let deadline = Instant::now() + Duration::from_secs(30);
+        loop {
+            if let Some(ended) = self.child.try_wait().expect("its state") {
+                return ended.code();
+            }
+            assert!(Instant::now() < deadline, "the server does not end");
+            std::thread::yield_now();
+        }
     }
 
     /// Kills the server as by `kill -9`.

@@ -83,6 +83,8 @@ fn a_signal_ends_the_server_despite_open_connections_and_stores_answers_in_fligh
         open.push(stream);
     }
     let mut stream = begun_answer(&page, &body);
+    let limit = Some(Duration::from_secs(30));
+    stream.set_read_timeout(limit).expect("a limit");
     let start = Instant::now();
     interrupt(&page);
     stream.write_all(body.as_bytes()).expect("sent");

@@ -15,9 +15,10 @@ const HOSTILE: &str =
 /// Han-Nôm and Vietnamese text, which is shown unchanged.
 const PLAIN: &str = "\u{20022}\u{5b57} Tra\u{302}\u{300}n";
 
-/// Removes the codes of colours, which the program itself prints with `--color always`.
+/// Removes the codes of colours, which the program and its log print with `--color always`.
 fn without_colours(text: &str) -> String {
-    let codes = ["0", "1", "2", "31", "32", "33"].map(|code| format!("\u{1b}[{code}m"));
+    let codes =
+        ["0", "1", "2", "3", "31", "32", "33", "34", "35"].map(|code| format!("\u{1b}[{code}m"));
     let plain = |text: String, code: &String| text.replace(code, "");
     codes.iter().fold(text.to_owned(), plain)
 }
@@ -99,6 +100,8 @@ fn hidden_characters_of_names_and_notes_are_visible_in_every_output() {
         &["config", "show", "--set", "fit.no\u{1b}[2J\u{202e}=1"],
         &["retry", "--dry-run\u{202e}"],
         &["verdict", "undo"],
+        &["-vv", "run", "--rerun", "failed"],
+        &["-vv", "run", "--rerun", "failed", "--log-format", "json"],
     ] {
         for colour in ["never", "always"] {
             let output = call(

@@ -5,6 +5,7 @@ use maud::{Markup, html};
 use super::album::Album;
 use super::markup::table;
 use super::plots;
+use crate::domain::one_line;
 use crate::report::comparison::{Basis, Comparison};
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::NumberStyle::PValue;
@@ -162,7 +163,7 @@ fn failure(group: &FailureGroup) -> Markup {
         h3 { (group.class.name().replace('_', " ")) ": " (format_count(group.count)) }
         ul.failures {
             @for pair in &group.pairs {
-                li { strong { (pair.id) } ", " (pair.stage) ": " (shortened(&pair.error)) }
+                li { strong { (pair.id) } ", " (pair.stage) ": " (shortened(&one_line(&pair.error))) }
             }
             @if more > 0 { li { "and " (format_count(more)) " more" } }
         }
