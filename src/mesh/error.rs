@@ -60,6 +60,16 @@ pub enum MeshError {
         /// Count in the header.
         want: u64,
     },
+    /// The file goes on after the rows that its header counts.
+    #[error(
+        "the {format} has {bytes} bytes after the rows that its header counts; save it again with the right counts"
+    )]
+    BytesAfterRows {
+        /// Format and encoding.
+        format: &'static str,
+        /// Number of bytes.
+        bytes: u64,
+    },
     /// The file ends early, and no count says how much is missing.
     #[error("the {format} is truncated: it ends after {have} facets without {missing}")]
     EndMissing {

@@ -79,8 +79,12 @@ impl InputError {
     }
 
     /// Returns whether a retry may succeed without a change by the user.
-    pub const fn is_transient(&self) -> bool {
-        matches!(self, Self::Changed(_) | Self::Io { .. })
+    pub fn is_transient(&self) -> bool {
+        match self {
+            Self::Io { source, .. } => source.kind() != ErrorKind::InvalidFilename,
+            Self::Changed(_) => true,
+            _ => false,
+        }
     }
 }
 

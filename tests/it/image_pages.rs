@@ -3,10 +3,14 @@
 use std::io::Cursor;
 
 use image::{DynamicImage, ImageFormat};
+use mocban::domain::JobStatus;
 use mocban::raster::{ImageLimits, PrintImage, decode};
 use tiff::encoder::TiffEncoder;
 use tiff::encoder::colortype::Gray8;
 use tiff::tags::Tag;
+
+use crate::cli::{call, mocban};
+use crate::resume::{pairs, project, run};
 
 const LIMITS: ImageLimits = ImageLimits::SUGGESTED;
 
@@ -49,13 +53,16 @@ fn jpeg(orientation: u8) -> Vec<u8> {
 
 /// Returns a PNG with an `eXIf` chunk before or after its pixels.
 fn png(orientation: u8, is_before: bool) -> Vec<u8> {
+    with_exif(encode(ImageFormat::Png), orientation, is_before)
+}
+
+fn with_exif(mut file: Vec<u8>, orientation: u8, is_before: bool) -> Vec<u8> {
     let block = exif(orientation);
     let mut chunk = (block.len() as u32).to_be_bytes().to_vec();
     let mut body = b"eXIf".to_vec();
     body.extend(block);
     chunk.extend(&body);
     chunk.extend(crc32(&body).to_be_bytes());
-    let mut file = encode(ImageFormat::Png);
     let at = if is_before { 33 } else { file.len() - 12 };
     file.splice(at..at, chunk);
     file
@@ -155,5 +162,50 @@ fn several_full_pages_are_refused_with_their_number() {
              save it as its own file"
         );
         assert_eq!(refused.to_string(), wanted);
+    }
+}
+
+/// The stored pixels differ, the upright images are equal.
+#[test]
+fn a_turned_print_has_the_results_of_the_upright_one() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "1");
+    let data = project.dir().join("data");
+    let upright = image::open(data.join("prints/upright-0000.jpg")).expect("a print");
+    let save = |image: &DynamicImage| {
+        let mut out = Cursor::new(Vec::new());
+        image.write_to(&mut out, ImageFormat::Png).expect("encodes");
+        out.into_inner()
+    };
+    std::fs::write(data.join("a.png"), save(&upright)).expect("written");
+    let turned = with_exif(save(&upright.rotate270()), 6, true);
+    std::fs::write(data.join("b.png"), turned).expect("written");
+    let mesh = "meshes/upright-0000.ply";
+    let list = format!("id,mesh,print\na,{mesh},a.png\nb,{mesh},b.png\n");
+    std::fs::write(data.join("both.csv"), list).expect("written");
+    mocban(project.dir(), &["import", "data/both.csv"]).expect(0);
+    call(&mut run(&project, &["a", "b"])).expect(0);
+    let outcomes = |name: &str| {
+        let all = pairs(&project);
+        let mut named = all.into_iter().map(|pair| pair.results);
+        let found = named.find(|pair| pair.attributes.name.as_str() == name);
+        let found = found.expect("the pair");
+        assert_eq!(found.status, JobStatus::Done);
+        let metrics = found.metrics.into_iter();
+        metrics.map(|record| record.outcome).collect::<Vec<_>>()
+    };
+    assert_eq!(outcomes("a"), outcomes("b"));
+    let shown = |name| mocban(project.dir(), &["show", name]).expect(0).out;
+    let said = "turned upright by its EXIF orientation 6";
+    assert!(shown("b").contains(said) && !shown("a").contains(said));
+    mocban(project.dir(), &["export", "-o", "exported"]).expect(0);
+    for name in ["a", "b"] {
+        let print = project
+            .dir()
+            .join("exported/pairs")
+            .join(name)
+            .join("print.png");
+        let print = image::open(print).expect("an exported print");
+        assert_eq!(print.into_rgb8(), upright.to_rgb8(), "{name}");
     }
 }

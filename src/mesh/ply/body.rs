@@ -31,6 +31,15 @@ pub(super) fn read(
     for element in &header.elements {
         body.element(element)?;
     }
+    // Some programs end the file with a line break or fill its last block.
+    let is_padding = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
+    let rest = body.source.rest();
+    if !rest.iter().all(is_padding) {
+        return Err(MeshError::BytesAfterRows {
+            format: header.encoding.name(),
+            bytes: rest.len() as u64,
+        });
+    }
     Ok(body.mesh)
 }
 

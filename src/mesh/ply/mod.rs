@@ -39,6 +39,18 @@ mod tests {
     const CORNERS: &str = "property list uchar int vertex_indices\n";
 
     #[test]
+    fn rows_that_the_header_does_not_count_are_refused() {
+        let elements = format!("element vertex 3\n{XYZ}element face 1\n{CORNERS}");
+        let rows = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        assert!(read(&ascii(&elements, &format!("{rows}\n \0"))).is_ok());
+        let error = read(&ascii(&elements, &format!("{rows}3 2 1 0\n"))).expect_err("a row more");
+        assert_eq!(
+            error.to_string(),
+            "the ascii PLY has 9 bytes after the rows that its header counts; save it again with the right counts"
+        );
+    }
+
+    #[test]
     fn unknown_elements_and_properties_are_skipped() {
         let bytes = ascii(
             "comment made by hand\nobj_info num_cols 2\nelement camera 1\nproperty float f\n\

@@ -31,6 +31,9 @@ pub(super) trait NumberSource {
     /// Returns how many rows of an element the rest of the body can hold at most.
     fn max_rows(&self, element: &PlyElement) -> u64;
 
+    /// Returns the bytes that have not been read.
+    fn rest(&self) -> &[u8];
+
     /// Appends the positions of up to `_most` rows, each of three 32-bit floats. Appends nothing if the body is text or
     /// has ended.
     fn packed_positions(&mut self, _most: usize, _into: &mut Vec<[f32; 3]>) {}
@@ -65,6 +68,10 @@ impl NumberSource for AsciiSource<'_> {
             self.next(kind)?;
         }
         Ok(())
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.rest
     }
 
     fn max_rows(&self, element: &PlyElement) -> u64 {
@@ -130,6 +137,10 @@ impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
         }
         self.rest = &self.rest[bytes as usize..];
         Ok(())
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.rest
     }
 
     fn max_rows(&self, element: &PlyElement) -> u64 {
