@@ -236,6 +236,7 @@ pub(crate) fn send(
         lines.push(format!("content-length: {}", body.len()));
     }
     let mut stream = TcpStream::connect(to)?;
+    stream.set_read_timeout(Some(Duration::from_mins(1)))?;
     stream.write_all(format!("{}\r\n\r\n", lines.join("\r\n")).as_bytes())?;
     // A server that rejects the headers may close before the body is sent.
     let _ = stream.write_all(body);
