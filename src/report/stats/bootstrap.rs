@@ -37,7 +37,7 @@ pub fn resample_count(units: usize) -> usize {
     }
 }
 
-/// Returns, for each of the `width` quantities, its mean in every resample. Resamples without the quantity are skipped.
+/// Returns the mean of each of the `width` quantities in every resample. Resamples without the quantity are skipped.
 ///
 /// All quantities use the same drawn units, so the means of two quantities can be compared resample by resample. The
 /// result depends on the order of the units, not on the number of threads.
