@@ -57,7 +57,7 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
                 let kind = match error {
                     ArtifactError::Missing(_) => Kind::FileMissing,
                     ArtifactError::Changed(_) => Kind::FileChanged,
-                    ArtifactError::Io { .. } => Kind::FileUnreadable,
+                    ArtifactError::Io { .. } | ArtifactError::Moved(_) => Kind::FileUnreadable,
                 };
                 let finding = damage(pair, kind, *stage, error.to_string());
                 check.damage.push(finding);

@@ -8,8 +8,8 @@ use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcom
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
-    backup, check, completions, config, contact_sheet, demo, export, import, man, report, retry,
-    review, run, show, status, verdict,
+    backup, check, completions, config, contact_sheet, demo, export, import, man, report, restore,
+    retry, review, run, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -45,8 +45,10 @@ pub(super) enum Command {
     Retry(retry::RetryArgs),
     /// Check files, rows and counters against each other
     Check(check::CheckArgs),
-    /// Copy the catalog and the verdicts to a file, also during a run
+    /// Copy pairs, results, verdicts and settings to one file, also during a run
     Backup(backup::BackupArgs),
+    /// Make a project of a backup
+    Restore(restore::RestoreArgs),
     /// Record and list people's verdicts on the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),

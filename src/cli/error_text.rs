@@ -10,7 +10,7 @@ use super::exit::{ExitCode, Refusal};
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, lock_owner};
 use crate::config::ConfigError;
 use crate::runner::RunError;
-use crate::store::{CATALOG_FILE, StoreError};
+use crate::store::{CATALOG_FILE, StoreError, TargetLockError};
 
 /// Returns the exit code of an error.
 pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
@@ -24,6 +24,9 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     if cause.is::<ConfigError>() {
         return Some(ExitCode::Usage);
+    }
+    if let Some(TargetLockError::InUse { .. }) = cause.downcast_ref() {
+        return Some(ExitCode::InUse);
     }
     match cause.downcast_ref() {
         Some(RunError::InUse(_)) => return Some(ExitCode::InUse),
@@ -106,6 +109,12 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
             .downcast_ref::<std::io::Error>()
             .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
     })
+}
+
+/// Returns whether another process runs the project.
+pub(super) fn is_run_in_use(error: &anyhow::Error) -> bool {
+    let is_target = <dyn Error>::is::<TargetLockError>;
+    exit_code(error) == ExitCode::InUse && !error.chain().any(is_target)
 }
 
 /// Returns the first error of the catalog in a chain of causes.

@@ -16,7 +16,7 @@ pub enum ExitCode {
     NothingSelected = 4,
     /// There is no project in the directory.
     NoProject = 10,
-    /// Another process runs the project.
+    /// Another process runs the project, or writes the same output.
     InUse = 11,
     /// `check` found damage.
     Damaged = 12,
@@ -36,7 +36,7 @@ const MEANINGS: [(ExitCode, &str); 11] = [
     (ExitCode::SomeFailed, "finished, some pairs failed"),
     (ExitCode::NothingSelected, "the selection matched no pair"),
     (ExitCode::NoProject, "no project here"),
-    (ExitCode::InUse, "project in use by another process"),
+    (ExitCode::InUse, "project or output in use by another process"),
     (ExitCode::Damaged, "check found damage"),
     (ExitCode::BelowFailUnder, "--fail-under not met"),
     (ExitCode::Incomplete, "--require-complete not met"),

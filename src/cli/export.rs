@@ -78,6 +78,12 @@ fn print_summary(
     } else {
         print_done(summary, args, context);
     }
+    if let Some((path, why)) = &summary.leftover {
+        context.warn(&format!(
+            "the earlier export was replaced but could not be removed from {}: {why}; the next export removes it",
+            path.display()
+        ));
+    }
     if !summary.unreadable.is_empty() {
         // A run trusts the catalog, so the check must come first.
         context.next("check --repair");

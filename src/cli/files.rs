@@ -1,6 +1,9 @@
 //! Files and directories named on the command line.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::domain::sanitize;
@@ -12,6 +15,38 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 /// Reads a list that is named on the command line, from a file or a pipe.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES).map_err(|error| refusal("read", path, &error))
+}
+
+/// Returns the metadata of a file or folder, or `None` if it does not exist.
+pub(super) fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
+}
+
+/// Longest small file, in bytes.
+const MAX_SMALL: u64 = 1 << 20;
+
+/// Reads a small file, such as settings. Returns `None` if it does not exist.
+pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+    let shown = path.display();
+    let failed = || format!("cannot read {shown}");
+    match metadata(path).with_context(failed)? {
+        None => return Ok(None),
+        // Opening a pipe could wait forever.
+        Some(meta) if !meta.is_file() => anyhow::bail!("{shown} is not a regular file; rename it"),
+        Some(_) => {}
+    }
+    let file = std::fs::File::open(path).with_context(failed)?;
+    let mut bytes = Vec::new();
+    file.take(MAX_SMALL + 1)
+        .read_to_end(&mut bytes)
+        .with_context(failed)?;
+    if bytes.len() as u64 > MAX_SMALL {
+        anyhow::bail!("{shown} is longer than 1 MiB");
+    }
+    Ok(Some(bytes))
 }
 
 /// Lists a directory.
@@ -33,15 +68,6 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
             let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
             text.trim_ascii_start().starts_with(b"{")
         }
-    }
-}
-
-/// Removes a database with its SQLite journal files. Ignores files that are missing or cannot be removed.
-pub(super) fn remove_database(path: &Path) {
-    for ending in ["", "-wal", "-shm", "-journal"] {
-        let mut name = path.as_os_str().to_owned();
-        name.push(ending);
-        let _ = std::fs::remove_file(name);
     }
 }
 

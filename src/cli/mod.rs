@@ -24,6 +24,7 @@ mod output;
 mod panics;
 mod progress;
 mod report;
+mod restore;
 mod retry;
 mod review;
 mod run;
@@ -110,6 +111,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Retry(args) => retry::retry(args, context).await,
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
+        Command::Restore(args) => restore::restore(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,
         Command::Agreement => agreement::agreement(context).await,
@@ -133,7 +135,7 @@ fn report_error(error: &anyhow::Error, context: &Context) -> ExitCode {
     if code == ExitCode::NoProject {
         context.next("import pairs.csv");
         context.next_command(&context.program_with("demo"));
-    } else if code == ExitCode::InUse {
+    } else if error_text::is_run_in_use(error) {
         context.next("status --watch");
     }
     code

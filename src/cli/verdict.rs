@@ -23,7 +23,7 @@ pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
     /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
-    /// of the verdicts.jsonl of an export or a backup
+    /// of the verdicts.jsonl of an export
     Import(VerdictImportArgs),
     /// Print the log, oldest first
     Log(VerdictLogArgs),

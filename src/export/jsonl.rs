@@ -4,15 +4,14 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::export_folder::{
-    ATTENTION_CHECKS, Folder, FolderError, LINES, MANUAL_ALIGNMENTS, PAIRS, VERDICTS, at,
-};
+use super::export_folder::{Folder, FolderError, at};
 use super::export_line::{ExportLine, LineStatus, Outcomes, newest_manual_alignments};
+use super::file_names::{ATTENTION_CHECKS, LINES, MANUAL_ALIGNMENTS, PAIRS, VERDICTS};
 use super::pair_files::{EncodedImages, FilesError, PairFiles};
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
@@ -45,6 +44,8 @@ pub struct ExportSummary {
     pub unreadable: Vec<(PairName, String)>,
     /// Whether the new export was discarded because it lacks files of finished pairs. The earlier export was kept.
     pub kept_earlier: bool,
+    /// The path of an earlier export that could not be removed after it was replaced, and why.
+    pub leftover: Option<(PathBuf, String)>,
 }
 
 /// Why nothing was exported.
@@ -54,7 +55,7 @@ pub enum ExportError {
     #[error("{0}")]
     Catalog(#[from] CatalogError),
     /// The folder cannot be used, or a file in it not written.
-    #[error(transparent)]
+    #[error("{0}")]
     Folder(#[from] FolderError),
     /// A worker task panicked or was cancelled.
     #[error("the export stopped: {0}")]
@@ -94,9 +95,10 @@ pub async fn to_jsonl(
     }
     lines.flush().map_err(at(&path))?;
     write_logs(catalog, folder.path()).await?;
-    summary.kept_earlier = !summary.unreadable.is_empty() && folder.replaces();
+    summary.kept_earlier = !summary.unreadable.is_empty() && folder.replaces()?;
     if !summary.kept_earlier {
-        folder.finish()?;
+        let leftover = folder.finish()?;
+        summary.leftover = leftover.map(|(path, error)| (path, error.to_string()));
     }
     Ok(summary)
 }

@@ -1,8 +1,10 @@
 //! Exports results for other tools, and images for people.
 
 mod contact_sheet;
+mod earlier_export;
 mod export_folder;
 mod export_line;
+mod file_names;
 mod gallery_selection;
 mod jsonl;
 mod pair_files;

@@ -1,10 +1,12 @@
 //! The files of one exported pair.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::export_folder::{FolderError, PAIRS, at};
+use super::export_folder::{FolderError, at};
+use super::file_names::PAIRS;
 use super::pictures::PrintView;
 use super::source_print::{SourcePrint, SourcePrintError};
 use crate::catalog::PairResults;
@@ -184,9 +186,12 @@ impl<'a> PairFiles<'a> {
 /// Writes a file below the export folder, and creates its parent folders.
 fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
-    let created = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    let written = created.and_then(|()| std::fs::write(&path, bytes));
-    Ok(written.map_err(at(&path))?)
+    match path.parent().map_or(Ok(()), std::fs::create_dir_all) {
+        // A disk error can hide that the folder exists. Writing the file then fails with the true reason, or succeeds.
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(at(&path)(error).into()),
+        Ok(()) | Err(_) => {}
+    }
+    Ok(std::fs::write(&path, bytes).map_err(at(&path))?)
 }
 
 #[cfg(test)]

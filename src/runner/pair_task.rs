@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::checkpointer::Checkpointer;
-use super::compute_thread::{ComputeEvent, ComputeThread};
+use super::compute_thread::{ComputeEvent, ComputeThread, run_blocking};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::input_changes;
@@ -149,6 +149,9 @@ async fn store_failure(
     pair: PairSummary,
     failed: FailedStage,
 ) -> Result<PairEnd, RunError> {
+    // If the project was renamed, its inputs seem to be missing. That is no failure of the pair.
+    let project = context.project.clone();
+    run_blocking(move || project.check_in_place()).await?;
     let inputs = match failed.inputs {
         Some(inputs) => inputs,
         None => pair.inputs_now(context).await,

@@ -114,7 +114,7 @@ impl StageInputs {
                     tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
                     ExecutionError::RerunFrom(stage)
                 }
-                ArtifactError::Io { .. } => ExecutionError::Failed {
+                ArtifactError::Io { .. } | ArtifactError::Moved(_) => ExecutionError::Failed {
                     failure: Failure::new(FailureClass::Io, error.to_string()),
                     is_transient: true,
                 },

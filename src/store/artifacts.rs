@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
-use super::atomic_write::{parent_folder, sync_folder, write_synced};
+use super::atomic_write::write_synced;
 use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
+use super::parent_folder::{parent_folder, sync_folder};
 use crate::domain::{ArtifactRef, ContentHash};
 
 /// An artifact that is not on disk yet.
@@ -57,6 +58,11 @@ pub enum ArtifactError {
     /// The file was changed after it was written.
     #[error("artifact {0} was changed: its bytes do not match its name")]
     Changed(PathBuf),
+    /// The project's directory was renamed or removed.
+    #[error(
+        "{0} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path"
+    )]
+    Moved(PathBuf),
     /// A file operation failed.
     #[error("artifact {path}: {source}")]
     Io {
@@ -141,11 +147,22 @@ impl Project {
         files: &[NewArtifact],
         on_written: &dyn Fn(),
     ) -> Result<(), ArtifactError> {
+        self.write_all(files, on_written).map_err(|error| {
+            // After a renaming, the disk reports only that a folder does not exist.
+            self.check_in_place().err().unwrap_or(error)
+        })
+    }
+
+    fn write_all(
+        &self,
+        files: &[NewArtifact],
+        on_written: &dyn Fn(),
+    ) -> Result<(), ArtifactError> {
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
             let path = self.artifact_path(&file.reference);
             let folder = parent_folder(&path);
-            make_folder(&folder)?;
+            self.make_folder(&folder)?;
             if self.read_artifact(&file.reference).is_err() {
                 self.write_artifact(&path, &file.bytes, on_written)?;
             }
@@ -181,6 +198,31 @@ impl Project {
         self.artifacts_dir().join("tmp")
     }
 
+    /// Checks that the project's directory was not renamed or removed since it was opened.
+    ///
+    /// # Errors
+    /// Returns an error if it was, or if the disk fails.
+    pub fn check_in_place(&self) -> Result<(), ArtifactError> {
+        if self.is_in_place().map_err(ArtifactError::io(self.dir()))? {
+            Ok(())
+        } else {
+            Err(ArtifactError::Moved(self.dir().to_owned()))
+        }
+    }
+
+    /// Creates a folder in the artifacts folder, and the artifacts folder, if they are missing. Never creates the
+    /// project's directory: after a renaming, that would leave a second, incomplete project at the old path.
+    fn make_folder(&self, folder: &Path) -> Result<(), ArtifactError> {
+        self.check_in_place()?;
+        for folder in [&self.artifacts_dir(), folder] {
+            match std::fs::create_dir(folder) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                created => created.map_err(ArtifactError::io(folder))?,
+            }
+        }
+        Ok(())
+    }
+
     fn write_artifact(
         &self,
         path: &Path,
@@ -188,10 +230,17 @@ impl Project {
         on_written: &dyn Fn(),
     ) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
-        make_folder(&folder)?;
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let temporary = folder.join(format!("{}-{number}", std::process::id()));
-        let outcome = write_synced(&temporary, bytes)
+        self.make_folder(&folder)?;
+        let (temporary, written) = loop {
+            let number = NEXT.fetch_add(1, Ordering::Relaxed);
+            let temporary = folder.join(format!("{}-{number}", std::process::id()));
+            match write_synced(&temporary, bytes) {
+                // A process with the same pid has this file: it died, or works in another container.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                written => break (temporary, written),
+            }
+        };
+        let outcome = written
             .and_then(|()| {
                 on_written();
                 std::fs::rename(&temporary, path)
@@ -217,10 +266,6 @@ fn has_hash(path: &Path, hash: &ContentHash) -> Result<bool, ArtifactError> {
 
 fn sync(folder: &Path) -> Result<(), ArtifactError> {
     sync_folder(folder).map_err(ArtifactError::io(folder))
-}
-
-fn make_folder(folder: &Path) -> Result<(), ArtifactError> {
-    std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))
 }
 
 #[cfg(test)]
@@ -260,6 +305,24 @@ mod tests {
     }
 
     #[test]
+    fn a_temporary_file_of_another_process_is_left_alone() {
+        let (_dir, project) = project();
+        write(&project, &image(b"a"));
+        let next = super::NEXT.load(std::sync::atomic::Ordering::Relaxed);
+        let names = (next..next + 50).map(|number| format!("{}-{number}", std::process::id()));
+        let others: Vec<_> = names.map(|name| project.temporary_dir().join(name)).collect();
+        for other in &others {
+            std::fs::write(other, "half").expect("a file");
+        }
+        write(&project, &image(b"b"));
+        for other in &others {
+            assert_eq!(std::fs::read(other).expect("a file"), b"half");
+        }
+        let image = image(b"b");
+        assert_eq!(project.read_artifact(image.reference()).expect("read"), b"b");
+    }
+
+    #[test]
     fn a_changed_artifact_is_found_and_written_again() {
         let (_dir, project) = project();
         let image = image(b"a");
@@ -275,6 +338,26 @@ mod tests {
         assert!(project.check_artifact(artifact, true).is_ok());
         write(&project, &image);
         assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
+    }
+
+    #[test]
+    fn a_renamed_project_is_not_created_again_at_its_old_path() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (old, new) = (dir.path().join("old"), dir.path().join("new"));
+        let project = Project::create(&old).expect("a project");
+        std::fs::rename(&old, &new).expect("renamed");
+        let files = [image(b"a")];
+        let refused = project.write_artifacts(&files, &|| {});
+        assert!(matches!(refused, Err(ArtifactError::Moved(path)) if path == old));
+        assert!(!old.exists());
+        // Another project at the old path gets no files either.
+        std::fs::create_dir(&old).expect("another project");
+        let refused = project.write_artifacts(&files, &|| {});
+        assert!(matches!(refused, Err(ArtifactError::Moved(_))));
+        assert_eq!(std::fs::read_dir(&old).expect("a folder").count(), 0);
+        std::fs::remove_dir(&old).expect("removed");
+        std::fs::rename(&new, &old).expect("renamed back");
+        write(&project, &image(b"a"));
     }
 
     #[test]

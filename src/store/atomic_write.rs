@@ -1,89 +1,113 @@
-//! Atomic and durable writes: a file is written under a temporary name, synced, and renamed.
+//! Atomic and durable writes: a file is written in a staging folder, synced, and renamed.
 
-use std::fs::File;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::fs::{File, Metadata};
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
 
-/// Writes a file atomically: an existing file is replaced only after the new content is on the disk. If `path` is not a
-/// regular file, such as a pipe or a terminal, writes to it directly.
+use super::parent_folder::{parent_folder, sync_folder};
+use super::staging::StagingFolder;
+
+/// Name of the new file in its staging folder.
+const NEW: &str = "new";
+
+/// Writes a file atomically: an existing file is replaced only after the new content is on the disk. If two processes
+/// write the same file, the file of the last one stays, whole. If `path` is not a regular file, such as a pipe or a
+/// terminal, writes to it directly.
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
-    let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    if path.exists() && !path.is_file() {
+    let path = match std::fs::canonicalize(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => path.to_owned(),
+        found => found?,
+    };
+    if metadata(&path)?.is_some_and(|meta| !meta.is_file()) {
         return std::fs::write(path, bytes);
     }
-    let partial = partial_path(&path);
-    let written = File::create(&partial)
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| rename_into_place(&partial, &path));
-    if written.is_err() {
-        // A partial file that cannot be removed does no harm.
-        let _ = std::fs::remove_file(&partial);
-    }
-    written
+    let staging = StagingFolder::beside(&path)?;
+    let partial = staging.path().join(NEW);
+    File::create(&partial)?.write_all(bytes)?;
+    rename_into_place(&partial, &path)
 }
 
-/// Writes a file and syncs its content to the disk. Does not sync the folder, so the name may be lost in a crash.
+/// Writes a new file and syncs its content to the disk. Does not sync the folder, so the name may be lost in a crash.
 ///
 /// # Errors
-/// Returns an error if the file cannot be written. A partly written file is not removed.
+/// Returns an error if the file exists or cannot be written. A partly written file is not removed.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = File::create(path)?;
+    let mut file = File::create_new(path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }
 
-/// Returns the temporary path for writing a file. It has a hidden name in the same folder.
-pub fn partial_path(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.mocban-partial"))
+/// Returns the metadata of a file, or `None` if it does not exist.
+fn metadata(path: &Path) -> std::io::Result<Option<Metadata>> {
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        found => found.map(Some),
+    }
 }
 
 /// Renames a written file durably: syncs the file, renames it, and syncs the folder. If `path` exists, the new file
 /// gets the permissions of the old one.
 ///
 /// # Errors
-/// Returns an error if syncing, renaming or setting the permissions fails.
+/// Returns an error if syncing, renaming or setting the permissions fails. Only the error about the name's durability
+/// comes after the renaming; its message says that the file is complete.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
-    if let Ok(earlier) = std::fs::metadata(path) {
+    if let Some(earlier) = metadata(path)? {
         std::fs::set_permissions(partial, earlier.permissions())?;
     }
     std::fs::rename(partial, path)?;
-    sync_folder(&parent_folder(path))
-}
-
-/// Returns the folder that holds the name of a file or folder.
-pub(super) fn parent_folder(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
-    folder.unwrap_or(Path::new(".")).to_owned()
-}
-
-/// Makes the names in a folder durable.
-pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    File::open(folder)?.sync_all()
+    sync_folder(&parent_folder(path)).map_err(|error| {
+        let text = format!("the file is complete, but the disk did not confirm its name: {error}");
+        std::io::Error::new(error.kind(), text)
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{partial_path, write_atomic};
+    use super::write_atomic;
 
     #[test]
     fn the_earlier_file_stays_until_the_new_one_is_complete() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("report.txt");
         write_atomic(&path, b"one").expect("written");
-        // A folder at the temporary path makes the write fail.
-        std::fs::create_dir(partial_path(&path)).expect("a folder");
-        assert!(write_atomic(&path, b"two").is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"one");
-        std::fs::remove_dir(partial_path(&path)).expect("removed");
         write_atomic(&path, b"two").expect("written");
         assert_eq!(std::fs::read(&path).expect("read"), b"two");
         assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn writers_of_the_same_file_never_disturb_each_other() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("report.txt");
+        let texts = ["one", "two", "three", "four"].map(|word| word.repeat(100_000));
+        std::thread::scope(|scope| {
+            for text in &texts {
+                scope.spawn(|| {
+                    for _ in 0..50 {
+                        write_atomic(&path, text.as_bytes()).expect("written");
+                        let found = std::fs::read_to_string(&path).expect("read");
+                        assert!(texts.contains(&found), "{} bytes", found.len());
+                    }
+                });
+            }
+        });
+        assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn a_name_of_the_greatest_length_can_be_written() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        write_atomic(&dir.path().join("a".repeat(255)), b"one").expect("written");
+        let refused = write_atomic(&dir.path().join("a".repeat(256)), b"one");
+        let error = refused.expect_err("no such file can exist").to_string();
+        assert!(error.contains("name too long"), "{error}");
     }
 
     #[test]

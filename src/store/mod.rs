@@ -5,12 +5,17 @@ mod atomic_write;
 mod input_error;
 mod inputs;
 mod lock;
+mod lock_file;
 mod open_file;
+mod parent_folder;
 mod project;
 mod referenced;
+mod replacement_folder;
+mod staging;
+mod target_lock;
 
 pub use artifacts::{ArtifactError, NewArtifact};
-pub use atomic_write::{partial_path, rename_into_place, write_atomic, write_synced};
+pub use atomic_write::{rename_into_place, write_atomic, write_synced};
 pub use input_error::InputError;
 pub use inputs::{
     InputDigest, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
@@ -19,3 +24,6 @@ pub use lock::{LockError, RunLock};
 pub use open_file::{open_regular, read_file_or_pipe};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
+pub use replacement_folder::{Leftover, ReplaceError, ReplacementFolder};
+pub use staging::StagingFolder;
+pub use target_lock::{TargetLock, TargetLockError};

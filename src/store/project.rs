@@ -1,8 +1,9 @@
 //! The project directory: the paths of its catalog, settings, artifacts and inputs.
 
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-use super::atomic_write::{parent_folder, sync_folder};
+use super::parent_folder::{parent_folder, sync_folder};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";
@@ -15,6 +16,8 @@ const ARTIFACTS: &str = "artifacts";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Project {
     dir: PathBuf,
+    /// Device and inode of the directory when it was opened; `None` if it may not exist yet.
+    identity: Option<(u64, u64)>,
 }
 
 /// Why a project's directory cannot be used.
@@ -50,18 +53,42 @@ impl Project {
     /// Returns an error if the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
         // The content of the file is checked when the catalog is opened.
-        if !dir.join(CATALOG_FILE).exists() {
+        let catalog = dir.join(CATALOG_FILE);
+        if !catalog.try_exists().map_err(StoreError::io(&catalog))? {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
-        Ok(Self {
-            dir: dir.to_owned(),
-        })
+        Self::found(dir)
     }
 
     /// Returns a project that may not exist yet; touches no file.
     pub fn at(dir: &Path) -> Self {
         Self {
             dir: dir.to_owned(),
+            identity: None,
+        }
+    }
+
+    /// Returns the project in an existing directory.
+    fn found(dir: &Path) -> Result<Self, StoreError> {
+        let meta = std::fs::metadata(dir).map_err(StoreError::io(dir))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+            identity: Some((meta.dev(), meta.ino())),
+        })
+    }
+
+    /// Returns whether the directory still has its path. If it was renamed or removed, nothing may be created there.
+    ///
+    /// # Errors
+    /// Returns an error if the disk fails.
+    pub(super) fn is_in_place(&self) -> std::io::Result<bool> {
+        let Some(identity) = self.identity else {
+            return Ok(true);
+        };
+        match std::fs::metadata(&self.dir) {
+            Ok(meta) => Ok((meta.dev(), meta.ino()) == identity),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(error),
         }
     }
 
@@ -76,9 +103,7 @@ impl Project {
             let folder = parent_folder(created);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;
         }
-        Ok(Self {
-            dir: dir.to_owned(),
-        })
+        Self::found(dir)
     }
 
     /// Returns the directory.

@@ -1,14 +1,15 @@
 //! `backup` through the real binary: backs up during a run, can be restored, and is never incomplete.
 
+use std::path::Path;
 use std::process::Stdio;
 
 use mocban::store::Project;
 
 use crate::check::{at, done, exported, sql};
 use crate::cli::mocban;
-use crate::resume::{copy, project, run, stages_done};
+use crate::resume::{copy_folder, project, run, stages_done};
 
-fn files(dir: &std::path::Path) -> Vec<String> {
+pub(crate) fn files(dir: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(dir).expect("a folder");
     let name = |entry: std::io::Result<std::fs::DirEntry>| {
         let name = entry.expect("an entry").file_name();
@@ -24,7 +25,8 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let original = project(dir.path(), "original", "3");
     std::fs::write(original.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
-    let blank = copy(&original, &dir.path().join("blank"));
+    let blank = dir.path().join("blank");
+    copy_folder(&original.dir().join("data"), &blank.join("data"));
     let file = dir.path().join("b.sqlite");
     let backup = ["backup", file.to_str().expect("UTF-8")];
 
@@ -44,9 +46,10 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     let expected = exported(&original, "expected");
 
     // The inputs are unchanged; the artifacts are lost with the old project.
-    std::fs::copy(&file, blank.catalog_path()).expect("copied");
-    let settings = dir.path().join("b.mocban.toml");
-    std::fs::copy(settings, blank.settings_path()).expect("copied");
+    restore(&file, &blank);
+    let blank = Project::open(&blank).expect("a project");
+    let settings = std::fs::read(original.settings_path()).expect("settings");
+    assert!(std::fs::read(blank.settings_path()).expect("settings") == settings);
     let repaired = at(&blank, &["check", "--repair", "--json"])
         .expect(0)
         .json();
@@ -57,8 +60,14 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     assert!(exported(&blank, "restored") == expected, "another export");
 }
 
+/// Restores a backup to a directory.
+fn restore(file: &Path, dir: &Path) {
+    let [file, dir] = [file, dir].map(|path| path.to_str().expect("UTF-8"));
+    mocban(Path::new("/"), &["restore", file, dir]).expect(0);
+}
+
 #[test]
-fn verdicts_survive_a_restore_and_are_saved_as_lines_too() {
+fn verdicts_survive_a_restore() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let file = dir.path().join("blocks.sqlite");
@@ -66,18 +75,14 @@ fn verdicts_survive_a_restore_and_are_saved_as_lines_too() {
     let told = at(&project, &backup).expect(0).json();
     assert_eq!(told["verdicts"], 4);
     let log = at(&project, &["verdict", "log", "--json"]).expect(0).out;
-    let lines = dir.path().join("blocks.verdicts.jsonl");
-    assert_eq!(std::fs::read_to_string(&lines).expect("read"), log);
 
-    let data = project.dir().join("data");
-    std::fs::create_dir(dir.path().join("q")).expect("a folder");
-    std::fs::rename(data, dir.path().join("q/data")).expect("moved");
-    std::fs::copy(&file, dir.path().join("q/catalog.sqlite")).expect("copied");
-    let settings = dir.path().join("blocks.mocban.toml");
-    std::fs::copy(settings, dir.path().join("q/mocban.toml")).expect("copied");
-    let restored = Project::open(&dir.path().join("q")).expect("a project");
+    let other = dir.path().join("q");
+    copy_folder(&project.dir().join("data"), &other.join("data"));
+    restore(&file, &other);
+    let restored = Project::open(&other).expect("a project");
     at(&restored, &["check", "--repair"]).expect(0);
     at(&restored, &["run"]).expect(0);
+    at(&restored, &["check"]).expect(0);
     // The results are the same, so the verdicts apply to them again.
     assert_eq!(
         at(&restored, &["verdict", "log", "--json"]).expect(0).out,
@@ -85,6 +90,68 @@ fn verdicts_survive_a_restore_and_are_saved_as_lines_too() {
     );
     let status = at(&restored, &["status", "--json"]).expect(0).json();
     assert_eq!(status["verdicts"]["pass"], 4);
+    // A project is never overwritten.
+    let args = ["restore", file.to_str().expect("UTF-8"), "q"];
+    let refused = mocban(dir.path(), &args).expect(2);
+    assert!(refused.err.contains("q is a project already"), "{}", refused.err);
+}
+
+#[test]
+fn backup_is_one_file_and_touches_no_other() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    std::fs::write(project.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
+    let foreign = ["blocks-v1.mocban.toml", "blocks-v1.verdicts.jsonl"];
+    for name in foreign {
+        std::fs::write(dir.path().join(name), "mine").expect("written");
+    }
+    let versions = ["blocks-v1.0", "blocks-v1.1"];
+    let before = files(dir.path());
+    let backup = |name: &str| at(&project, &["backup", &format!("../{name}")]).expect(0);
+    backup(versions[0]);
+    sql(&project, "UPDATE pair SET block = 'b1'");
+    let first = std::fs::read(dir.path().join(versions[0])).expect("read");
+    std::fs::remove_file(project.settings_path()).expect("settings");
+    backup(versions[1]);
+    let mut expected = [&before[..], &versions.map(ToOwned::to_owned)].concat();
+    expected.sort();
+    assert_eq!(files(dir.path()), expected);
+    assert!(std::fs::read(dir.path().join(versions[0])).expect("read") == first);
+    for name in foreign {
+        assert_eq!(std::fs::read(dir.path().join(name)).expect("read"), b"mine");
+    }
+    // Each backup holds its own settings, or none.
+    for (name, has_settings) in versions.into_iter().zip([true, false]) {
+        let restored = dir.path().join(format!("of-{name}"));
+        restore(&dir.path().join(name), &restored);
+        assert_eq!(restored.join("mocban.toml").exists(), has_settings);
+        at(&Project::at(&restored), &["status"]).expect(0);
+    }
+}
+
+#[test]
+fn restore_refuses_other_files_and_keeps_other_settings() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    std::fs::write(project.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
+    at(&project, &["backup", "../b"]).expect(0);
+    std::fs::write(dir.path().join("thesis.docx"), "ten years").expect("written");
+    std::fs::create_dir(dir.path().join("mine")).expect("a folder");
+    std::fs::write(dir.path().join("mine/mocban.toml"), "[run]\n").expect("written");
+    for (args, code, says) in [
+        (["thesis.docx", "q"], 2, "thesis.docx is not a backup"),
+        (["none", "q"], 2, "there is no file none"),
+        (["b", "mine"], 2, "mine/mocban.toml exists and differs"),
+    ] {
+        let refused = mocban(dir.path(), &[&["restore"], &args[..]].concat()).expect(code);
+        assert!(refused.err.contains(says), "{}", refused.err);
+    }
+    assert!(!dir.path().join("q").exists());
+    assert_eq!(files(&dir.path().join("mine")), ["mocban.toml"]);
+    // A restore that was killed before the catalog was renamed is completed.
+    std::fs::copy(project.settings_path(), dir.path().join("mine/mocban.toml")).expect("copied");
+    mocban(dir.path(), &["restore", "b", "mine"]).expect(0);
+    assert_eq!(files(&dir.path().join("mine")), ["catalog.sqlite", "mocban.toml"]);
 }
 
 #[test]
@@ -161,19 +228,11 @@ fn failed_backup_leaves_the_previous_one_and_no_partial_files() {
     assert!(refused.err.contains("is damaged"), "{}", refused.err);
     assert!(std::fs::read(&file).expect("read") == good);
     assert_eq!(files(dir.path()), names);
-    // A partial copy left by a killed process is replaced.
     std::fs::write(project.catalog_path(), intact).expect("restored");
     sql(&project, "UPDATE pair SET block = 'b1'");
-    std::fs::write(dir.path().join(".b.sqlite.mocban-partial"), "half").expect("written");
     at(&project, &backup).expect(0);
     assert!(std::fs::read(&file).expect("read") != good);
     assert_eq!(files(dir.path()), names);
-    // Settings that the project no longer has are removed from the backup.
-    std::fs::remove_file(project.settings_path()).expect("settings");
-    at(&project, &backup).expect(0);
-    let settings = "b.mocban.toml";
-    assert!(names.iter().any(|name| name == settings));
-    assert!(!dir.path().join(settings).exists());
 }
 
 #[test]

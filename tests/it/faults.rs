@@ -7,6 +7,7 @@ use std::process::Command;
 
 use mocban::store::Project;
 
+use crate::backup::files as names;
 use crate::cli::{binary, call, mocban};
 use crate::fault::{EAGAIN, EIO, ENOSPC, Fault};
 use crate::fault_scenario::{End, FaultScenario, fault_points};
@@ -100,18 +101,15 @@ const OF_AN_EXPORT: &[(Fault, End)] = &[
 /// Faults of a backup.
 const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("open", ".b.*", ENOSPC), End::Either),
-    (Fault::once("write", ".b.*", ENOSPC), End::Fails),
-    (Fault::once("write", ".b.v*", ENOSPC), End::Fails),
+    (Fault::once("write", ".b.*catalog.sqlite", ENOSPC), End::Fails),
     (Fault::once("write", "*", EIO).and_later(), End::Fails),
-    (Fault::half(".b.v*"), End::Succeeds),
+    (Fault::half(".b.*catalog.sqlite"), End::Succeeds),
     (Fault::once("sync", ".b.*", EIO), End::Fails),
     (Fault::once("sync", "*", EIO).and_later(), End::Fails),
     (Fault::once("rename", "b.sqlite", EIO), End::Fails),
-    (Fault::once("rename", "b.v*", EIO), End::Fails),
-    (Fault::once("rename", "b.m*", EIO), End::Fails),
-    (Fault::once("write", ".b.m*", ENOSPC), End::Fails),
     (Fault::once("unlink", ".b.*", EIO), End::Succeeds),
     (Fault::once("read", CATALOG, EIO), End::Fails),
+    (Fault::once("read", "p/mocban.toml", EIO), End::Fails),
 ];
 
 /// Faults during `check`. An unreadable database must not be reported as damaged.
@@ -229,60 +227,30 @@ fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).expect("a file")
 }
 
-/// Returns the names in a folder.
-fn names(root: &Path) -> Vec<String> {
-    let inside = std::fs::read_dir(root).expect("a folder");
-    let name = |entry: std::io::Result<std::fs::DirEntry>| {
-        let name = entry.expect("an entry").file_name();
-        name.to_string_lossy().into_owned()
-    };
-    let mut names: Vec<_> = inside.map(name).collect();
-    names.sort();
-    names
-}
-
-/// The files of a backup.
-const BACKED_UP: [&str; 3] = ["b.mocban.toml", "b.sqlite", "b.verdicts.jsonl"];
-
 const BACKUP: FaultScenario = FaultScenario {
     before: |comparison, root| {
         copy_completed(comparison, root);
         let settings = Project::at(&root.join("p")).settings_path();
         std::fs::write(&settings, "[run]\nworkers = 1\n").expect("written");
         call(&mut backup(root)).expect(0);
-        std::fs::create_dir(root.join("earlier")).expect("a folder");
-        for name in BACKED_UP {
-            std::fs::copy(root.join(name), root.join("earlier").join(name)).expect("copied");
-        }
+        std::fs::copy(root.join("b.sqlite"), root.join("earlier")).expect("copied");
         std::fs::write(&settings, "[run]\nworkers = 2\n").expect("written");
         let set = ["-C", "p", "verdict", "set", "upright-0000", "pass"];
         mocban(root, &[&set[..], &["--reviewer", "lan"]].concat()).expect(0);
     },
     command: backup,
     after: |_, root, done| {
-        let complete = [&BACKED_UP[..], &["earlier", "p"]].concat();
-        let is_earlier = |name: &str| {
-            let earlier = root.join("earlier").join(name);
-            bytes(&root.join(name)) == bytes(&earlier)
-        };
-        if !done {
-            assert_eq!(names(root), complete);
-            for name in BACKED_UP {
-                assert!(is_earlier(name), "another {name}");
-            }
-            call(&mut backup(root)).expect(0);
-        }
+        let is_earlier = || bytes(&root.join("b.sqlite")) == bytes(&root.join("earlier"));
+        assert_ne!(is_earlier(), done);
         call(&mut backup(root)).expect(0);
-        assert_eq!(names(root), complete);
-        for name in BACKED_UP {
-            assert!(!is_earlier(name), "the earlier {name}");
-        }
-        let catalog = root.join(CATALOG);
-        std::fs::copy(root.join("b.sqlite"), &catalog).expect("copied");
-        mocban(root, &["-C", "p", "check"]).expect(0);
-        let log = ["-C", "p", "verdict", "log", "--json"];
+        assert_eq!(names(root), ["b.sqlite", "earlier", "p"]);
+        assert!(!is_earlier());
+        mocban(root, &["restore", "b.sqlite", "q"]).expect(0);
+        mocban(root, &["-C", "q", "check", "--repair"]).expect(0);
+        let settings = ["p", "q"].map(|project| bytes(&root.join(project).join("mocban.toml")));
+        assert!(settings[0] == settings[1]);
+        let log = ["-C", "q", "verdict", "log", "--json"];
         let log = mocban(root, &log).expect(0).out;
-        assert_eq!(log.as_bytes(), bytes(&root.join("b.verdicts.jsonl")));
         assert!(log.contains("lan"), "{log}");
     },
 };

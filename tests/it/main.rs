@@ -18,6 +18,8 @@ mod decoys;
 mod demo;
 mod error_snapshots;
 #[cfg(target_os = "linux")]
+mod every_call;
+#[cfg(target_os = "linux")]
 mod fault;
 #[cfg(target_os = "linux")]
 mod fault_scenario;
@@ -45,6 +47,7 @@ mod parsers;
 mod power;
 mod processes;
 mod queue;
+mod renamed;
 mod report;
 mod resume;
 mod review_alignment;
@@ -55,6 +58,7 @@ mod review_kill;
 #[cfg(target_os = "linux")]
 mod review_load;
 mod review_page;
+mod same_output;
 mod sample_files;
 mod semi_real;
 #[cfg(target_os = "linux")]

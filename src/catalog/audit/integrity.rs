@@ -75,7 +75,8 @@ FROM pragma_foreign_key_check LIMIT ?1";
 
 const OBJECTS: &str = "
 SELECT type || ' ' || name, sql FROM sqlite_schema
-WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations' ORDER BY 1";
+WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name NOT IN ('_sqlx_migrations', 'backup_settings')
+ORDER BY 1";
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 

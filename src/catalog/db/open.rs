@@ -1,6 +1,6 @@
 //! Opens the database and verifies file, disk and settings.
 
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 use std::time::Duration;
 
@@ -137,7 +137,13 @@ fn check_file(path: &Path, allow_empty: bool) -> Result<()> {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
         Ok(meta) if meta.len() == 0 && !allow_empty => Err(CatalogError::Empty(path.to_owned())),
         Ok(_) => Ok(()),
-        Err(_) => Err(CatalogError::Missing(path.to_owned())),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            Err(CatalogError::Missing(path.to_owned()))
+        }
+        Err(source) => Err(CatalogError::Io {
+            path: path.to_owned(),
+            source,
+        }),
     }
 }
 
@@ -205,7 +211,7 @@ async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
     Ok(tables == 0)
 }
 
-fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
+pub(crate) fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
     let path = path.to_owned();
     if id == APPLICATION_ID {
         return CatalogError::OtherVersion {

@@ -1,0 +1,137 @@
+//! `restore`: makes a project of a backup.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use serde_json::json;
+
+use super::backup::{count_rows, is_backup};
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::files::{self, metadata};
+use super::table::count;
+use crate::catalog::Catalog;
+use crate::store::{
+    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
+    write_synced,
+};
+
+/// Arguments of `restore`.
+#[derive(Debug, Args)]
+pub(super) struct RestoreArgs {
+    /// The backup
+    pub(super) backup: PathBuf,
+    /// The project directory to create; it may hold meshes and prints already
+    pub(super) dir: PathBuf,
+}
+
+pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let RestoreArgs { backup, dir } = args;
+    check_backup(&backup)?;
+    check_directory(&Project::at(&dir))?;
+    let existed = dir.exists();
+    let restored = restore_into(&backup, &dir).await;
+    if restored.is_err() && !existed {
+        // Fails unless the directory is empty.
+        let _ = std::fs::remove_dir(&dir);
+    }
+    let restored = restored?;
+    let (pairs, verdicts) = (restored.pairs, restored.verdicts);
+    context.print_json(&json!({
+        "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
+        "settings": restored.has_settings,
+    }))?;
+    context.info(&format!(
+        "{} and {} restored to {}; put meshes and prints at their old places, `run` computes the images again",
+        count(pairs, "pair"),
+        count(verdicts, "verdict"),
+        dir.display(),
+    ));
+    let context = context.at(&dir);
+    context.next("check --repair");
+    context.next("run");
+    Ok(ExitCode::Done)
+}
+
+/// What a restored project holds.
+struct Restored {
+    pairs: u64,
+    verdicts: u64,
+    has_settings: bool,
+}
+
+/// Creates the project. The catalog comes last: a directory without a catalog is no project.
+async fn restore_into(backup: &Path, dir: &Path) -> anyhow::Result<Restored> {
+    let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
+    let project = Project::create(dir).with_context(failed)?;
+    let catalog = project.catalog_path();
+    let _lock = TargetLock::acquire(&catalog).with_context(failed)?;
+    let staging = StagingFolder::beside(&catalog).with_context(failed)?;
+    let new = staging.path().join(CATALOG_FILE);
+    let settings = Catalog::restore_backup(backup, &new).await.with_context(failed)?;
+    let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
+    // Another process may have created a project in the meantime.
+    check_directory(&project)?;
+    if let Some(bytes) = &settings {
+        write_settings(&project, bytes, staging.path()).with_context(failed)?;
+    }
+    rename_into_place(&new, &catalog).with_context(failed)?;
+    Ok(Restored {
+        pairs,
+        verdicts,
+        has_settings: settings.is_some(),
+    })
+}
+
+/// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it.
+fn write_settings(project: &Project, bytes: &[u8], staging: &Path) -> anyhow::Result<()> {
+    let path = project.settings_path();
+    if files::small(&path)?.is_some_and(|found| found != bytes) {
+        let text = format!(
+            "{} exists and differs from the settings in the backup; rename it",
+            path.display()
+        );
+        return Err(Refusal::Usage(text).into());
+    }
+    let new = staging.join(SETTINGS_FILE);
+    write_synced(&new, bytes)?;
+    Ok(rename_into_place(&new, &path)?)
+}
+
+/// Refuses a file that is not a backup.
+fn check_backup(backup: &Path) -> anyhow::Result<()> {
+    let shown = backup.display();
+    let failed = || format!("cannot read {shown}");
+    let refuse = |text: String| Err(Refusal::Usage(text).into());
+    if metadata(backup).with_context(failed)?.is_none() {
+        return refuse(format!("there is no file {shown}"));
+    }
+    if !is_backup(backup).with_context(failed)? {
+        return refuse(format!("{shown} is not a backup"));
+    }
+    // The log of a catalog in use holds changes that the file lacks.
+    let mut log = backup.as_os_str().to_owned();
+    log.push("-wal");
+    let log = metadata(Path::new(&log)).with_context(failed)?;
+    if log.is_some_and(|log| log.len() > 0) {
+        return refuse(format!(
+            "{shown} is the catalog of a project in use; `backup` copies it"
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a directory that is a project.
+fn check_directory(project: &Project) -> anyhow::Result<()> {
+    let shown = project.dir().display();
+    let catalog = metadata(&project.catalog_path());
+    if catalog
+        .with_context(|| format!("cannot read {shown}"))?
+        .is_some()
+    {
+        let text = format!("{shown} is a project already; name another directory");
+        return Err(Refusal::Usage(text).into());
+    }
+    Ok(())
+}

@@ -1,0 +1,15 @@
+//! The folder that holds the name of a file or folder.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Returns the folder that holds the name of a file or folder.
+pub(super) fn parent_folder(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
+    folder.unwrap_or(Path::new(".")).to_owned()
+}
+
+/// Makes the names in a folder durable.
+pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    File::open(folder)?.sync_all()
+}
