@@ -9,6 +9,7 @@ use super::config::{ConfigShowArgs, as_toml};
 use super::contact_sheet::{self, ContactSheetArgs};
 use super::context::{Context, shell_quoted};
 use super::exit::{ExitCode, Refusal};
+use super::files;
 use super::import::{self, ImportArgs};
 use super::report;
 use super::run::{self, drive};
@@ -16,10 +17,10 @@ use super::screen::Palette;
 use super::signals;
 use super::table::count;
 use crate::config::{Origin, Tree};
-use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, write_dataset};
+use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
 use crate::domain::JobStatus;
 use crate::runner::{Stop, StopLevel};
-use crate::store::{CATALOG_FILE, SETTINGS_FILE};
+use crate::store::{CATALOG_FILE, ReplacementFolder, SETTINGS_FILE, TargetLock, write_atomic};
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
@@ -107,11 +108,12 @@ async fn create_dataset(
 ) -> anyhow::Result<Option<DatasetFiles>> {
     let data = dir.join("data");
     check_directory(dir, &data, &options)?;
-    std::fs::create_dir_all(&data).with_context(|| format!("cannot create {}", data.display()))?;
-    let note = data.join(NOTE);
-    std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
-    let Some(files) = write_or_stop(data.clone(), options).await? else {
-        return Ok(None);
+    let files = match find_dataset(&data, &options) {
+        Some(files) => files,
+        None => match replace_dataset(&data, options, context).await? {
+            Some(files) => files,
+            None => return Ok(None),
+        },
     };
     let pairs = count(files.pairs, "pair");
     let DemoOptions { tier, seed, .. } = options;
@@ -120,6 +122,31 @@ async fn create_dataset(
     context.info(&format!(
         "{action} {pairs} of tier {tier}, seed {seed}, in {data}"
     ));
+    Ok(Some(files))
+}
+
+/// Writes the dataset next to `data` and then replaces `data`, so that a project never sees half of it. Returns `None`
+/// if a signal stopped the command.
+async fn replace_dataset(
+    data: &Path,
+    options: DemoOptions,
+    context: &Context,
+) -> anyhow::Result<Option<DatasetFiles>> {
+    let folder = ReplacementFolder::begin(data)?;
+    let note = folder.path().join(NOTE);
+    std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
+    let Some(mut files) = write_or_stop(folder.path().to_owned(), options).await? else {
+        return Ok(None);
+    };
+    if let Some((path, error)) = folder.finish()? {
+        context.warn(&format!(
+            "the earlier data could not be removed from {}: {error}; the next demo that writes data removes them",
+            path.display()
+        ));
+    }
+    for file in [&mut files.manifest, &mut files.truth] {
+        *file = data.join(file.file_name().unwrap_or_default());
+    }
     Ok(Some(files))
 }
 
@@ -145,21 +172,25 @@ const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their
 alignments.\nCreated by `mocban demo`, which creates it again if it is incomplete; do not put your own files here.\n";
 
 /// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
-fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(), Refusal> {
+fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> anyhow::Result<()> {
     let refuse = |reason: &str| {
         let shown = dir.display();
-        Err(Refusal::Usage(format!(
-            "{shown} {reason}; name another directory for this demo"
-        )))
+        let text = format!("{shown} {reason}; name another directory for this demo");
+        Err(Refusal::Usage(text).into())
     };
+    let exists = |path: &Path| {
+        let found = path.try_exists();
+        found.with_context(|| format!("cannot read {}", path.display()))
+    };
+    let (is_project, has_data) = (exists(&dir.join(CATALOG_FILE))?, exists(data)?);
     let continue_hint = || {
-        if !dir.join(CATALOG_FILE).exists() {
+        if !is_project {
             return String::new();
         }
         let dir = shell_quoted(&dir.to_string_lossy());
         format!("; `mocban -C {dir} run` continues it")
     };
-    let stamp = std::fs::read(data.join("dataset.json")).ok();
+    let stamp = files::small(&data.join("dataset.json"))?;
     let found = stamp.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
     match found {
         Some(found) if found.tier != options.tier || found.seed != options.seed => {
@@ -173,12 +204,16 @@ fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(),
             let hint = continue_hint();
             refuse(&format!("already holds a demo of {pairs} pairs{hint}"))
         }
-        None if data.exists() && !data.join(NOTE).is_file() => {
-            refuse("has a data directory that no demo created")
-        }
-        None if dir.join(CATALOG_FILE).exists() && !data.exists() => refuse("is another project"),
+        None if has_data && !has_note(data)? => refuse("has a data directory that no demo created"),
+        None if is_project && !has_data => refuse("is another project"),
         Some(_) | None => Ok(()),
     }
+}
+
+/// Returns whether a directory has the note of a demo. A `README.txt` alone may be anybody's.
+fn has_note(data: &Path) -> anyhow::Result<bool> {
+    let note = files::small(&data.join(NOTE))?;
+    Ok(note.is_some_and(|text| text == NOTE_TEXT.as_bytes()))
 }
 
 /// Saves the settings of `--config` and `--set` in the project's settings file, for later commands.
@@ -192,18 +227,19 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     let text = changed_settings(&context.settings()?.tree);
     let file = dir.join(SETTINGS_FILE);
     let shown = file.display();
-    match std::fs::read_to_string(&file) {
-        Ok(there) if there == text => {}
-        Ok(_) => {
+    std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
+    let _lock = TargetLock::acquire(&file)?;
+    match files::small(&file)? {
+        Some(there) if there == text.as_bytes() => {}
+        Some(_) => {
             context.warn(&format!(
                 "{shown} exists and was not changed; the flags apply to this call only"
             ));
             return Ok(context.clone());
         }
-        Err(_) => {
-            std::fs::create_dir_all(dir)
-                .with_context(|| format!("cannot create {}", dir.display()))?;
-            std::fs::write(&file, text).with_context(|| format!("cannot write {shown}"))?;
+        None => {
+            write_atomic(&file, text.as_bytes())
+                .with_context(|| format!("cannot write {shown}"))?;
             context.info(&format!("settings are saved in {shown}"));
         }
     }
@@ -228,7 +264,7 @@ fn changed_settings(tree: &Tree) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{NOTE, changed_settings, check_directory};
+    use super::{NOTE, NOTE_TEXT, changed_settings, check_directory};
     use crate::config::{BaseLayer, Preset, Sources, load};
     use crate::demo::{DemoOptions, Tier};
 
@@ -246,7 +282,9 @@ mod tests {
         assert!(check(&OPTIONS));
         std::fs::create_dir(&data).expect("a folder");
         assert!(!check(&OPTIONS));
-        std::fs::write(data.join(NOTE), "").expect("a small file");
+        std::fs::write(data.join(NOTE), "my scans").expect("a small file");
+        assert!(!check(&OPTIONS));
+        std::fs::write(data.join(NOTE), NOTE_TEXT).expect("a small file");
         assert!(check(&OPTIONS));
         let stamp = serde_json::to_vec(&OPTIONS).expect("plain values");
         std::fs::write(data.join("dataset.json"), stamp).expect("a small file");

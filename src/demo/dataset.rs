@@ -102,35 +102,47 @@ pub fn write_dataset(
     options: &DemoOptions,
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<DatasetFiles, DatasetError> {
-    let max_pairs = options.tier.max_pairs().unwrap_or(u64::MAX);
-    let options = DemoOptions {
-        pairs: options.pairs.min(max_pairs),
-        ..*options
-    };
-    let stamp = DatasetStamp {
-        schema: 1,
-        revision: REVISION,
-        options,
-    };
-    let already_existed = is_complete(dir, &stamp);
-    if !already_existed {
-        write_all(dir, &options, is_stopped)?;
-        let file = dir.join(STAMP_FILE);
-        write(&file, &json_line(&file, &stamp)?)?;
+    if let Some(files) = find_dataset(dir, options) {
+        return Ok(files);
     }
-    Ok(DatasetFiles {
-        manifest: dir.join("manifest.csv"),
-        truth: dir.join("truth.jsonl"),
-        pairs: options.pairs,
-        already_existed,
-    })
+    let stamp = DatasetStamp::of(options);
+    write_all(dir, &stamp.options, is_stopped)?;
+    let file = dir.join(STAMP_FILE);
+    write(&file, &json_line(&file, &stamp)?)?;
+    Ok(DatasetFiles::of(dir, &stamp, false))
 }
 
-fn is_complete(dir: &Path, stamp: &DatasetStamp) -> bool {
-    fs::read(dir.join(STAMP_FILE))
-        .ok()
-        .and_then(|bytes| serde_json::from_slice::<DatasetStamp>(&bytes).ok())
-        .is_some_and(|found| found == *stamp)
+/// Returns the dataset below `dir` if it is complete and has these options.
+pub fn find_dataset(dir: &Path, options: &DemoOptions) -> Option<DatasetFiles> {
+    let stamp = DatasetStamp::of(options);
+    let bytes = fs::read(dir.join(STAMP_FILE)).ok()?;
+    let found: DatasetStamp = serde_json::from_slice(&bytes).ok()?;
+    (found == stamp).then(|| DatasetFiles::of(dir, &stamp, true))
+}
+
+impl DatasetStamp {
+    fn of(options: &DemoOptions) -> Self {
+        let max_pairs = options.tier.max_pairs().unwrap_or(u64::MAX);
+        Self {
+            schema: 1,
+            revision: REVISION,
+            options: DemoOptions {
+                pairs: options.pairs.min(max_pairs),
+                ..*options
+            },
+        }
+    }
+}
+
+impl DatasetFiles {
+    fn of(dir: &Path, stamp: &DatasetStamp, already_existed: bool) -> Self {
+        Self {
+            manifest: dir.join("manifest.csv"),
+            truth: dir.join("truth.jsonl"),
+            pairs: stamp.options.pairs,
+            already_existed,
+        }
+    }
 }
 
 fn write_all(

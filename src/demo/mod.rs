@@ -27,7 +27,7 @@ mod scene;
 mod tier;
 mod truth_line;
 
-pub use dataset::{DatasetError, DatasetFiles, DemoOptions, write_dataset};
+pub use dataset::{DatasetError, DatasetFiles, DemoOptions, find_dataset, write_dataset};
 pub use generator::PairGenerator;
 pub use pair::DemoPair;
 pub use scan_pose::TopsPlane;

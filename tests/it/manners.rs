@@ -84,7 +84,8 @@ fn demo_stopped_while_writing_its_files_reports_that() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
-    let meshes = dir.path().join("d/data/meshes");
+    let staging = format!("d/.data.{}-0.mocban-partial", child.id());
+    let meshes = dir.path().join(staging).join("new/meshes");
     let has_started = || std::fs::read_dir(&meshes).is_ok_and(|mut files| files.next().is_some());
     while !has_started() {
         assert_eq!(child.try_wait().expect("a child"), None);
@@ -100,5 +101,6 @@ fn demo_stopped_while_writing_its_files_reports_that() {
         err.contains("stopped while the files were being written"),
         "{err}"
     );
-    assert!(!dir.path().join("d/catalog.sqlite").exists());
+    let left = std::fs::read_dir(dir.path().join("d")).expect("a folder");
+    assert_eq!(left.count(), 0);
 }
