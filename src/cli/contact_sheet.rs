@@ -63,7 +63,11 @@ pub(super) async fn contact_sheet(
         sheet.of,
         path.display()
     ));
-    Ok(ExitCode::Done)
+    Ok(if sheet.problems.is_empty() {
+        ExitCode::Done
+    } else {
+        ExitCode::SomeFailed
+    })
 }
 
 /// Draws the sheet, writes it and returns its path.
@@ -96,5 +100,8 @@ pub(super) async fn write(
     };
     write_atomic(&path, &png_rgb8(&sheet.picture))
         .with_context(|| format!("cannot write {}", path.display()))?;
+    for (pair, why) in &sheet.problems {
+        context.warn(&format!("{pair} is not drawn completely: {why}"));
+    }
     Ok((path, sheet))
 }

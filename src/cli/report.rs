@@ -69,10 +69,13 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
+    let mut is_complete = true;
     let text = if let Some(other) = &args.compare {
         compared(&report, other, format, context).await?
     } else if format == ReportFormat::Html {
-        pictured(&report, pictures, (&project, &catalog), context).await?
+        let (page, has_all) = pictured(&report, pictures, (&project, &catalog), context).await?;
+        is_complete = has_all;
+        page
     } else {
         render(&report, format)
     };
@@ -86,16 +89,19 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         None if format == ReportFormat::Json => output::print_json_text(&text)?,
         None => output::print(&text)?,
     }
-    Ok(check_requirements(&report, &args, context))
+    Ok(match check_requirements(&report, &args, context) {
+        ExitCode::Done if !is_complete => ExitCode::SomeFailed,
+        code => code,
+    })
 }
 
-/// Renders the report as a page with images.
+/// Renders the report as a page with images. Returns whether no image of a result is missing; warns about each.
 async fn pictured(
     report: &Report,
     pictures: GallerySelection,
     (project, catalog): (&Project, &Catalog),
     context: &Context,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<(String, bool)> {
     let limits = context.settings()?.config.limits.image;
     let gallery = draw_gallery(pictures, catalog, project, limits).await?;
     let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
@@ -104,7 +110,14 @@ async fn pictured(
         project: name.map(Into::into),
         date: Some(day(now())),
     };
-    Ok(page(report, &gallery, &cover))
+    let problems = (gallery.groups.iter())
+        .flat_map(|group| &group.items)
+        .filter_map(|item| Some(format!("{}: {}", item.pair, item.problem.as_ref()?)))
+        .collect::<std::collections::BTreeSet<_>>();
+    for problem in &problems {
+        context.warn(&format!("the report lacks images of {problem}"));
+    }
+    Ok((page(report, &gallery, &cover), problems.is_empty()))
 }
 
 /// Renders this project's report with another one.

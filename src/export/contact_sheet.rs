@@ -60,6 +60,8 @@ pub struct ContactSheet {
     pub shown: usize,
     /// Pairs that are finished or failed, of those asked for.
     pub of: usize,
+    /// Pairs on it whose images or ground truth cannot be read, and why.
+    pub problems: Vec<(PairName, String)>,
 }
 
 /// Why images cannot be drawn.
@@ -79,11 +81,13 @@ struct SheetCandidate {
     rank: f64,
     pair: PairResults,
     truth: Option<TruthErrors>,
+    /// Why ground truth exists and cannot be used.
+    truth_problem: Option<String>,
 }
 
 /// Draws the contact sheet of a project from the current state of its catalog, without unfinished pairs.
 ///
-/// An image that cannot be drawn is left blank. If the depth map cannot be read, the cell states the reason.
+/// An image that cannot be drawn is left blank. If print or depth map cannot be read, the cell states the reason.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read, or a worker task panics.
@@ -96,11 +100,19 @@ pub async fn draw_contact_sheet(
     let project = project.clone();
     let picture = move || {
         let draw = |candidate| cell(&project, candidate, &options);
-        let cells: Vec<ContactSheetCell> = chosen.par_iter().map(draw).collect();
+        let drawn: Vec<(ContactSheetCell, Option<String>)> = chosen.par_iter().map(draw).collect();
+        let (cells, problems): (Vec<_>, Vec<_>) = drawn.into_iter().unzip();
+        let problems = (chosen.iter().zip(problems))
+            .filter_map(|(candidate, problem)| {
+                let name = candidate.pair.attributes.name.clone();
+                Some((name, problem.or_else(|| candidate.truth_problem.clone())?))
+            })
+            .collect();
         ContactSheet {
             picture: contact_sheet(&cells, options.columns),
             shown: cells.len(),
             of,
+            problems,
         }
     };
     Ok(tokio::task::spawn_blocking(picture).await?)
@@ -118,9 +130,15 @@ async fn choose(
         let wanted = page.into_iter().filter(|pair| is_shown(options, pair));
         for (pair, truth) in evaluate_pairs(project, wanted.collect()).await? {
             of += 1;
+            let truth_problem = truth.problem;
             let truth = truth.errors.get(&options.metric).copied();
             let rank = rank(&pair, truth.as_ref(), options);
-            chosen.push(SheetCandidate { rank, pair, truth });
+            chosen.push(SheetCandidate {
+                rank,
+                pair,
+                truth,
+                truth_problem,
+            });
         }
         // Pairs are read in the order of their names, and the sort is stable. Pairs of equal rank stay sorted by name.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
@@ -151,22 +169,24 @@ fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetO
     }
 }
 
+/// Draws the cell of a pair. The text is the reason if images of a result cannot be drawn.
 fn cell(
     project: &Project,
     candidate: &SheetCandidate,
     options: &ContactSheetOptions,
-) -> ContactSheetCell {
+) -> (ContactSheetCell, Option<String>) {
     let pair = &candidate.pair;
     let consensus = pair.metric(options.metric).map(Consensus::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
     let side = tile_side(options.columns);
     let (tiles, problem) = result_images(project, pair, options.metric, side, &options.limits);
-    ContactSheetCell {
+    let cell = ContactSheetCell {
         id: title(pair, options.metric),
-        note: problem.unwrap_or_else(|| note(candidate, options.metric)),
+        note: (problem.clone()).unwrap_or_else(|| note(candidate, options.metric)),
         wrong: off_truth || consensus.is_none_or(|consensus| consensus == Consensus::Failed),
         tiles,
-    }
+    };
+    (cell, problem)
 }
 
 /// Returns the id of a pair, with its confidence and its verdict if they exist.

@@ -83,8 +83,8 @@ impl SourcePrint {
 
 /// Draws the print, the aligned relief and the overlay of a metric's result. The longest side of each is `side` pixels.
 ///
-/// An image that cannot be drawn is `None`. The text is the reason if the depth map cannot be read, and otherwise
-/// `None`.
+/// An image that cannot be drawn is `None`. The text is the reason if the pair has a result whose print or depth map
+/// cannot be read, and otherwise `None`.
 pub(super) fn result_images(
     project: &Project,
     pair: &PairResults,
@@ -92,8 +92,13 @@ pub(super) fn result_images(
     side: usize,
     limits: &ImageLimits,
 ) -> ([Option<Rgb>; 3], Option<String>) {
-    let Ok(print) = SourcePrint::read(project, pair, limits) else {
-        return ([None, None, None], None);
+    let print = match SourcePrint::read(project, pair, limits) {
+        Ok(print) => print,
+        // The failure of a pair without a result says what is wrong with the print.
+        Err(error) => {
+            let has_result = pair.metric(metric).is_some();
+            return ([None, None, None], has_result.then(|| error.to_string()));
+        }
     };
     let view = PrintView::of_side(&print.picture, side);
     let plain = Some(view.print(&print.picture));
