@@ -118,8 +118,8 @@ pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
     let mut head = [0; 72];
     match std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut head)) {
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
-        read => read.map(|()| {
-            head.starts_with(b"SQLite format 3\0") && head[68..].starts_with(b"mocb")
-        }),
+        read => {
+            read.map(|()| head.starts_with(b"SQLite format 3\0") && head[68..].starts_with(b"mocb"))
+        }
     }
 }

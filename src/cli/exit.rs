@@ -36,7 +36,10 @@ const MEANINGS: [(ExitCode, &str); 11] = [
     (ExitCode::SomeFailed, "finished, some pairs failed"),
     (ExitCode::NothingSelected, "the selection matched no pair"),
     (ExitCode::NoProject, "no project here"),
-    (ExitCode::InUse, "project or output in use by another process"),
+    (
+        ExitCode::InUse,
+        "project or output in use by another process",
+    ),
     (ExitCode::Damaged, "check found damage"),
     (ExitCode::BelowFailUnder, "--fail-under not met"),
     (ExitCode::Incomplete, "--require-complete not met"),

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::domain::sanitize;
-use crate::store::read_file_or_pipe;
+use crate::store::{open_regular, read_file_or_pipe};
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
@@ -32,13 +32,10 @@ const MAX_SMALL: u64 = 1 << 20;
 pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
-    match metadata(path).with_context(failed)? {
-        None => return Ok(None),
-        // Opening a pipe could wait forever.
-        Some(meta) if !meta.is_file() => anyhow::bail!("{shown} is not a regular file; rename it"),
-        Some(_) => {}
+    if metadata(path).with_context(failed)?.is_none() {
+        return Ok(None);
     }
-    let file = std::fs::File::open(path).with_context(failed)?;
+    let (file, _) = open_regular(path)?;
     let mut bytes = Vec::new();
     file.take(MAX_SMALL + 1)
         .read_to_end(&mut bytes)

@@ -69,7 +69,9 @@ async fn restore_into(backup: &Path, dir: &Path) -> anyhow::Result<Restored> {
     let _lock = TargetLock::acquire(&catalog).with_context(failed)?;
     let staging = StagingFolder::beside(&catalog).with_context(failed)?;
     let new = staging.path().join(CATALOG_FILE);
-    let settings = Catalog::restore_backup(backup, &new).await.with_context(failed)?;
+    let settings = Catalog::restore_backup(backup, &new)
+        .await
+        .with_context(failed)?;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
     // Another process may have created a project in the meantime.
     check_directory(&project)?;

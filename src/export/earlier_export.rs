@@ -13,9 +13,18 @@ use crate::domain::ThresholdMetric;
 /// Files of lines, each with keys that every line has.
 const FILES: [(&str, &[&str]); 4] = [
     (LINES, &["id", "metric", "status", "result_hash"]),
-    (VERDICTS, &["pair", "metric", "result_hash", "verdict", "reviewer"]),
-    (ATTENTION_CHECKS, &["pair", "result_hash", "check", "verdict"]),
-    (MANUAL_ALIGNMENTS, &["pair", "reviewer", "print_from_mesh", "mesh_hash"]),
+    (
+        VERDICTS,
+        &["pair", "metric", "result_hash", "verdict", "reviewer"],
+    ),
+    (
+        ATTENTION_CHECKS,
+        &["pair", "result_hash", "check", "verdict"],
+    ),
+    (
+        MANUAL_ALIGNMENTS,
+        &["pair", "reviewer", "print_from_mesh", "mesh_hash"],
+    ),
 ];
 
 /// Names of files in the folder of a pair and of a metric, without their extensions.
@@ -46,15 +55,13 @@ pub(super) fn foreign_entry(dir: &Path) -> Result<Option<PathBuf>> {
         let is_dir = entry.file_type()?.is_dir();
         let known = FILES.iter().find(|(file, _)| name == *file);
         match known {
-            Some((_, keys)) if entry.file_type()?.is_file() => {
-                match first_line(&entry.path())? {
-                    None => {
-                        empty_files.insert(name.clone());
-                    }
-                    Some(line) if has_keys(&line, keys) => {}
-                    Some(_) => return Ok(Some(entry.path())),
+            Some((_, keys)) if entry.file_type()?.is_file() => match first_line(&entry.path())? {
+                None => {
+                    empty_files.insert(name.clone());
                 }
-            }
+                Some(line) if has_keys(&line, keys) => {}
+                Some(_) => return Ok(Some(entry.path())),
+            },
             None if name == PAIRS && is_dir => {}
             Some(_) | None => return Ok(Some(entry.path())),
         }
@@ -95,7 +102,9 @@ fn foreign_in_pair(pair: &Path) -> Result<Option<PathBuf>> {
             continue;
         }
         let name = entry.file_name();
-        let is_metric = ThresholdMetric::ALL.iter().any(|metric| name == metric.name());
+        let is_metric = ThresholdMetric::ALL
+            .iter()
+            .any(|metric| name == metric.name());
         if !is_metric {
             return Ok(Some(entry.path()));
         }

@@ -16,7 +16,9 @@ pub(super) struct Folder(ReplacementFolder);
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// The folder holds something that no export writes.
-    #[error("{0} is not part of an export, so its folder is not replaced; choose an empty or new folder")]
+    #[error(
+        "{0} is not part of an export, so its folder is not replaced; choose an empty or new folder"
+    )]
     NotAnExport(PathBuf),
     /// The folder cannot be replaced.
     #[error("{0}")]
@@ -134,7 +136,9 @@ mod tests {
         write(&target, LINE).finish().expect("renamed");
         let second = write(&target, "");
         fs::write(target.join("thesis.tex"), "ten years").expect("written");
-        assert!(matches!(second.finish(), Err(FolderError::NotAnExport(path)) if path.ends_with("thesis.tex")));
+        assert!(
+            matches!(second.finish(), Err(FolderError::NotAnExport(path)) if path.ends_with("thesis.tex"))
+        );
         assert_eq!(fs::read_to_string(target.join(LINES)).expect("read"), LINE);
         assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1);
     }

@@ -188,7 +188,9 @@ fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
     match path.parent().map_or(Ok(()), std::fs::create_dir_all) {
         // A disk error can hide that the folder exists. Writing the file then fails with the true reason, or succeeds.
-        Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(at(&path)(error).into()),
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => {
+            return Err(at(&path)(error).into());
+        }
         Ok(()) | Err(_) => {}
     }
     Ok(std::fs::write(&path, bytes).map_err(at(&path))?)

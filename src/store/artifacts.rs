@@ -153,11 +153,7 @@ impl Project {
         })
     }
 
-    fn write_all(
-        &self,
-        files: &[NewArtifact],
-        on_written: &dyn Fn(),
-    ) -> Result<(), ArtifactError> {
+    fn write_all(&self, files: &[NewArtifact], on_written: &dyn Fn()) -> Result<(), ArtifactError> {
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
             let path = self.artifact_path(&file.reference);
@@ -310,7 +306,9 @@ mod tests {
         write(&project, &image(b"a"));
         let next = super::NEXT.load(std::sync::atomic::Ordering::Relaxed);
         let names = (next..next + 50).map(|number| format!("{}-{number}", std::process::id()));
-        let others: Vec<_> = names.map(|name| project.temporary_dir().join(name)).collect();
+        let others: Vec<_> = names
+            .map(|name| project.temporary_dir().join(name))
+            .collect();
         for other in &others {
             std::fs::write(other, "half").expect("a file");
         }
@@ -319,7 +317,10 @@ mod tests {
             assert_eq!(std::fs::read(other).expect("a file"), b"half");
         }
         let image = image(b"b");
-        assert_eq!(project.read_artifact(image.reference()).expect("read"), b"b");
+        assert_eq!(
+            project.read_artifact(image.reference()).expect("read"),
+            b"b"
+        );
     }
 
     #[test]

@@ -49,7 +49,9 @@ pub enum ReplaceError {
         source: io::Error,
     },
     /// The target could not be replaced, nor the earlier content be moved back.
-    #[error("{path}: {source}; the earlier folder is {earlier}, and the next call of this command restores it")]
+    #[error(
+        "{path}: {source}; the earlier folder is {earlier}, and the next call of this command restores it"
+    )]
     Displaced {
         /// The target.
         path: PathBuf,

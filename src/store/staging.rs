@@ -209,7 +209,10 @@ mod tests {
     fn folders_of_living_processes_stay_and_those_of_dead_ones_are_removed() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let target = dir.path().join("out");
-        let (alive, dead) = (StagingFolder::beside(&target), StagingFolder::beside(&target));
+        let (alive, dead) = (
+            StagingFolder::beside(&target),
+            StagingFolder::beside(&target),
+        );
         let (alive, dead) = (alive.expect("a folder"), dead.expect("a folder"));
         assert_ne!(alive.path(), dead.path());
         fs::write(dead.path().join("half"), "half").expect("written");
@@ -237,7 +240,8 @@ mod tests {
 
     #[test]
     fn hidden_names_fit_the_file_system_and_differ() {
-        let name = |letter: &str| hidden_sibling(Path::new(&letter.repeat(83)), "1-1.mocban-partial");
+        let name =
+            |letter: &str| hidden_sibling(Path::new(&letter.repeat(83)), "1-1.mocban-partial");
         let (long, other) = (name("字字字"), name("字字音"));
         let length = |path: &Path| path.file_name().expect("a name").len();
         assert!(length(&long) < 230 && length(&other) < 230);

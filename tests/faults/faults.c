@@ -1,6 +1,7 @@
 /* Makes chosen system calls fail in the process that preloads this library.
  *
- * FAULT_CALL     open, stat, read, write, sync, rename, truncate, unlink, mkdir or lock
+ * FAULT_CALL     open, stat, fstat, list, read, write, sync, rename, truncate, unlink, mkdir, rmdir, chmod, flock or lock;
+ *                any for all of them except lock
  * FAULT_PATH     pattern (fnmatch) for the file's absolute path; for a rename, for either path
  * FAULT_NTH      number of the first matching call that fails, from 1; 0 for none
  * FAULT_TIMES    number of calls that fail from there on, 1 by default; 0 for all
@@ -12,6 +13,7 @@
  * FAULT_MARK     file that gets a line for every call with an injected fault
  */
 #define _GNU_SOURCE
+#include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -22,6 +24,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/uio.h>
@@ -71,9 +74,16 @@ static void note(const char *file, const char *call, const char *path) {
 
 enum verdict { PASS, FAIL, HALF };
 
+static int is_planned(const char *call) {
+    if (!plan.call) {
+        return 0;
+    }
+    return strcmp(plan.call, "any") == 0 ? strcmp(call, "lock") != 0 : strcmp(call, plan.call) == 0;
+}
+
 /* Decides about a call; sets errno if it is to fail. */
 static enum verdict judge(const char *call, const char *path, const char *other) {
-    if (!plan.call || !plan.path || strcmp(call, plan.call) != 0) {
+    if (!plan.path || !is_planned(call)) {
         return PASS;
     }
     if (fnmatch(plan.path, path, 0) != 0 && (!other || fnmatch(plan.path, other, 0) != 0)) {
@@ -105,7 +115,7 @@ static enum verdict judge(const char *call, const char *path, const char *other)
 
 /* Decides about a call on an open file. */
 static enum verdict judge_file(const char *call, int fd) {
-    if (!plan.call || strcmp(call, plan.call) != 0) {
+    if (!is_planned(call)) {
         return PASS;
     }
     char link[64], path[PATH_MAX];
@@ -116,6 +126,24 @@ static enum verdict judge_file(const char *call, int fd) {
     }
     path[length] = 0;
     return judge(call, path, NULL);
+}
+
+/* Decides about a call on a path below an open folder. */
+static enum verdict judge_at(const char *call, int folder, const char *path) {
+    char link[64], whole[PATH_MAX];
+    if (!is_planned(call)) {
+        return PASS;
+    }
+    if (path[0] == '/' || folder == AT_FDCWD) {
+        return judge(call, path, NULL);
+    }
+    snprintf(link, sizeof link, "/proc/self/fd/%d", folder);
+    ssize_t length = readlink(link, whole, sizeof whole - 2 - strlen(path));
+    if (length < 0) {
+        return PASS;
+    }
+    snprintf(whole + length, sizeof whole - (size_t)length, "/%s", path);
+    return judge(call, whole, NULL);
 }
 
 static size_t part(enum verdict verdict, size_t count) { return verdict == HALF ? (count + 1) / 2 : count; }
@@ -131,14 +159,51 @@ static size_t part(enum verdict verdict, size_t count) { return verdict == HALF 
 OPEN(open)
 OPEN(open64)
 
+int openat64(int folder, const char *path, int flags, ...) {
+    va_list rest;
+    va_start(rest, flags);
+    mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(rest, mode_t) : 0;
+    va_end(rest);
+    return judge_at("open", folder, path) == FAIL ? -1 : REAL(openat64)(folder, path, flags, mode);
+}
+
+DIR *opendir(const char *path) { return judge("list", path, NULL) == FAIL ? NULL : REAL(opendir)(path); }
+
+struct dirent64 *readdir64(DIR *folder) {
+    return judge_file("list", dirfd(folder)) == FAIL ? NULL : REAL(readdir64)(folder);
+}
+
 int statx(int folder, const char *path, int flags, unsigned mask, struct statx *found) {
     /* Rust asks once without a path whether the call exists, which its declaration does not allow. */
     const char *volatile given = path;
-    if (given && *given && judge("stat", path, NULL) == FAIL) {
+    if (given && (*given ? judge_at("stat", folder, path) : judge_file("fstat", folder)) == FAIL) {
         return -1;
     }
     return REAL(statx)(folder, path, flags, mask, found);
 }
+
+int stat64(const char *path, struct stat64 *found) {
+    return judge("stat", path, NULL) == FAIL ? -1 : REAL(stat64)(path, found);
+}
+
+int lstat64(const char *path, struct stat64 *found) {
+    return judge("stat", path, NULL) == FAIL ? -1 : REAL(lstat64)(path, found);
+}
+
+int fstat64(int fd, struct stat64 *found) {
+    return judge_file("fstat", fd) == FAIL ? -1 : REAL(fstat64)(fd, found);
+}
+
+int unlinkat(int folder, const char *path, int flags) {
+    const char *call = flags & AT_REMOVEDIR ? "rmdir" : "unlink";
+    return judge_at(call, folder, path) == FAIL ? -1 : REAL(unlinkat)(folder, path, flags);
+}
+
+int rmdir(const char *path) { return judge("rmdir", path, NULL) == FAIL ? -1 : REAL(rmdir)(path); }
+
+int chmod(const char *path, mode_t mode) { return judge("chmod", path, NULL) == FAIL ? -1 : REAL(chmod)(path, mode); }
+
+int flock(int fd, int operation) { return judge_file("flock", fd) == FAIL ? -1 : REAL(flock)(fd, operation); }
 
 ssize_t read(int fd, void *bytes, size_t count) {
     return judge_file("read", fd) == FAIL ? -1 : REAL(read)(fd, bytes, count);

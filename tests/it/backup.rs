@@ -93,7 +93,11 @@ fn verdicts_survive_a_restore() {
     // A project is never overwritten.
     let args = ["restore", file.to_str().expect("UTF-8"), "q"];
     let refused = mocban(dir.path(), &args).expect(2);
-    assert!(refused.err.contains("q is a project already"), "{}", refused.err);
+    assert!(
+        refused.err.contains("q is a project already"),
+        "{}",
+        refused.err
+    );
 }
 
 #[test]
@@ -151,7 +155,10 @@ fn restore_refuses_other_files_and_keeps_other_settings() {
     // A restore that was killed before the catalog was renamed is completed.
     std::fs::copy(project.settings_path(), dir.path().join("mine/mocban.toml")).expect("copied");
     mocban(dir.path(), &["restore", "b", "mine"]).expect(0);
-    assert_eq!(files(&dir.path().join("mine")), ["catalog.sqlite", "mocban.toml"]);
+    assert_eq!(
+        files(&dir.path().join("mine")),
+        ["catalog.sqlite", "mocban.toml"]
+    );
 }
 
 #[test]

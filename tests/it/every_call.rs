@@ -1,7 +1,8 @@
 //! Commands that write outputs, while one system call after another fails with EIO and with ENOSPC. With a small
 //! `MOCBAN_FAULT_MOMENTS` only some of the calls fail; with a large one, each of them.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::backup::files as names;
@@ -47,11 +48,11 @@ fn judge(root: &Path, verdict: &str) {
 }
 
 /// Returns the bytes of a file or of all files below a folder.
-fn content(path: &Path) -> std::collections::BTreeMap<std::path::PathBuf, Vec<u8>> {
+fn content(path: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     if path.is_dir() {
         return files(path);
     }
-    [(Default::default(), std::fs::read(path).expect("a file"))].into()
+    [(PathBuf::new(), std::fs::read(path).expect("a file"))].into()
 }
 
 /// Asserts that the output is the earlier one or the new one, and that the next command writes the new one and leaves
@@ -95,7 +96,10 @@ fn contact_sheet(root: &Path) -> Command {
 
 fn restore(root: &Path) -> Command {
     let mut command = binary();
-    command.arg("restore").arg(root.join("b")).arg(root.join("q"));
+    command
+        .arg("restore")
+        .arg(root.join("b"))
+        .arg(root.join("q"));
     command
 }
 
@@ -181,7 +185,10 @@ const RESTORE: FaultScenario = FaultScenario {
         let left = names(&root.join("q"));
         if done {
             // The next command for the same output removes other files, but a restore is refused here.
-            assert!(left.iter().all(|name| name.starts_with('.') || expected.contains(&&**name)));
+            assert!(
+                left.iter()
+                    .all(|name| name.starts_with('.') || expected.contains(&&**name))
+            );
         } else {
             assert_eq!(left, expected);
         }

@@ -101,7 +101,10 @@ const OF_AN_EXPORT: &[(Fault, End)] = &[
 /// Faults of a backup.
 const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("open", ".b.*", ENOSPC), End::Either),
-    (Fault::once("write", ".b.*catalog.sqlite", ENOSPC), End::Fails),
+    (
+        Fault::once("write", ".b.*catalog.sqlite", ENOSPC),
+        End::Fails,
+    ),
     (Fault::once("write", "*", EIO).and_later(), End::Fails),
     (Fault::half(".b.*catalog.sqlite"), End::Succeeds),
     (Fault::once("sync", ".b.*", EIO), End::Fails),

@@ -182,7 +182,9 @@ fn what_a_killed_export_left_is_removed_by_the_next() {
     let export = ["export", "-o", "../out"];
     at(&project, &export).expect(0);
     let (before, expected) = (files(&dir.path().join("out")), names(dir.path()));
-    let mut child = command(&project, &export).spawn().expect("the binary starts");
+    let mut child = command(&project, &export)
+        .spawn()
+        .expect("the binary starts");
     let staging = format!(".out.{}-0.mocban-partial", child.id());
     let lock = dir.path().join(&staging).join("lock");
     while !lock.exists() {
@@ -208,11 +210,18 @@ fn an_export_replaces_no_foreign_folder_with_a_file_of_the_same_name() {
     let refused = at(&project, &["export", "-o", "../mine"]).expect(1);
     let wanted = "mine/verdicts.jsonl is not part of an export";
     assert!(refused.err.contains(wanted), "{}", refused.err);
-    assert_eq!(std::fs::read(mine.join("verdicts.jsonl")).expect("read"), b"guilty\n");
+    assert_eq!(
+        std::fs::read(mine.join("verdicts.jsonl")).expect("read"),
+        b"guilty\n"
+    );
     at(&project, &["export", "-o", "../out"]).expect(0);
     std::fs::write(dir.path().join("out/pairs/notes.txt"), "mine").expect("written");
     let refused = at(&project, &["export", "-o", "../out"]).expect(1);
-    assert!(refused.err.contains("out/pairs/notes.txt is not part"), "{}", refused.err);
+    assert!(
+        refused.err.contains("out/pairs/notes.txt is not part"),
+        "{}",
+        refused.err
+    );
 }
 
 #[test]

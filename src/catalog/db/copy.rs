@@ -83,7 +83,10 @@ async fn vacuum_into(conn: &mut SqliteConnection, file: &Path) -> Result<sqlx::R
 async fn open_copy(file: &Path) -> sqlx::Result<SqliteConnection> {
     let options = SqliteConnectOptions::new().filename(file);
     let options = options.create_if_missing(false);
-    options.journal_mode(SqliteJournalMode::Memory).connect().await
+    options
+        .journal_mode(SqliteJournalMode::Memory)
+        .connect()
+        .await
 }
 
 /// Replaces the settings in a backup. A catalog that was copied from a backup by hand may hold earlier settings.
@@ -107,7 +110,9 @@ async fn store_settings(file: &Path, settings: Option<&[u8]>) -> sqlx::Result<()
 /// Removes the settings from a copy of a backup and returns them.
 async fn take_settings(file: &Path) -> sqlx::Result<Option<Vec<u8>>> {
     let mut copy = open_copy(file).await?;
-    let tables: i64 = sqlx::query_scalar(HAS_SETTINGS).fetch_one(&mut copy).await?;
+    let tables: i64 = sqlx::query_scalar(HAS_SETTINGS)
+        .fetch_one(&mut copy)
+        .await?;
     let mut settings = None;
     if tables > 0 {
         settings = sqlx::query_scalar("SELECT text FROM backup_settings LIMIT 1")
@@ -132,7 +137,9 @@ async fn verify(file: &Path) -> Result<()> {
         error => error,
     };
     let found = identity(&mut copy).await.map_err(in_copy)?;
-    let faults = integrity::integrity(&mut copy, true).await.map_err(in_copy)?;
+    let faults = integrity::integrity(&mut copy, true)
+        .await
+        .map_err(in_copy)?;
     copy.close().await.map_err(unreadable)?;
     if found == Identity::Current && faults.is_empty() {
         Ok(())
