@@ -128,6 +128,10 @@ async fn rows_and_files(
         summary.add(Finding::new(Kind::Reference, line));
     }
     counters(catalog, options, summary).await?;
+    // These logs are read only to find rows that cannot be read.
+    catalog.verdict_log(None).await?;
+    catalog.manual_alignments().await?;
+    catalog.attention_check_answers().await?;
     let mut named = ReferencedArtifacts::default();
     let mut after = None;
     loop {

@@ -1,13 +1,13 @@
 //! Checks one pair: its rows against each other and against its files.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use super::finding::{Finding, Kind};
 use crate::catalog::{AuditedPair, AuditedResult, InputVersion};
 use crate::domain::{
     ArtifactSet, ContentHash, JobStatus, PairId, RegisterOutcome, Stage, ThresholdMetric,
 };
-use crate::runner::result_hash;
+use crate::runner::{metric_results, result_hash};
 use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 
 /// Result of the check of one pair.
@@ -105,8 +105,10 @@ fn state(pair: &AuditedPair) -> Vec<Finding> {
         }
     }
     let last = pair.results.get(&Stage::Register);
+    // Without the depth row, the hashes are unknown, and the metrics are computed again anyway.
     if let (JobStatus::Done, Some(last)) = (status, last)
-        && metrics_of(last).is_none_or(|metrics| metrics != pair.metrics)
+        && pair.results.contains_key(&Stage::Depth)
+        && metrics_of(pair, last).is_none_or(|metrics| metrics != pair.metrics)
     {
         add(
             Kind::Metrics,
@@ -132,9 +134,22 @@ fn has_its_hash(result: &AuditedResult) -> bool {
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
 }
 
-fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
-    let outcome: RegisterOutcome = serde_json::from_str(&result.outcome).ok()?;
-    Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
+/// Returns the hash of each metric's result, computed from the results of the stages.
+fn metrics_of(
+    pair: &AuditedPair,
+    register: &AuditedResult,
+) -> Option<BTreeMap<ThresholdMetric, ContentHash>> {
+    let outcome: RegisterOutcome = serde_json::from_str(&register.outcome).ok()?;
+    let files = serde_json::from_str(&register.files).ok()?;
+    let depth = pair.results.get(&Stage::Depth);
+    let depth: Option<ArtifactSet> =
+        depth.and_then(|depth| serde_json::from_str(&depth.files).ok());
+    let results = metric_results(&outcome.metrics, &files, depth.as_ref()).into_iter();
+    Some(
+        results
+            .map(|result| (result.outcome.metric, result.result_hash))
+            .collect(),
+    )
 }
 
 /// Lists input files that are missing, unreadable or changed since they were read. They are not damage, because a run
@@ -165,11 +180,11 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::{BTreeMap, BTreeSet};
+    use std::collections::BTreeMap;
 
     use super::{Kind, result_hash, state};
     use crate::catalog::{AuditedPair, AuditedResult, KnownInputs};
-    use crate::domain::{ArtifactSet, JobStatus, PairId, Stage};
+    use crate::domain::{ArtifactSet, ContentHash, JobStatus, PairId, Stage};
 
     fn pair(status: JobStatus, cursor: i64) -> AuditedPair {
         let outcome = r#"{"ink":0,"metrics":[]}"#.to_owned();
@@ -190,7 +205,7 @@ mod tests {
             job: Some((status, cursor)),
             has_failure: false,
             results: Stage::ALL.map(|stage| (stage, result.clone())).into(),
-            metrics: BTreeSet::new(),
+            metrics: BTreeMap::new(),
         }
     }
 
@@ -233,8 +248,10 @@ mod tests {
         failed.has_failure = true;
         assert_eq!(found(&failed), []);
         let mut done = pair(JobStatus::Done, 4);
-        done.metrics
-            .insert(crate::domain::ThresholdMetric::Ensemble);
+        done.metrics.insert(
+            crate::domain::ThresholdMetric::Ensemble,
+            ContentHash::of(b""),
+        );
         assert_eq!(found(&done), [(Kind::Metrics, Stage::Register)]);
     }
 }

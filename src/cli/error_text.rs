@@ -42,6 +42,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     match cause.downcast_ref()? {
         CatalogError::Missing(_) => Some(ExitCode::NoProject),
         CatalogError::NetworkFileSystem { .. } => Some(ExitCode::Usage),
+        CatalogError::Corrupt(_) | CatalogError::Json(_) => Some(ExitCode::Damaged),
         CatalogError::UnknownPair(_)
         | CatalogError::NoResult(_)
         | CatalogError::NoMetricResult(..)

@@ -34,5 +34,5 @@ pub use events::{RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
 pub use options::RunOptions;
 pub use run::{fingerprints, plan, run};
-pub use stage_output::result_hash;
+pub use stage_output::{metric_results, result_hash};
 pub use stop::{Stop, StopLevel};

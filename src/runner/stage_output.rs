@@ -105,7 +105,7 @@ pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
 }
 
 /// Adds a hash to each metric. It covers the numbers and images that a reviewer sees, and verdicts refer to it.
-pub(super) fn metric_results(
+pub fn metric_results(
     metrics: &[MetricOutcome],
     files: &ArtifactSet,
     depth: Option<&ArtifactSet>,

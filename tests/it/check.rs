@@ -197,6 +197,10 @@ fn rows_and_counters_that_disagree_are_found_and_repaired() {
             "metrics",
             "DELETE FROM metric_result WHERE pair = 2 AND metric = 'ensemble'",
         ),
+        (
+            "metrics",
+            "UPDATE metric_result SET result_hash = zeroblob(32) WHERE pair = 1 AND metric = 'relief'",
+        ),
         ("schema", "DROP TRIGGER verdict_no_delete"),
         ("schema", "DROP INDEX job_ready"),
         // A pair without a job, and one that failed without a reason.
@@ -272,6 +276,38 @@ fn damaged_database_is_not_written_to() {
     assert_eq!(kinds(&found), wanted.into());
     let after = std::fs::read(project.catalog_path()).expect("read");
     assert!(after == before, "the repair wrote to it");
+}
+
+#[test]
+fn rows_that_cannot_be_read_are_damage_for_every_command() {
+    let cases = [
+        "UPDATE pair SET character = CAST(x'ff' AS TEXT) WHERE id = 2",
+        "UPDATE pair SET meta = json_array(1) WHERE id = 2",
+        "DROP TRIGGER verdict_no_update; UPDATE verdict SET note = CAST(x'ff' AS TEXT)",
+    ];
+    for statements in cases {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = done(dir.path());
+        sql(&project, statements);
+        let found = at(&project, &["check"]).expect(12);
+        assert!(found.out.contains("column"), "{statements}: {}", found.out);
+        let unread = at(&project, &["export", "-o", "export"]).expect(12);
+        assert!(unread.err.contains("`check`"), "{}", unread.err);
+        if statements.contains("id = 2") {
+            for text in [&found.out, &unread.err] {
+                assert!(text.contains("row 2 of the pairs"), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn damaged_schema_is_damage_not_an_error() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let rename = "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'json_valid', 'json_vanid')";
+    sql(&project, rename);
+    at(&project, &["check"]).expect(12);
 }
 
 #[test]

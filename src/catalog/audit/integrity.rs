@@ -11,6 +11,7 @@ use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
+use crate::catalog::records::model::PairAttributes;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::records::stage_results;
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -54,8 +55,8 @@ pub struct AuditedPair {
     pub has_failure: bool,
     /// Every stored result, also of stages that are to run again.
     pub results: BTreeMap<Stage, AuditedResult>,
-    /// Metrics with a row.
-    pub metrics: BTreeSet<ThresholdMetric>,
+    /// Hash of each metric with a row.
+    pub metrics: BTreeMap<ThresholdMetric, ContentHash>,
 }
 
 /// A stored result, left unparsed so that a check can also read invalid values.
@@ -96,6 +97,7 @@ const UNMARKED: &str = concat!(
 
 pub(crate) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
+    p.unit, p.scanned_face_down, p.character, p.block, p.meta,
     j.stage, j.status, f.pair IS NOT NULL AS has_failure
 FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
 WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
@@ -199,15 +201,15 @@ impl Catalog {
         let mut conn = self.snapshot().await?;
         let query = sqlx::query(PAGE).bind(after.map_or(0, |pair| pair.0));
         let found = query.bind(limit as i64).fetch_all(&mut *conn).await?;
-        let mut pairs = found.iter().map(pair).collect::<Result<Vec<_>>>()?;
+        let mut pairs = found
+            .iter()
+            .map(readable_pair)
+            .collect::<Result<Vec<_>>>()?;
         let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
         let mut results = stored(&mut conn, &ids).await?;
-        let mut metrics: BTreeMap<i64, BTreeSet<_>> = BTreeMap::new();
-        for (id, metric) in stage_results::metric_hashes(&mut conn, &ids)
-            .await?
-            .into_keys()
-        {
-            metrics.entry(id).or_default().insert(metric);
+        let mut metrics: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+        for ((id, metric), hash) in stage_results::metric_hashes(&mut conn, &ids).await? {
+            metrics.entry(id).or_default().insert(metric, hash);
         }
         for pair in &mut pairs {
             let id = pair.inputs.pair.0;
@@ -274,7 +276,15 @@ pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
     objects(&mut conn).await
 }
 
+/// Reads a pair; an error names its row.
+fn readable_pair(row: &SqliteRow) -> Result<AuditedPair> {
+    let id: i64 = row.try_get("id")?;
+    pair(row).map_err(|error| error.in_pair(id))
+}
+
 fn pair(row: &SqliteRow) -> Result<AuditedPair> {
+    // Every column must be readable, also those that are not checked otherwise.
+    PairAttributes::from_row(row)?;
     let status: Option<JobStatus> = row.try_get("status")?;
     Ok(AuditedPair {
         name: row.try_get("name")?,
@@ -282,7 +292,7 @@ fn pair(row: &SqliteRow) -> Result<AuditedPair> {
         job: status.zip(row.try_get("stage")?),
         has_failure: row.try_get("has_failure")?,
         results: BTreeMap::new(),
-        metrics: BTreeSet::new(),
+        metrics: BTreeMap::new(),
     })
 }
 

@@ -148,8 +148,21 @@ pub enum CatalogError {
 impl From<sqlx::Error> for CatalogError {
     fn from(error: sqlx::Error) -> Self {
         match error {
-            sqlx::Error::ColumnDecode { source, .. } => Self::Corrupt(source.to_string()),
+            sqlx::Error::ColumnDecode { index, source } => {
+                Self::Corrupt(format!("column {index}: {source}"))
+            }
             error => Self::Database(error),
+        }
+    }
+}
+
+impl CatalogError {
+    /// Names the pair whose row holds an invalid value.
+    pub(crate) fn in_pair(self, pair: i64) -> Self {
+        match self {
+            Self::Corrupt(what) => Self::Corrupt(format!("row {pair} of the pairs: {what}")),
+            Self::Json(what) => Self::Corrupt(format!("row {pair} of the pairs: {what}")),
+            error => error,
         }
     }
 }

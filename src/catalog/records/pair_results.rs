@@ -135,7 +135,7 @@ async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Ve
     let mut stages = stage_results::of_pairs(conn, &ids).await?;
     let hashes = stage_results::metric_hashes(conn, &ids).await?;
     let verdicts = verdicts::of_pairs(conn, &ids).await?;
-    let pairs = found.iter().zip(ids).map(|(row, id)| {
+    let mut assemble_pair = |row: &SqliteRow, id: i64| {
         let cursor: Cursor = row.try_get("stage")?;
         let mut records = stages.remove(&id).unwrap_or_default();
         records.retain(|record| (record.stage.index() as Cursor) < cursor);
@@ -149,7 +149,10 @@ async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Ve
             stages: records,
             truth: truth.map(|Json(body)| body),
         })
-    });
+    };
+    let pairs = found.iter().zip(ids);
+    let pairs = pairs
+        .map(|(row, id)| assemble_pair(row, id).map_err(|error: CatalogError| error.in_pair(id)));
     pairs.collect()
 }
 
