@@ -1,5 +1,5 @@
 //! Commands that write the same output at the same time, or were killed while they wrote it. The output is always that
-//! of one command, whole, and nothing else is left. `MOCBAN_RACES` sets the number of races of each kind.
+//! of one command, whole, and nothing else is left. `MOCBAN_TRIALS` sets the number of races of each kind.
 
 use std::fs::File;
 use std::path::Path;
@@ -11,15 +11,11 @@ use crate::backup::files as names;
 use crate::check::{at, done};
 use crate::cli::{binary, mocban};
 use crate::resume::copy;
-use crate::test_size::size_from_env;
+use crate::test_size::trials;
 use crate::uninterrupted::files;
 
 /// Calls of one command that start at the same time.
 const AT_ONCE: usize = 3;
-
-fn races() -> usize {
-    size_from_env("MOCBAN_RACES", 3)
-}
 
 /// Returns the binary for a project, with arguments, ready to be started.
 fn command(project: &Project, args: &[&str]) -> Command {
@@ -72,7 +68,7 @@ fn exports_of_two_projects_to_one_folder_leave_one_whole_export() {
     assert!(whole[0] != whole[1]);
     let mut expected = [&names(dir.path())[..], &["out".to_owned()]].concat();
     expected.sort();
-    for _ in 0..races() {
+    for _ in 0..trials(3) {
         let out = ["export", "-o", "../out"];
         let mut commands: Vec<_> = (0..AT_ONCE)
             .map(|index| command(&projects[index % 2], &out))
@@ -88,7 +84,7 @@ fn backups_to_one_name_leave_one_whole_backup() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let projects = two_projects(dir.path());
     let expected = [&["b".to_owned()][..], &names(dir.path())].concat();
-    for round in 0..races() {
+    for round in 0..trials(3) {
         let mut commands: Vec<_> = (0..AT_ONCE)
             .map(|index| command(&projects[index % 2], &["backup", "../b"]))
             .collect();
@@ -116,7 +112,7 @@ fn reports_and_sheets_to_one_file_all_succeed_and_leave_one_whole_file() {
         std::fs::read(&result).expect("read")
     });
     let expected = names(dir.path());
-    for _ in 0..races() {
+    for _ in 0..trials(3) {
         let mut commands = calls.map(|args| command(&project, args));
         assert_eq!(race(&mut commands), calls.len());
         assert!(whole.contains(&std::fs::read(&result).expect("read")));
@@ -131,7 +127,7 @@ fn demos_in_one_directory_leave_one_whole_project() {
     mocban(dir.path(), &demo).expect(0);
     let project = Project::open(&dir.path().join("d")).expect("a project");
     let whole = files(&project.dir().join("data"));
-    for round in 0..races() {
+    for round in 0..trials(3) {
         let name = format!("d{round}");
         let mut commands: Vec<_> = (0..AT_ONCE)
             .map(|_| {
