@@ -59,8 +59,8 @@ impl Tree {
 
     /// Returns the changes that a layer's table makes, one per key.
     ///
-    /// A table below the top level is a section if the defaults have a section with all of its keys. Otherwise it is
-    /// one value, such as an enum variant with data (`{ fixed = 127 }`).
+    /// A table below the top level changes one setting per key if the defaults contain all of its keys. Otherwise the
+    /// whole table is one value, such as an enum variant with data (`{ fixed = 127 }`).
     ///
     /// # Errors
     /// Returns an error if the layer names a section or key that does not exist, or sets a top-level section to a
@@ -190,8 +190,8 @@ fn collect(
     Ok(())
 }
 
-/// Returns whether a table of a layer is a section. A top-level table always is, so that a mistyped key is reported by
-/// name. Any other table is a section only if all of its keys are known.
+/// Returns whether a table of a layer is a section. A top-level table is always a section, so that a mistyped key is
+/// reported by name. Any other table is a section only if all of its keys are known.
 fn is_section(prefix: &str, section: &Table, layer: &Table) -> bool {
     prefix.is_empty() || layer.keys().all(|key| section.contains_key(key))
 }

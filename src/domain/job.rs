@@ -36,7 +36,7 @@ impl JobStatus {
     }
 }
 
-/// Number of workers that may die over a pair before it is quarantined, if no other workers die.
+/// Smallest number of deaths of workers that leased only one pair after which this pair may be quarantined.
 pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair must be quarantined because it probably kills its workers.

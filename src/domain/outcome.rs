@@ -35,8 +35,8 @@ pub struct SideEvidence {
     /// are no faces, and under the paper's method.
     pub winding: Option<f64>,
     /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
-    /// stores `|a - b| / (a + b)` instead. `a` and `b` are the mean distances of either side's points to their
-    /// centroid.
+    /// stores `|a - b| / (a + b)` instead: the points on one side have the mean distance `a` from their centroid, those
+    /// on the other side `b`.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,

@@ -44,7 +44,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc, if whole blocks were resampled. `None` if no pair names its block, or all results passed or all failed.
+    /// Of Acc. `None` unless whole blocks were resampled, and `None` if all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 

@@ -72,8 +72,8 @@ pub struct ScoreComparison {
     pub conclusion: String,
 }
 
-/// Sets `p_holm` and `conclusion` of every comparison. Holm's correction covers the comparisons by the same score,
-/// which must be adjacent.
+/// Sets `p_holm` and `conclusion` of every comparison. Holm's correction is applied to each score separately.
+/// Comparisons of the same score must be adjacent.
 pub(super) fn conclude(comparisons: &mut [ScoreComparison], unit: ResamplingUnit) {
     for family in comparisons.chunk_by_mut(|a, b| a.score == b.score) {
         let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();

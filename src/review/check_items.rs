@@ -21,7 +21,7 @@ const MAX_SYMMETRY_IOU: f64 = 0.6;
 const REDUCED_STROKES: f64 = 0.45;
 /// Target stroke area of a fault that includes background, as a multiple of the result's stroke area.
 const ENLARGED_STROKES: f64 = 1.9;
-/// Smallest distance of a duplicate from its result, in items. Near the end of the queue, half of it suffices.
+/// Smallest distance of a duplicate from its result, in items. Near the end of the queue, it is halved.
 const DUPLICATE_GAP: f64 = 10.0;
 /// Largest random distance that is added to `DUPLICATE_GAP`.
 const DUPLICATE_SPREAD: f64 = 30.0;

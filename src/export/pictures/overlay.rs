@@ -31,7 +31,7 @@ impl PrintView {
         Self::new(scale, width, height)
     }
 
-    /// Returns a view enlarged by an integer. The factor is the smallest for a longest side of at least `OVERLAY_SIDE`.
+    /// Returns a view enlarged by the smallest integer factor that makes its longest side at least `OVERLAY_SIDE`.
     pub fn enlarged(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));

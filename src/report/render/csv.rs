@@ -26,7 +26,7 @@ pub(super) fn render(report: &Report) -> String {
     text
 }
 
-/// Returns a row as JSON. Adds the values that other parts of the report hold on the same metric.
+/// Returns a row as JSON. Adds values of the row's metric from other parts of the report.
 fn document(report: &Report, row: &MetricRow) -> Value {
     let mut value = serde_json::to_value(row).expect("a row is JSON");
     let truth_ci95 = row.truth.as_ref().and_then(|truth| truth.acc_ci95);

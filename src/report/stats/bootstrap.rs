@@ -115,9 +115,9 @@ pub fn percentile_interval_95(means: &mut [f64]) -> Option<[f64; 2]> {
 /// Returns the two-sided p-value, in 0..=1, of the hypothesis that the true difference is 0. Returns `None` if
 /// `differences` is empty.
 ///
-/// The p-value is twice the share of resampled differences on the rarer side of 0. One is added to the number on that
-/// side and to the number of all differences, so the p-value is never 0. Source: Davison and Hinkley 1997, section
-/// 4.4, doi:10.1017/CBO9780511802843.
+/// The p-value is `2 (m + 1) / (n + 1)`, at most 1, for `n` differences. `m` is the number of differences that are at
+/// most 0, or the number that are at least 0, whichever is smaller. Source: Davison and Hinkley 1997, section 4.4,
+/// doi:10.1017/CBO9780511802843.
 ///
 /// ```
 /// use mocban::report::stats::bootstrap_p;

@@ -67,7 +67,7 @@ pub fn wilson_95(count: u64, n: u64) -> Option<[f64; 2]> {
 
 /// Returns the exact 95 % interval of `count / n`, with both bounds in 0..=1, or `None` if `n` is 0.
 ///
-/// If the true proportion is one of the bounds, a count at least as extreme as `count` has a probability of 2.5 %.
+/// At the lower bound, `count` or more successes have a probability of 2.5 %. At the upper bound, `count` or fewer do.
 /// Source: Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404.
 ///
 /// ```
