@@ -52,7 +52,7 @@ pub struct RunSettings {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReviewSettings {
-    /// The key of each action, named by its position on the keyboard (`KeyboardEvent.code`).
+    /// The key for each action. Keys are named by position on the keyboard (`KeyboardEvent.code`).
     pub keys: BTreeMap<String, String>,
 }
 

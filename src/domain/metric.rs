@@ -29,10 +29,10 @@ pub enum ThresholdMetric {
     /// threshold nearest to [`Self::Relief`]'s is used. The score is the mean. The paper's method instead uses the
     /// better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
     Ensemble,
-    /// The depth at which the stroke tops end and the walls begin, from the histogram of heights alone. It is the
-    /// geometric mean of the usual depth (0.075 of the relief) and a measured depth (clamped to 0.02..=0.25 of the
-    /// relief). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w + peak) /
-    /// 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's method.
+    /// The depth at which the stroke tops end and the walls begin, as a share of the relief, from the histogram of
+    /// heights alone. It is the geometric mean of 0.075 (the usual depth) and a measured depth (clamped to
+    /// 0.02..=0.25). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w + peak)
+    /// / 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's method.
     Relief,
 }
 

@@ -219,9 +219,8 @@ pub struct PoseFeatures {
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, divided by the score of the best pose.
     pub mirrored: f64,
-    /// Sensitivity of the pose to its start. The pose is refined from three slightly different sizes. This is the
-    /// largest distance between the best of the three results and another one, as a share of the depth map's longest
-    /// side.
+    /// Sensitivity of the pose to its start: the largest distance between the best of three results and another one, as
+    /// a share of the depth map's longest side. The results are refined from starts with slightly different sizes.
     #[serde(default)]
     pub spread: f64,
 }

@@ -143,7 +143,8 @@ impl<'a> PairFiles<'a> {
         ]
     }
 
-    /// Writes the files of one metric. Returns the paths for the metric's line, including files that all metrics share.
+    /// Writes the files of one metric. Returns the paths for the metric's line, including the paths of files shared by
+    /// all metrics.
     pub(super) fn write_metric(
         &self,
         root: &Path,

@@ -156,8 +156,8 @@ impl<'a> PairArtifacts<'a> {
         Ok(grey.map(|value| *value == INK))
     }
 
-    /// Returns the map from depth-map pixels to print pixels that `print_from_mesh` gives on the fitted plane. Returns
-    /// `None` if `depth_from_plane` is singular.
+    /// Returns the map from depth-map pixels to print pixels for points on the fitted plane, which `print_from_mesh`
+    /// maps to the print. Returns `None` if `depth_from_plane` is singular.
     ///
     /// # Errors
     /// Returns an error if the result of the fit or depth stage cannot be read.
@@ -181,7 +181,7 @@ impl<'a> PairArtifacts<'a> {
         }))
     }
 
-    /// Returns the map from mesh to print that follows from a metric's `print_from_depth`, the fit and the depth scale.
+    /// Computes the map from mesh to print from a metric's `print_from_depth`, the fit and the depth scale.
     ///
     /// # Errors
     /// Returns an error if the result of the fit or depth stage cannot be read.

@@ -5,8 +5,8 @@ use super::number_format::format_count;
 
 /// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
 ///
-/// Every row that has an Acc must reach `least` (0..=1). If nobody passed or failed a result, there is no Acc, and the
-/// report misses it. Ground truth does not replace verdicts here.
+/// Every row with an Acc must reach `least` (0..=1). If nobody has passed or failed a result, no row has an Acc, which
+/// is reported as a reason. Only verdicts count, not ground truth.
 pub fn below(report: &Report, least: f64) -> Vec<String> {
     let rows = report.rows.iter();
     let judged: Vec<_> = rows

@@ -129,7 +129,7 @@ async fn asset(Path(name): Path<String>) -> Response {
     }
 }
 
-/// Returns what the script needs to start, such as the CSRF token, the key bindings and the messages.
+/// Returns the values that the script needs at the start, such as the CSRF token, the key bindings and the messages.
 async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
     let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
