@@ -1,7 +1,7 @@
 //! Images of an item as PNG, rendered once and cached. Attention checks are rendered like results.
 //!
-//! The page never shows a print larger than [`IMAGE_SIDE`] pixels, also when it zooms in. So only the rendered images are
-//! cached. Prints are decoded one at a time, and dropped once their image is rendered.
+//! The page never shows a print larger than [`IMAGE_SIDE`] pixels, even when it zooms in. Therefore only the rendered
+//! images are cached. Prints are decoded one at a time, and dropped once their image is rendered.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -266,7 +266,7 @@ impl ImageCache {
         images
     }
 
-    /// Reads what a manual alignment of an item needs.
+    /// Reads the data for a manual alignment of an item.
     ///
     /// # Errors
     /// Returns an error if files of the pair cannot be read, or if the pair has a new result.

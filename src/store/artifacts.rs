@@ -197,7 +197,7 @@ impl Project {
     /// Checks that the project's directory was not renamed or removed since it was opened.
     ///
     /// # Errors
-    /// Returns an error if it was, or if the disk fails.
+    /// Returns an error if the directory was renamed or removed, or if the disk fails.
     pub fn check_in_place(&self) -> Result<(), ArtifactError> {
         if self.is_in_place().map_err(ArtifactError::io(self.dir()))? {
             Ok(())

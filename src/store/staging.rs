@@ -17,7 +17,8 @@ use super::parent_folder::parent_folder;
 const SUFFIX: &str = ".mocban-partial";
 /// The locked file in a staging folder.
 const LOCK: &str = "lock";
-/// Longest part of an output's name in hidden names, in bytes. File systems allow 255 bytes for a whole name.
+/// Maximum number of bytes of an output's name that a hidden name contains. File systems allow 255 bytes for a whole
+/// name.
 const MAX_STEM: usize = 180;
 /// Number of attempts to create a folder with a new name.
 const ATTEMPTS: u32 = 1_000;
