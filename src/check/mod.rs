@@ -82,12 +82,9 @@ pub async fn check(
 }
 
 fn is_damage(error: &CatalogError) -> bool {
+    use CatalogErrorKind::{Damaged, NotADatabase, Statement};
     let is_invalid_row = matches!(error, CatalogError::Corrupt(_) | CatalogError::Json(_));
-    is_invalid_row
-        || matches!(
-            error.kind(),
-            Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase)
-        )
+    is_invalid_row || matches!(error.kind(), Some(Damaged | NotADatabase | Statement))
 }
 
 /// Checks the database file; returns whether it may be written to.

@@ -165,7 +165,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         Some(CatalogErrorKind::Contradiction) => format!(
             "{path} contains rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
         ),
-        None => match error {
+        Some(CatalogErrorKind::Statement) | None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
                 format!("{path} contains an invalid value: {error}; `check` gives details")
             }

@@ -119,9 +119,11 @@ impl Catalog {
                 Err(CatalogError::Unread(self.path.to_path_buf()))
             }
             Err(error) => match error.kind() {
-                Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
-                    Ok(vec![error.to_string()])
-                }
+                Some(
+                    CatalogErrorKind::Damaged
+                    | CatalogErrorKind::NotADatabase
+                    | CatalogErrorKind::Statement,
+                ) => Ok(vec![error.to_string()]),
                 _ => Err(error),
             },
             lines => lines,

@@ -21,18 +21,21 @@ pub enum CatalogErrorKind {
     Disk,
     /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
+    /// A statement failed. A check takes this for damage, because its statements never change: the schema or a stored
+    /// JSON text is damaged.
+    Statement,
 }
 
 impl CatalogErrorKind {
     /// Returns the kind of a SQLite result code, if it has one. An extended code has the kind of its primary code.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
-            // SQLITE_ERROR: the statements are constants, so the schema that they refer to is damaged.
-            1 | 11 => Some(Self::Damaged),
+            1 => Some(Self::Statement),
             // SQLITE_PROTOCOL: a reader lost the race for the log's locks too often.
             5 | 6 | 15 => Some(Self::Busy),
             8 => Some(Self::ReadOnly),
             10 => Some(Self::Disk),
+            11 => Some(Self::Damaged),
             13 => Some(Self::Full),
             14 => Some(Self::CannotOpen),
             19 => Some(Self::Contradiction),
@@ -82,7 +85,7 @@ mod tests {
         );
         assert_eq!(
             CatalogErrorKind::of_code(1),
-            Some(CatalogErrorKind::Damaged)
+            Some(CatalogErrorKind::Statement)
         );
         assert_eq!(CatalogErrorKind::of_code(2), None);
     }

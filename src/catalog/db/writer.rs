@@ -92,8 +92,9 @@ async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
 
 /// Returns whether an error concerns the file rather than a request.
 fn is_of_the_file(error: &CatalogError) -> bool {
+    use CatalogErrorKind::{Contradiction, Statement};
     let kind = error.kind();
-    kind.is_some_and(|kind| kind != CatalogErrorKind::Contradiction)
+    kind.is_some_and(|kind| !matches!(kind, Contradiction | Statement))
 }
 
 async fn apply(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<BatchReply> {
