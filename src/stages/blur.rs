@@ -1,4 +1,4 @@
-//! Gaussian blur by three box filters (Wells 1986, doi:10.1109/TPAMI.1986.4767776), zero beyond the border.
+//! Gaussian blur by three box filters (Wells 1986, doi:10.1109/TPAMI.1986.4767776).
 
 use crate::raster::Grid;
 use crate::simd::dispatch;
@@ -8,7 +8,7 @@ const MIN_SIGMA: f64 = 0.5;
 
 /// Blurs values with a Gaussian of `sigma` pixels. Returns the values unchanged if `sigma` is below half a pixel.
 ///
-/// Values beyond the border count as zero. Where that matters, divide by the blurred weight.
+/// Values beyond the border count as zero. To correct for this, divide by the blurred mask of the valid pixels.
 pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < MIN_SIGMA {
         return values.clone();

@@ -70,8 +70,8 @@ impl ConnectedComponents {
             .map(|label| *label != u32::MAX && wanted(*label as usize))
     }
 
-    /// Returns the pixels of components near `other` or the border. From a pixel of such a component, a step of
-    /// `distance` pixels along an axis ends in `other` or outside the grid.
+    /// Returns the pixels of all components near `other` or the border. A component is near if a step of `distance`
+    /// pixels along an axis leads from one of its pixels into `other` or out of the grid.
     pub(super) fn touching(&self, other: &Mask, distance: i64) -> Mask {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {

@@ -1,4 +1,4 @@
-//! The depth stage (paper III-B): renders the mesh along the plane's normal. Each pixel gets the nearest surface.
+//! The depth stage (paper III-B): renders the mesh along the plane's normal. Each pixel gets the highest surface.
 
 use serde::{Deserialize, Serialize};
 
@@ -73,7 +73,7 @@ impl DepthError {
 /// in the height of the highest hit, see [`DepthScale`]. `unit` is the unit of the mesh, if known.
 ///
 /// # Errors
-/// Returns an error if the resolution needs an unknown unit or too many pixels, or if no ray meets the mesh.
+/// Returns an error if pixels per millimetre are set but `unit` is `None`, the map is too large, or no ray hits.
 pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,

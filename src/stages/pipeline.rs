@@ -56,7 +56,7 @@ impl Settings {
     }
 }
 
-/// Finds the character plane and the carved side of a mesh. `scanned_face_down` is the attribute in the manifest.
+/// Finds the character plane and the carved side of a mesh. The manifest may give `scanned_face_down`.
 ///
 /// # Errors
 /// Returns an error if no plane is found or nothing is carved.

@@ -62,7 +62,7 @@ impl BulkRange {
         (self.least..=self.most).contains(&value)
     }
 
-    /// Returns the lowest and the highest of the added values that belong to the bulk.
+    /// Of the values added so far, returns the lowest and the highest that belong to the bulk.
     pub(super) fn range(&self) -> [f32; 2] {
         [
             self.low.into_iter().fold(f32::INFINITY, f32::min),

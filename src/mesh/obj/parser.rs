@@ -16,8 +16,8 @@ const POWERS_OF_TEN: [f64; 23] = [
 ];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
-/// Estimated bytes of a file per vertex and per triangle. The values are high, to reserve too little rather than too
-/// much memory.
+/// Estimates of the bytes that a file needs per vertex and per triangle. They are high, so that too little memory is
+/// reserved rather than too much.
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 

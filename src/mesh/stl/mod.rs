@@ -67,7 +67,7 @@ mod tests {
         }
     }
 
-    /// A text after the last solid is no word of the format; several solids are one mesh.
+    /// A file may contain several solids, so the parser reads on after the last solid and finds an unknown word.
     #[test]
     fn ascii_text_after_the_last_solid_is_refused_by_its_line() {
         let error = open(format!("{ASCII}made by a scanner\n").as_bytes()).expect_err("text");

@@ -24,7 +24,7 @@ pub(super) fn of_png(bytes: &[u8]) -> Orientation {
     Orientation::NoTransforms
 }
 
-/// Returns the orientation that a decoder finds. One that cannot be read counts as upright.
+/// Returns the orientation that a decoder finds. An unreadable orientation counts as upright.
 pub(super) fn of_decoder(decoder: &mut impl ImageDecoder) -> Orientation {
     decoder.orientation().unwrap_or(Orientation::NoTransforms)
 }

@@ -15,7 +15,7 @@ const NEW_SUBFILE_TYPE: u64 = 254;
 const SUBFILE_TYPE: u64 = 255;
 const ORIENTATION: u64 = 274;
 
-/// Numbers of a TIFF file by their byte offset. A big TIFF has offsets of eight bytes.
+/// Reads the numbers of a TIFF file. Offsets in the file have eight bytes in a BigTIFF, and four bytes otherwise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TiffBytes<'b> {
     bytes: &'b [u8],
@@ -24,7 +24,7 @@ pub(super) struct TiffBytes<'b> {
 }
 
 impl<'b> TiffBytes<'b> {
-    /// Reads the header; `None` if the file is too short for one.
+    /// Reads the header. Returns `None` if the file is too short for one.
     pub(super) fn new(bytes: &'b [u8]) -> Option<Self> {
         let mut file = Self {
             bytes,
@@ -35,7 +35,7 @@ impl<'b> TiffBytes<'b> {
         Some(file)
     }
 
-    /// Returns a number of `len` bytes; `None` after the end of the file.
+    /// Returns a number of `len` bytes, or `None` if the file ends before its last byte.
     pub(super) fn number(&self, at: usize, len: usize) -> Option<u64> {
         let field = self.bytes.get(at..at.checked_add(len)?)?;
         let add = |sum: u64, byte: &u8| sum << 8 | u64::from(*byte);
@@ -55,12 +55,12 @@ impl<'b> TiffBytes<'b> {
         }
     }
 
-    /// Returns where the offset of the first page is, and how many bytes it has.
+    /// Returns the position and the length, in bytes, of the field that holds the offset of the first page.
     const fn first_page_field(&self) -> (usize, usize) {
         if self.is_big_tiff { (8, 8) } else { (4, 4) }
     }
 
-    /// Returns the first page; `None` if its offset is after the end of the file.
+    /// Returns the first page, or `None` if its offset is after the end of the file.
     pub(super) fn first_page(&self) -> Option<TiffPage<'b>> {
         let (at, len) = self.first_page_field();
         self.page_at(self.number(at, len)?)
@@ -93,7 +93,7 @@ impl<'b> TiffPage<'b> {
         if self.file.is_big_tiff { 20 } else { 12 }
     }
 
-    /// Returns the offset of the value of a tag, and the length of the value in bytes.
+    /// Returns the offset and the length, in bytes, of a tag's value.
     pub(super) fn value_field(&self, tag: u64) -> Option<(usize, usize)> {
         let entry_at = |nth: usize| {
             let offset = nth.checked_mul(self.entry_len())?;
@@ -127,7 +127,7 @@ impl<'b> TiffPage<'b> {
         flags & (REDUCED | MASK) != 0 || self.value(SUBFILE_TYPE) == Some(OLD_REDUCED)
     }
 
-    /// Returns the next page; `None` after the last.
+    /// Returns the next page, or `None` after the last.
     ///
     /// # Errors
     /// Returns an error if the file ends before the next page.
@@ -153,11 +153,11 @@ pub(super) struct PrintPage {
     pub(super) orientation: Option<u64>,
 }
 
-/// Finds the only full page of a file. Reduced copies and masks are skipped. A file with one page only counts as full.
+/// Finds the only full page of a file. Skips reduced copies and masks, but accepts any single page.
 ///
 /// # Errors
-/// Returns an error if there are several full pages, because only the user knows which one is the print, or if a page
-/// cannot be read.
+/// Returns an error if several pages are full, because only the user knows which one is the print. Also returns an
+/// error if none of several pages is full, or if a page cannot be read.
 pub(super) fn find_print_page(bytes: &[u8]) -> Result<PrintPage, DecodeError> {
     let truncated = || DecodeError::Truncated(FileKind::Tiff);
     let file = TiffBytes::new(bytes).ok_or_else(truncated)?;
@@ -176,7 +176,7 @@ pub(super) fn find_print_page(bytes: &[u8]) -> Result<PrintPage, DecodeError> {
     }
     let print = match full[..] {
         [print] => print,
-        // Every page is marked as a copy, so the first is as good as any.
+        // The only page is marked as a copy or a mask.
         [] if count == 1 => first,
         [] => return Err(DecodeError::Pages { full: 0, count }),
         _ => {

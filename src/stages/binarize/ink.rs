@@ -15,7 +15,7 @@ const DISTINCT_BACKGROUND: f64 = 0.945;
 const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
-/// Dark pixels above this position between the darkest grey and the background are pale.
+/// A dark pixel is pale if it is above this position between the darkest tenth (0) and the background (1).
 const PALE: f64 = 0.35;
 /// Stains are possible if more than this share of the dark pixels are pale.
 const LEAST_PALE: f64 = 0.15;

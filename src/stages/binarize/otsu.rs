@@ -64,7 +64,7 @@ fn sort(values: &mut [f32]) {
     let mut sorted = vec![0; keys.len()];
     for shift in DIGITS {
         let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
-        // First the number of keys with each digit value, then the index of the next such key in `sorted`.
+        // At first the number of keys with each digit value. Later the index in `sorted` for the next such key.
         let mut places = [0_u32; DIGIT_VALUES];
         for key in &keys {
             places[digit(*key)] += 1;

@@ -5,7 +5,7 @@ use crate::raster::{Grid, Mask};
 
 /// Ink is clearly darker than the background if the sum of the evidence is below the negative of this.
 const CLEAR: f64 = 0.8;
-/// Ink is clearly lighter, as in rubbings, above this sum: heavy ink in a frame also looks like a dark background.
+/// Ink is clearly lighter, as in rubbings, if the sum is above this. Heavy ink in a frame can cause a smaller sum.
 const CLEAR_LIGHT: f64 = 1.6;
 /// Width of the rim that counts as evidence for the background, as a share of the image's shorter side.
 const RIM: f64 = 0.06;
@@ -27,9 +27,9 @@ pub(super) fn polarity(
     (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
-/// Returns the evidence that the dark class is the background, or ink if negative. The evidence is that background is
-/// the larger class, with weight 2, and that background covers most of the rim. Heavy ink breaks the first rule, and
-/// border lines break the second.
+/// Returns the evidence that the dark class is the background, negative if it is ink. The larger class is assumed to be
+/// the background (weight 2), and so is the class that covers most of the rim (weight 1). Heavy ink breaks the first
+/// rule, and border lines break the second.
 fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());

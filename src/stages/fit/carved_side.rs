@@ -62,8 +62,8 @@ const fn mirrored(count: usize) -> BeamWidth {
 
 /// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Nearness to the surface below which wood does not print. Without this limit, the slopes around thin strokes would
-/// count as strokes. Only the pose search uses the slopes.
+/// Pixels with a lower nearness to the surface are assumed not to print. Without this limit, the slopes around thin
+/// strokes would count as strokes. Only the pose search uses the slopes.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;

@@ -1,6 +1,6 @@
 //! Points of a height map, and weighted least squares over them.
 //!
-//! Fitting a surface takes about thirty passes over the points, which are stored in blocks for SIMD instructions.
+//! Fitting a surface takes about thirty passes. The points are stored in blocks, so that SIMD instructions apply.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -152,8 +152,8 @@ impl MomentSums {
                 }
             }
         };
-        // Each product of one degree times u, and the last one also times v, gives the next degree. A loop over the
-        // degrees would take four times as long.
+        // All monomials of a degree follow from the degree before: each one times u, and the last one times v. A loop
+        // over the degrees would take four times as long.
         let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
         let second = [
             times(&first[0], u),

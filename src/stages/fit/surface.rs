@@ -10,8 +10,8 @@ use crate::stages::components::ConnectedComponents;
 use crate::stages::pose::SoftMask;
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
-/// Weight of points above the surface in the first, convex passes. Points below weigh `1 - ENVELOPE`. The surface is
-/// then the 0.97 expectile of the heights.
+/// Weight of points above the surface in the first passes, which solve a convex problem. Points below weigh
+/// `1 - ENVELOPE`. The resulting surface is the 0.97 expectile of the heights.
 const ENVELOPE: f64 = 0.97;
 /// Weight of a point above the surface in the passes that follow.
 const ABOVE: f64 = 3.0;
@@ -24,7 +24,7 @@ const ENVELOPE_PASSES: usize = 8;
 const NARROW_PASSES: usize = 2;
 /// Number of wide windows, for which a quarter of the points is enough.
 const WIDE_WINDOWS: usize = 3;
-/// Connected tops this close to the edge of the mesh, in rendering pixels, belong to a neighbouring character.
+/// Connected tops belong to a neighbouring character if they come within this many pixels of the mesh's edge.
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
 const OFF_TOP_WEIGHT: f64 = 1e-6;
@@ -43,7 +43,7 @@ const TILT_SIGMA: f64 = 0.05;
 const BOW_SIGMA: f64 = 0.15;
 /// Prior standard deviation of the difference between the second-degree coefficients of tops and ground.
 const GROUND_BOW_SIGMA: f64 = 0.03;
-/// Quantile of the heights over the mean plane at which the fit of the ground starts.
+/// The fit of the ground starts at this quantile of the heights above the mean plane.
 const GROUND_START: f64 = 0.25;
 /// Distances from the ground at which the weight of a point falls to 0, as shares of the height range.
 const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
@@ -77,7 +77,7 @@ pub(super) struct HeightSamples {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     pub(super) coefficients: Coefficients,
-    /// Share of the points that lie near the surface, weighted by nearness. Points above the surface count negatively.
+    /// Share of the points that lie near the surface, weighted by nearness. Points far above it count negatively.
     pub(super) support: f64,
     /// Share of the visible area within the last window.
     pub(super) tops: f64,
@@ -289,7 +289,7 @@ impl HeightSamples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Returns an image of the nearness to the surface: 1 on or above the surface, 0 from half the relief below.
+    /// Returns an image of the nearness to the surface: 1 on or above it, 0 at half the relief below or deeper.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {
@@ -306,8 +306,7 @@ impl HeightSamples {
 
     /// Returns the plane `z = a + b x + c y` through the stroke tops, in plane coordinates and mesh units.
     ///
-    /// Tops at the edge of the mesh belong to neighbouring characters. If the surface is curved, they help to fit the
-    /// surface but hardly influence the plane.
+    /// If the surface is curved, tops of neighbouring characters (at the mesh's edge) hardly influence the plane.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
         let is_bent = c[3..].iter().any(|c| *c != 0.0);
@@ -375,7 +374,7 @@ pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
 }
 
 /// Returns the weight of a residual. Above the surface, the weight is `ABOVE`, or 0 for spikes higher than three
-/// windows. Below the surface, the weight falls from 1 to 0 at a depth of `window`. Plain comparisons are vectorized.
+/// windows. Below the surface, the weight falls from 1 to 0 at a depth of `window`.
 #[inline(always)]
 fn one_sided_weight(r: f64, window: f64) -> f64 {
     let below = smooth_weight(r, window);

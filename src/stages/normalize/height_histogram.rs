@@ -1,8 +1,8 @@
 //! Histogram of the heights below the tops, and the depth at which the tops end.
 //!
 //! Tops are concentrated at one depth, or a little below if they are worn. Walls slope and have about the same area at
-//! each depth. The best threshold is the depth at which tops and walls are equally frequent: few tops are lost, few
-//! walls included.
+//! each depth. The best threshold is the depth at which tops and walls are equally frequent. It excludes few tops and
+//! includes few walls.
 
 use crate::domain::ReliefHeights;
 
@@ -19,10 +19,10 @@ const FINE: usize = 3;
 const COARSE: usize = 16;
 /// Tops end at the depth at which the frequency falls to this multiple of the walls' frequency. At 2, tops and walls
 /// are equally frequent; 0.5 is a margin for noise. Accuracy on two independent kinds of generated reliefs is about the
-/// same for all values near 2.5. The limit is at most the mean of the peak's and the walls' frequency.
+/// same for all values near 2.5. If the peak is low, the mean of the peak's and the walls' frequency is used instead.
 const EDGE: f64 = 2.5;
-/// Usual depth at which tops end. A measured depth is noisy, so the result is the geometric mean of both depths. On
-/// three kinds of generated reliefs, the mean was nearer to the truth.
+/// Usual depth at which tops end, as a share of the relief. The result is the geometric mean of the usual and the
+/// measured depth. On three kinds of generated reliefs, it was nearer to the truth than the noisy measured depth.
 const USUAL: f64 = 0.075;
 /// Limits to which a measured depth is clamped.
 const RANGE: [f64; 2] = [0.02, 0.25];

@@ -12,7 +12,7 @@ const STRIDE: usize = 3;
 /// Share of the map's width and height left out at each border when tops and ground are separated. Side walls and a
 /// protruding foot of the block may lie there, and are neither.
 const MARGIN: f64 = 0.15;
-/// Tops closer to the fitted surface than this share of the relief are first assumed to lie on the surface.
+/// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
 
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
@@ -84,7 +84,7 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
 fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
-        // Both ends are equally far from a sample, so a map rotated by 180 degrees gives the same heights.
+        // The samples are symmetric about the middle, so a map rotated by 180 degrees gives the same heights.
         let rest = 2 * (high - low - 2 * cut) % STRIDE;
         (low + cut + rest..=high - cut).step_by(STRIDE)
     };

@@ -2,8 +2,8 @@
 //!
 //! The depth mask is rotated through a full circle, then in finer steps about the best angle. At each angle the mask is
 //! scaled and centred on the canvas, then shifted pixel by pixel as long as its IoU with the print rises. The program
-//! tries 60 angles, and 60 more about the best. The text of the paper has only one angle in each of six sectors, which
-//! is wrong by up to half a sector.
+//! tries 60 angles, and 60 more about the best. The text of the paper has only one angle in each of six sectors, so the
+//! angle could be off by half a sector.
 
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};

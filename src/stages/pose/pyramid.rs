@@ -1,4 +1,4 @@
-//! Image pyramid of a soft mask: levels of several working sizes, smoothed and high-pass filtered.
+//! Image pyramid of a soft mask: one level per working size, smoothed and high-pass filtered.
 
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask, resample, resample_transposed};

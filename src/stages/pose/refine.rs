@@ -174,7 +174,7 @@ impl<'a> Refiner<'a> {
         Some(into.after(&from_middle))
     }
 
-    /// Returns the inverse of `moving_from_fixed`, a map between image pixels.
+    /// Undoes `moving_from_fixed`: converts a map to image pixels and inverts it.
     fn fixed_from_moving(&self, from_fixed: &Affine2) -> Option<Affine2> {
         let to_image = self.moving.work_from_image.inverse()?;
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
@@ -258,7 +258,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Interpolates linearly. Unlike closures, the loop is always inlined, and only inlined code is vectorised.
+/// Interpolates linearly. Uses a loop, because calls of closures may not be inlined and would prevent vectorisation.
 #[inline(always)]
 fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     let mut mixed = a;

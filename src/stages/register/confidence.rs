@@ -17,10 +17,10 @@ const MASK_INPUTS: usize = 8;
 
 /// Weights of the pose model's inputs.
 const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
-/// Weights of the mask model's inputs. The last input, the square of `Areas::rim`, is small: on generated pairs of the
-/// tier `hard`, the median rim is 0.03, and 3 % of the rims are above 0.05.
+/// Weights of the mask model's inputs. The last weight is large, because its input, the square of `Areas::rim`, is
+/// small: on hard generated pairs, the median rim is 0.03, and 3 % of the rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
-/// Unit of the spread in `spread_input`, as a share of the depth map's longest side. So small a spread is invisible.
+/// Unit of the spread in `spread_input`, as a share of the depth map's longest side. A spread below it is invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Lower bound of shares before their logarithm is taken.
 const FLOOR: f64 = 0.02;

@@ -23,7 +23,7 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// If a competitor scores more than this share of the best score, both competitors are refined at `CLOSER` too.
 const CLOSE: f64 = 0.75;
-/// In `fair_share`, the ratio of the scores on all pixels counts only up to this. A symmetric character can reach it.
+/// `fair_share` limits the ratio of the scores on all pixels to this. A symmetric character can reach the limit.
 const SYMMETRIC: f64 = 0.9;
 /// Two further refinements start from the pose scaled down and up by this factor. Ideally, all end at the same pose.
 const OTHER_SIZE: f64 = 1.08;

@@ -284,8 +284,8 @@ impl WindowWeights {
         }
     }
 
-    /// Computes the weighted means down the columns of the windows that start at row `y`. `across` is a ring buffer: it
-    /// holds row `y` at `y` modulo the number of weights.
+    /// Computes the weighted means down the columns of the windows that start at row `y`. `across` is a ring buffer.
+    /// The slot of a row is the row's index modulo the number of weights.
     #[inline(always)]
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
         match *self.weights.as_slice() {

@@ -76,7 +76,7 @@ impl BulkBox {
         }
     }
 
-    /// Adds the first `count` triangles of a block. Skips triangles that leave the bulk.
+    /// Adds the first `count` triangles of a block. Skips triangles with a corner outside the bulk.
     #[inline(always)]
     fn add(&self, block: &TriangleBlock, count: usize, sums: &mut [[f32; LANES]; SUM_COUNT]) {
         let per_extent = (1.0 / self.extent) as f32;
@@ -134,7 +134,7 @@ mod tests {
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// Computes the moments for comparison: cuts each triangle into small triangles, and sums their centroids by area.
+    /// Computes the moments for comparison: cuts each triangle into small ones, and weights their centroids by area.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {
