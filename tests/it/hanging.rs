@@ -166,8 +166,8 @@ fn an_input_that_became_a_pipe_is_named_by_every_command() {
     let commands: [(&[&str], i32); 7] = [
         (&["export", "-o", "exported"], 3),
         (&["report"], 0),
-        (&["report", "--format", "html", "-o", "report.html"], 0),
-        (&["contact-sheet", "-o", "sheet.png"], 0),
+        (&["report", "--format", "html", "-o", "report.html"], 3),
+        (&["contact-sheet", "-o", "sheet.png"], 3),
         (&["show", "upright-0000"], 0),
         (&["check"], 0),
         (&["run", "--rerun", "all"], 3),
