@@ -15,7 +15,7 @@ const NEW_SUBFILE_TYPE: u64 = 254;
 const SUBFILE_TYPE: u64 = 255;
 const ORIENTATION: u64 = 274;
 
-/// Reads the numbers of a TIFF file. Offsets in the file have eight bytes in a BigTIFF, and four bytes otherwise.
+/// Reads the numbers of a TIFF file. Offsets in the file have eight bytes in a `BigTIFF`, and four bytes otherwise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TiffBytes<'b> {
     bytes: &'b [u8],
