@@ -5,16 +5,13 @@ use tokio::task::JoinHandle;
 
 use crate::runner::Stop;
 
-/// Watches Ctrl-C, SIGTERM and a closed terminal until the handle is aborted. SIGINT and SIGHUP stay ignored if they
-/// were ignored when this process started, as `nohup` and a shell's background jobs do.
+/// Watches Ctrl-C, SIGTERM and a closed terminal until the handle is aborted. SIGHUP stays ignored if it was ignored
+/// when this process started, as under `nohup`.
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
-    let ignored = IgnoredSignals::of_this_process();
-    let unless_ignored = |kind: SignalKind| {
-        let is_ignored = ignored.contains(kind);
-        (!is_ignored).then(|| signal(kind)).transpose()
-    };
-    let mut interrupt = unless_ignored(SignalKind::interrupt())?;
-    let mut hang_up = unless_ignored(SignalKind::hangup())?;
+    let is_ignored = IgnoredSignals::of_this_process().contains(SignalKind::hangup());
+    let hang_up = (!is_ignored).then(|| signal(SignalKind::hangup()));
+    let mut hang_up = hang_up.transpose()?;
+    let mut interrupt = Some(signal(SignalKind::interrupt())?);
     let mut terminate = Some(signal(SignalKind::terminate())?);
     let stop = stop.clone();
     Ok(tokio::spawn(async move {
