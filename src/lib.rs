@@ -5,8 +5,9 @@
 //! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** runs four **stages**:
 //! `fit`, `depth`, `normalize` and `register`. A **worker** is one process that runs stages. It leases a pair and runs
 //! the remaining stages. While a stage is computed, the worker writes a **checkpoint** of the stage before: first the
-//! files, then the rows in a transaction, which may hold the checkpoints of several pairs. Stages are pure functions.
-//! Only the catalog contains SQL, only the store handles artifact files, and the runner connects both with the stages.
+//! files, then the rows in a transaction, which may hold the checkpoints of several pairs and may wait for them up to
+//! 250 ms. The stage is durable when this transaction is committed. Stages are pure functions. Only the catalog
+//! contains SQL, only the store handles artifact files, and the runner connects both with the stages.
 //!
 //! ## One pair, from manifest row to report cell
 //!
@@ -45,22 +46,24 @@
 //! statements are in `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`. Each of them increases the job's
 //! fencing token.
 //!
-//! All writes of a worker are fenced. The statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
-//! only if the worker and the token equal those of the lease, the worker has not ended, and its last heartbeat is
-//! recent. If a statement changes no row, `group_commit.rs` stores nothing of that request, and the worker learns it
-//! from the reply of `src/catalog/queue/api.rs`:
+//! All writes under a lease are fenced; a release checks only worker and token. The statements in
+//! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
+//! lease, the worker has not ended, and its last heartbeat is recent. If a statement changes no row, `group_commit.rs`
+//! stores nothing of that request, and the worker learns it from the reply of `src/catalog/queue/api.rs`:
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
-//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | the result is dropped; the thread ends after its current stage |
-//! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored |
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; `pair_task.rs` notices at the next finished stage, and the thread ends after the stage that it has begun by then |
+//! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
 //! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process registers as a new worker; its running pairs end at their next write |
 //! | claim | no leases | `prefetch.rs` | nothing, until the next heartbeat |
-//! | release | `false`, ignored | | nothing: the job already belongs to another worker or is ready |
+//! | release | `false`, ignored | | nothing: the job was recovered meanwhile |
 //!
 //! The pair ends as `PairEnd::LeaseLost`. `StoredStages::finish` in `checkpointer.rs` decides this after any refused
-//! checkpoint, `store_failure` after a refused failure. Stages stored before stay. The pair is leased again when its job
-//! is ready; artifact files without a row are used again if a stage gives the same bytes.
+//! checkpoint, `store_failure` after a refused failure. Stages stored before stay. The pair is leased again when its
+//! job is ready, unless the recovery quarantined it. Artifact files without a row are used again if a stage gives the
+//! same bytes. If heartbeats fail with an error for as long as a lease lasts, the run finishes its stages and ends with
+//! that error.
 //!
 //! ## Why `fit` reads the print
 //!

@@ -47,7 +47,7 @@ pub(super) enum PairEnd {
     Retry,
     /// The pair was released unfinished.
     Released,
-    /// The lease was lost to another worker.
+    /// The lease was lost: it expired, or a run or repair recovered the job.
     LeaseLost,
 }
 
