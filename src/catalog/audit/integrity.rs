@@ -60,7 +60,7 @@ pub struct AuditedPair {
 }
 
 /// A stored result, left unparsed so that a check can also read invalid values.
-#[derive(Debug, Clone, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq, sqlx_macros::FromRow)]
 pub struct AuditedResult {
     /// The outcome as JSON text.
     pub outcome: String,

@@ -25,7 +25,7 @@ const SCHEMA_VERSION: i64 = 6;
 /// Read connections per process.
 const READERS: u32 = 4;
 
-pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("./migrations");
+pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx_macros::migrate!("./migrations");
 
 /// Returns the options of every connection.
 fn options(path: &Path) -> SqliteConnectOptions {

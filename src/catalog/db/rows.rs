@@ -1,13 +1,13 @@
 //! Decodes columns into domain types. An invalid value is an error.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 use sqlx::error::BoxDynError;
 use sqlx::sqlite::{SqliteTypeInfo, SqliteValueRef};
 use sqlx::{Decode, Sqlite, Type};
 
 use crate::domain::{
-    Affine2, ArtifactSet, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId,
-    PairName, PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+    Affine2, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName,
+    PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
 /// Implements `Type` and `Decode` for types. Each line has a type, the type of its column, and a conversion function.
@@ -48,34 +48,6 @@ decode! {
     Affine2: &str = serde_json::from_str;
     AttentionCheck: &str = serde_json::from_str;
     PrintFromMesh: &str = serde_json::from_str;
-    Json<ArtifactSet>: &str = json;
-    Json<Map<String, Value>>: &str = json;
-    Json<Value>: &str = json;
-}
-
-/// The value of a column with JSON text, for types of other crates.
-pub(crate) struct Json<T>(pub(crate) T);
-
-fn json<T: serde::de::DeserializeOwned>(text: &str) -> serde_json::Result<Json<T>> {
-    serde_json::from_str(text).map(Json)
-}
-
-impl From<Json<Self>> for ArtifactSet {
-    fn from(Json(files): Json<Self>) -> Self {
-        files
-    }
-}
-
-impl From<Json<Self>> for Map<String, Value> {
-    fn from(Json(fields): Json<Self>) -> Self {
-        fields
-    }
-}
-
-impl From<Json<Self>> for Value {
-    fn from(Json(value): Json<Self>) -> Self {
-        value
-    }
 }
 
 fn status(code: i64) -> Result<JobStatus, String> {

@@ -28,7 +28,7 @@ pub(crate) const fn cursor(stage: Stage) -> Cursor {
 }
 
 /// Key of a counter. Jobs with the same key are counted together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, sqlx_macros::FromRow)]
 pub(crate) struct CounterKey {
     #[sqlx(rename = "stage")]
     pub(crate) cursor: Cursor,
@@ -68,7 +68,7 @@ impl CounterKey {
 }
 
 /// A job with its counter key.
-#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
 pub(crate) struct KeyedJob {
     pub(crate) pair: i64,
     #[sqlx(flatten)]
@@ -76,7 +76,7 @@ pub(crate) struct KeyedJob {
 }
 
 /// A number of jobs that are counted together.
-#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
 pub(crate) struct JobGroup {
     #[sqlx(flatten)]
     pub(crate) key: CounterKey,

@@ -50,7 +50,7 @@ DELETE FROM attempt WHERE id IN (
     WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?))";
 
 /// A row of [`FAIL`]: a job with its token and new counter key.
-#[derive(sqlx::FromRow)]
+#[derive(sqlx_macros::FromRow)]
 pub(crate) struct FailedRow {
     pub(crate) pair: i64,
     pub(crate) token: i64,

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
 use sqlx::SqliteConnection;
+use sqlx::types::Json;
 
-use crate::catalog::db::rows::{Json, json_array};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::catalog::{Catalog, Result};

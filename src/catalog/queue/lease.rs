@@ -13,7 +13,7 @@ use crate::domain::{
 ///
 /// `token` is the fencing token. Each claim and each recovery increases the job's token, so a write under an older
 /// lease changes nothing.
-#[derive(Debug, sqlx::FromRow)]
+#[derive(Debug, sqlx_macros::FromRow)]
 pub struct Lease {
     pub(crate) pair: PairId,
     pub(crate) worker: WorkerId,
@@ -64,7 +64,7 @@ impl Lease {
 }
 
 /// A job that was changed under a lease, with the token of that lease.
-#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
 pub(crate) struct FencedRow {
     pub(crate) pair: i64,
     pub(crate) token: i64,
@@ -188,6 +188,8 @@ pub struct StageFailure {
 }
 
 /// Row id of a fingerprint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, sqlx::Type)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, sqlx_macros::Type,
+)]
 #[sqlx(transparent)]
 pub struct FingerprintId(pub(crate) i64);

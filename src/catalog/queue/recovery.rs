@@ -14,7 +14,7 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx_macros::FromRow)]
 pub struct LeaseHolder {
     /// The worker.
     #[sqlx(rename = "id")]
@@ -111,7 +111,7 @@ UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 
 FROM json_each(?) AS item WHERE failure.pair = item.value ->> 0";
 
 /// A row of [`RECOVER`] or [`OVERDUE`].
-#[derive(sqlx::FromRow)]
+#[derive(sqlx_macros::FromRow)]
 struct RecoveredJob {
     #[sqlx(flatten)]
     job: KeyedJob,

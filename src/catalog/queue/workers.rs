@@ -20,7 +20,7 @@ pub struct WorkerInfo {
 }
 
 /// Numbers of pairs that have a stage to run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, sqlx::FromRow)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, sqlx_macros::FromRow)]
 pub struct Outstanding {
     /// Pairs that are ready.
     pub ready: u64,

@@ -9,7 +9,7 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// A manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct ManualAlignment {
     /// Idempotency key of the client: an alignment sent twice is stored once.
     pub event: String,
@@ -38,7 +38,7 @@ pub struct ManualAlignment {
 }
 
 /// A stored manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct StoredAlignment {
     /// The alignment.
     #[serde(flatten)]

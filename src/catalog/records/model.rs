@@ -6,7 +6,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::catalog::db::rows::Json;
 use crate::catalog::records::verdicts::{ReviewerVerdict, VerdictEvent};
 use crate::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
@@ -68,22 +67,22 @@ pub struct FailedPair {
 }
 
 /// The current result of one stage of one pair.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct StageRecord {
     /// The stage.
     pub stage: Stage,
     /// Outcome of the stage as JSON; parse it with [`StageRecord::parse`].
-    #[sqlx(try_from = "Json<Value>")]
+    #[sqlx(json)]
     pub outcome: Value,
     /// Its artifacts by role.
-    #[sqlx(try_from = "Json<ArtifactSet>")]
+    #[sqlx(json)]
     pub files: ArtifactSet,
     /// Hash of the outcome and the artifacts. Equal bytes give equal hashes.
     pub result_hash: ContentHash,
     /// Hash of the settings of this stage and of all earlier stages.
     pub fingerprint_hash: ContentHash,
     /// Revision and settings of this stage.
-    #[sqlx(try_from = "Json<Value>")]
+    #[sqlx(json)]
     pub fingerprint_fields: Value,
     /// Hash of the mesh that the result was computed from.
     pub mesh_hash: ContentHash,
@@ -120,7 +119,7 @@ pub struct MetricRecord {
 }
 
 /// Attributes of a pair as imported.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
@@ -137,7 +136,7 @@ pub struct PairAttributes {
     /// The block, if given.
     pub block: Option<String>,
     /// All other columns of the manifest.
-    #[sqlx(try_from = "Json<Map<String, Value>>")]
+    #[sqlx(json)]
     pub meta: Map<String, Value>,
 }
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use sqlx::sqlite::SqliteRow;
+use sqlx::types::Json;
 use sqlx::{FromRow as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::rows::Json;
 use crate::catalog::queue::counters::Cursor;
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,

@@ -16,7 +16,7 @@ use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairId, Stage};
 
 /// A leased pair with its attributes and results.
-#[derive(Debug, Clone, PartialEq, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, sqlx_macros::FromRow)]
 pub struct PairWork {
     /// Attributes as imported.
     #[sqlx(flatten)]

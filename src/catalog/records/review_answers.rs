@@ -28,7 +28,7 @@ pub enum Shown {
 }
 
 /// An answer that was not undone.
-#[derive(Debug, Clone, PartialEq, FromRow)]
+#[derive(Debug, Clone, PartialEq, sqlx_macros::FromRow)]
 pub struct Answer {
     /// Id by which it is undone.
     pub event: String,
@@ -69,7 +69,7 @@ impl FromRow<'_, SqliteRow> for AnsweredOn {
 }
 
 /// An answer to an attention check, undone or not.
-#[derive(Debug, Clone, PartialEq, Serialize, FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct AttentionCheckAnswer {
     /// The pair.
     pub pair: PairName,

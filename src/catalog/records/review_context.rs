@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::domain::{ContentHash, ReviewOrder};
 
 /// Context of a verdict. All fields are `None` if the context is unknown.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, sqlx::FromRow)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, sqlx_macros::FromRow)]
 pub struct ReviewContext {
     /// Idempotency key of the client. A verdict that is sent twice is stored once.
     pub event: Option<String>,

@@ -35,7 +35,7 @@ pub struct NewVerdict {
 }
 
 /// One line of the verdict log.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
@@ -69,7 +69,7 @@ pub struct VerdictEvent {
 }
 
 /// A reviewer's newest verdict on a result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, sqlx::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, sqlx_macros::FromRow)]
 pub struct ReviewerVerdict {
     /// Name of the reviewer.
     pub reviewer: String,
@@ -82,7 +82,7 @@ pub struct ReviewerVerdict {
 }
 
 /// A verdict that was not undone, with the result that it judges.
-#[derive(Debug, sqlx::FromRow)]
+#[derive(Debug, sqlx_macros::FromRow)]
 pub(crate) struct ResultVerdict {
     pair: i64,
     metric: ThresholdMetric,
