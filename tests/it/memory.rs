@@ -12,17 +12,17 @@ use crate::resume::{copy, pairs, project};
 /// Pairs with large prints.
 const PAIRS: u64 = 4;
 /// Most pixels of each print; each has only a few less.
-const PIXELS: usize = 5_000_000;
+const PIXELS: usize = 2_500_000;
 /// Memory limit of a run. One pair needs up to 50 bytes per pixel, so one pair fits, but not two.
-const MEMORY_MIB: u64 = 400;
+const MEMORY_MIB: u64 = 240;
 
-/// Scales a print up to nearly [`PIXELS`] pixels.
-pub(crate) fn enlarge(path: &Path) {
+/// Scales a print up to nearly the given number of pixels.
+pub(crate) fn enlarge(path: &Path, pixels: usize) {
     let bytes = std::fs::read(path).expect("a print");
     let small = decode(&bytes, &ImageLimits::SUGGESTED)
         .expect("a picture")
         .rgb;
-    let times = (PIXELS / small.data().len()).isqrt();
+    let times = (pixels / small.data().len()).isqrt();
     let color = |x: usize, y: usize| {
         let of_16_bits = small.at(x / times, y / times);
         of_16_bits.map(|channel| (channel >> 8) as u8)
@@ -48,7 +48,10 @@ fn pairs_with_large_prints_stay_within_the_memory_limit_together() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let bounded = project(dir.path(), "bounded", &PAIRS.to_string());
     for pair in pairs(&bounded) {
-        enlarge(&bounded.input_path(&pair.results.attributes.print_path));
+        enlarge(
+            &bounded.input_path(&pair.results.attributes.print_path),
+            PIXELS,
+        );
     }
     let free = copy(&bounded, &dir.path().join("free"));
     let within = peak_mib(&bounded, &format!("{MEMORY_MIB}M"));

@@ -132,7 +132,8 @@ fn memory_does_not_grow_with_the_number_of_items_shown() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "large", "3");
     for pair in pairs(&project) {
-        enlarge(&project.input_path(&pair.results.attributes.print_path));
+        let print = project.input_path(&pair.results.attributes.print_path);
+        enlarge(&print, 5_000_000);
     }
     call(&mut run(&project, &["-j", "1"])).expect(0);
     let page = Page::open(&project, "lan", &NO_CHECKS);
