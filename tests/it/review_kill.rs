@@ -25,8 +25,15 @@ struct RequestLog {
 }
 
 impl RequestLog {
-    /// Answers random items until the server is gone. Sometimes undoes the last answer.
-    fn review(&mut self, site: &Site, queue: &[Value], rng: &mut ChaCha8Rng) {
+    /// Answers random items until the server is gone. Sometimes undoes the last answer. Sends a message after each
+    /// acknowledged answer.
+    fn review(
+        &mut self,
+        site: &Site,
+        queue: &[Value],
+        rng: &mut ChaCha8Rng,
+        acknowledged: &mpsc::Sender<()>,
+    ) {
         if let Some((path, body)) = self.open.take()
             && !self.send(site, path, body)
         {
@@ -40,6 +47,8 @@ impl RequestLog {
             if !self.send(site, "/api/answer", answer(&event, item, verdict)) {
                 return;
             }
+            // The receiver is gone if the server is about to be killed.
+            let _ = acknowledged.send(());
             if rng.random_bool(0.1) && !self.send(site, "/api/undo", json!({ "event": event })) {
                 return;
             }
@@ -91,18 +100,20 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
     for _ in 0..kills {
         let mut page = Page::open(&project, "lan", &NO_CHECKS);
         let queue = page.queue();
-        let moment = Duration::from_micros(rng.random_range(0..60_000));
-        let (killed, gone) = mpsc::channel::<()>();
+        let answers = rng.random_range(1..=6);
+        let moment = Duration::from_micros(rng.random_range(0..8000));
+        let (acknowledged, answered) = mpsc::channel();
         std::thread::scope(|scope| {
             let reviewing = scope.spawn({
                 let (site, queue, log) = (Site::clone(&page), &queue, &mut log);
                 let mut rng = ChaCha8Rng::seed_from_u64(rng.random());
-                move || log.review(&site, queue, &mut rng)
+                move || log.review(&site, queue, &mut rng, &acknowledged)
             });
-            // The kill comes at a random time, so there is no event to wait for.
-            let _ = gone.recv_timeout(moment);
+            for () in answered.iter().take(answers) {}
+            // The kill comes at a random time after that answer, so there is no event to wait for.
+            let (_sender, never) = mpsc::channel::<()>();
+            let _ = never.recv_timeout(moment);
             page.kill();
-            drop(killed);
             reviewing.join().expect("the reviewer");
         });
     }
