@@ -59,7 +59,7 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog, not the project's.
+/// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
 pub(super) async fn count_rows(dir: &Path) -> anyhow::Result<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;

@@ -174,7 +174,8 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
     Ok(report)
 }
 
-/// Warns about unmet requirements and returns the exit code. If both requirements are unmet, returns `Incomplete`.
+/// Warns about the unmet requirements of `--require-complete` and `--fail-under`. Returns the exit code; for an
+/// incomplete report, `Incomplete`.
 fn check_requirements(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
     let missing = args.require_complete.then(|| quality_gate::missing(report));
     let below = args

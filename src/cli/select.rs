@@ -25,7 +25,7 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
     }
 }
 
-/// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
+/// Looks up pairs by their ids. Returns `None` if no id is given; callers then select all pairs.
 ///
 /// # Errors
 /// Like [`pairs`].

@@ -36,7 +36,7 @@ impl JobStatus {
     }
 }
 
-/// Smallest number of deaths of workers that leased only one pair after which this pair may be quarantined.
+/// A pair is never quarantined before this many workers died while they leased only this pair.
 pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair must be quarantined because it probably kills its workers.

@@ -105,7 +105,7 @@ struct Readers<T: ReadItem> {
 }
 
 impl<T: ReadItem> Readers<T> {
-    /// Starts a thread that reads items until none is left. Without a thread the items end by their timeout.
+    /// Starts a thread that reads items until none is left. If the thread cannot start, the items time out.
     fn start_thread(&self) {
         let (queue, sender) = (Arc::clone(&self.queue), self.sender.clone());
         let work = move || {

@@ -22,7 +22,7 @@ pub(super) struct StoredStage {
     pub(super) print_hash: Option<ContentHash>,
 }
 
-/// The input file that a pair's thread reads now. Others see it while the thread hangs.
+/// The input file that a pair's thread is reading. Other threads name this file in messages if the read hangs.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FileInUse(Arc<Mutex<Option<PathBuf>>>);
 

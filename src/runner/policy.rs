@@ -216,7 +216,7 @@ mod tests {
             recover_every,
             ..
         } = Timing::DEFAULT;
-        // One search records the last heartbeat. A later search finds that a lease length has passed since.
+        // One recovery records the last heartbeat. A later recovery finds it older than a lease.
         assert!(lease + recover_every * 2 <= Duration::from_mins(1));
         assert!(lease >= heartbeat_every * 4);
     }

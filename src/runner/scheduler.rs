@@ -135,7 +135,7 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // No other pair is ready or in progress, so a pair that must run alone can be claimed.
+        // This process has no other pair in progress, so a pair that must run alone can be claimed.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {

@@ -1,4 +1,4 @@
-//! Messages of commands if something is missing, exists already or is too long to list, or the command is interrupted.
+//! Messages about missing files, existing files, long lists and interrupted commands.
 
 use std::process::{Command, Stdio};
 

@@ -1,4 +1,4 @@
-//! What the review server stores and reveals: verdicts belong to what was shown, and items are blind.
+//! The review server stores a verdict only for the result that was shown, and does not reveal the metric of an item.
 
 use std::collections::{BTreeMap, BTreeSet};
 

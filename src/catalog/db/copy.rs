@@ -1,4 +1,4 @@
-//! Copies the catalog to a backup while a run may be writing, and a backup to a new catalog.
+//! Copies the catalog to a backup, even during a run, and restores a backup to a new catalog.
 
 use std::path::Path;
 
@@ -10,7 +10,8 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity, wrong_identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
-/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. A copy is only written.
+/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. They concern the source,
+/// because the copy is never read.
 const READ_FAILED: [&str; 2] = ["266", "522"];
 
 /// Longest absolute path that SQLite opens, in bytes, less the ending of a journal.

@@ -40,8 +40,8 @@ impl UnplacedFile {
     /// Creates an empty file beside `target`, and removes the files of creators that were killed.
     ///
     /// # Errors
-    /// Returns an error if the folder is not writable, or holds a log without its catalog. SQLite would read that log
-    /// as a part of the new catalog.
+    /// Returns an error if the folder is not writable, or if it holds a WAL but no catalog. SQLite would apply that WAL
+    /// to the new catalog.
     pub(crate) fn create(target: &Path) -> Result<Self> {
         for ending in ["-wal", "-journal"] {
             let log = sidecar(target, ending);

@@ -9,8 +9,8 @@ use crate::stages::score::SsimWindow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
-    /// Largest scale that the pose search tries, 1..=2. The smallest is `1 / scale_band`. At scale 1, the longest sides
-    /// of print and depth map have the same length.
+    /// Largest scale from depth map to print that the pose search tries, 1..=2. The smallest scale is its reciprocal.
+    /// Scale 1 makes the longest sides of both images equal.
     pub scale_band: f64,
     /// Working size of the refinement, 32..=1024: the longest side of the area with data, in pixels.
     pub working_px: u32,

@@ -190,7 +190,7 @@ impl SsimSums {
         }
     }
 
-    /// Returns the means over `count` windows. `equal` of these windows score 1 and are missing from the sums.
+    /// Returns the mean scores of `count` windows. `equal` is the number of windows with score 1, which the sums omit.
     fn mean(&self, equal: usize, count: usize) -> SsimScores {
         let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + equal as f64) / count.max(1) as f64;
         SsimScores {
