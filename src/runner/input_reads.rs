@@ -136,7 +136,7 @@ struct PendingReads {
     timeout: Duration,
     /// When each read started, by position.
     started: BTreeMap<usize, Instant>,
-    /// When the last read started or ended.
+    /// When a read last started or ended, or was found overdue.
     last_event: Instant,
     /// Items whose read has returned or is overdue.
     ended: usize,
@@ -199,6 +199,10 @@ impl PendingReads {
         for at in overdue.keys() {
             report_overdue(&path_of(*at), timeout);
         }
+        if !overdue.is_empty() {
+            // The threads that replace the hanging ones need time to start.
+            self.last_event = now;
+        }
         self.ended += overdue.len();
         self.hanging += overdue.len();
         if !self.is_slow_reported
@@ -230,7 +234,7 @@ mod tests {
     use std::sync::{Arc, Condvar, Mutex};
     use std::time::Duration;
 
-    use super::{ReadItem, ReadLimits, THREADS, read_each};
+    use super::{Instant, PendingReads, ReadItem, ReadLimits, THREADS, read_each};
     use crate::runner::stop::{Stop, StopLevel};
 
     /// Opened when hanging reads may return.
@@ -289,6 +293,19 @@ mod tests {
         let wanted = (0..40).map(|number| (!hangs(number)).then_some(number));
         assert_eq!(read, wanted.collect::<Vec<_>>());
         open(&gate);
+    }
+
+    #[test]
+    fn threads_that_replace_hanging_ones_have_time_to_start() {
+        let timeout = Duration::from_secs(5);
+        let mut pending = PendingReads::new(timeout);
+        let begun = Instant::now()
+            .checked_sub(timeout)
+            .expect("an earlier time");
+        pending.started.insert(0, begun);
+        pending.last_event = begun;
+        assert_eq!(pending.check(|_| PathBuf::new()), 1);
+        assert!(pending.next_check() > Instant::now());
     }
 
     #[tokio::test]
