@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 6;
+PRAGMA user_version = 7;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead.
@@ -254,6 +254,14 @@ CREATE TRIGGER manual_alignment_no_update BEFORE UPDATE ON manual_alignment BEGI
 CREATE TRIGGER manual_alignment_no_delete BEFORE DELETE ON manual_alignment BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_update BEFORE UPDATE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_delete BEFORE DELETE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+
+-- Checksums of the rows of other tables, which `record` numbers: see `SealedTable` in `src/catalog/records/checksums.rs`.
+CREATE TABLE checksum (
+    record INTEGER NOT NULL,
+    row INTEGER NOT NULL,
+    value INTEGER NOT NULL,
+    PRIMARY KEY (record, row)
+) STRICT, WITHOUT ROWID;
 
 -- Key for the names of pictures on the review page: they reveal nothing and stay the same after a restart.
 CREATE TABLE review_key (id INTEGER PRIMARY KEY CHECK (id = 1), key BLOB NOT NULL CHECK (length(key) = 32)) STRICT;

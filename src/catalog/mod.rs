@@ -13,7 +13,7 @@ mod records;
 #[cfg(test)]
 mod tests;
 
-pub use audit::integrity::{AuditedPair, AuditedResult, CounterDrift, Drift};
+pub use audit::integrity::{AuditPage, AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, Result};
 pub use db::error_kind::CatalogErrorKind;
@@ -33,6 +33,7 @@ pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;
 pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
+pub use records::checksums::{FaultyRow, RowFault, SealedTable};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{

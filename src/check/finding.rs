@@ -2,8 +2,11 @@
 
 use serde::Serialize;
 
-use crate::catalog::CounterDrift;
-use crate::domain::{PairName, Stage};
+use crate::catalog::{CounterDrift, FaultyRow, SealedTable};
+use crate::domain::{PairId, PairName, Stage};
+
+/// What the user can do about a damaged pair.
+const IMPORT: &str = "import its list again, or restore a backup";
 
 /// Kind of damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -13,6 +16,8 @@ pub enum Kind {
     Database,
     /// A table, index or trigger differs from the schema.
     Schema,
+    /// A row that no run can compute again differs from its checksum, is missing, or has an invalid value.
+    Row,
     /// A row references a missing row.
     Reference,
     /// A counter differs from the number of jobs.
@@ -41,6 +46,7 @@ impl Kind {
         match self {
             Self::Database => "faults of the database",
             Self::Schema => "tables, indexes or triggers that differ from the schema",
+            Self::Row => "damaged rows that no run can compute again",
             Self::Reference => "rows that reference a missing row",
             Self::Counter => "wrong counters",
             Self::JobMissing => "pairs without a job",
@@ -77,6 +83,36 @@ impl Finding {
             stage: None,
             what,
         }
+    }
+
+    /// Describes a row that does not agree with its checksum, and what the user can do.
+    pub(super) fn row(faulty: &FaultyRow) -> Self {
+        let remedy = match faulty.table {
+            SealedTable::Pair => IMPORT,
+            SealedTable::Truth => "import the true alignments again, or restore a backup",
+            SealedTable::Verdict
+            | SealedTable::VerdictUndo
+            | SealedTable::Answer
+            | SealedTable::AnswerUndo
+            | SealedTable::ManualAlignment
+            | SealedTable::ManualAlignmentUndo => {
+                "restore a backup, then import the verdicts that were given since"
+            }
+        };
+        let name = faulty.pair.as_ref();
+        Self {
+            pair: name.and_then(|name| name.parse().ok()),
+            ..Self::new(Kind::Row, format!("{faulty}; {remedy}"))
+        }
+    }
+
+    /// Describes a pair with an invalid value.
+    pub(super) fn unreadable(pair: PairId, reason: &str) -> Self {
+        let what = format!(
+            "row {} of the table pair has an invalid value: {reason}; {IMPORT}",
+            pair.0
+        );
+        Self::new(Kind::Row, what)
     }
 
     /// Describes a wrong counter.

@@ -12,7 +12,9 @@ pub use summary::{CheckSummary, Found, Notes, Repaired, Unreferenced};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use crate::catalog::{AuditedPair, Catalog, CatalogError, CatalogErrorKind, Drift};
+use crate::catalog::{
+    AuditedPair, Catalog, CatalogError, CatalogErrorKind, Drift, FaultyRow, SealedTable,
+};
 use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
@@ -125,17 +127,25 @@ async fn rows_and_files(
         summary.add(Finding::new(Kind::Reference, line));
     }
     counters(catalog, options, summary).await?;
-    // These logs are read only to find rows that cannot be read.
-    catalog.verdict_log(None).await?;
-    catalog.manual_alignments().await?;
-    catalog.attention_check_answers().await?;
+    let faulty = catalog.faulty_rows().await?;
+    for row in &faulty {
+        summary.add(Finding::row(row));
+    }
+    let mut is_readable = true;
     let mut named = ReferencedArtifacts::default();
     let mut after = None;
     loop {
         let page = catalog.audit_page(after, PAGE).await?;
-        let Some(last) = page.last() else { break };
-        after = Some(last.inputs.pair);
-        let checks = check_page(project, page, options.quick).await?;
+        let Some(last) = page.last else { break };
+        after = Some(last);
+        is_readable &= page.unreadable.is_empty();
+        for (pair, reason) in &page.unreadable {
+            let is_listed = |row: &FaultyRow| (row.table, row.row) == (SealedTable::Pair, pair.0);
+            if !faulty.iter().any(is_listed) {
+                summary.add(Finding::unreadable(*pair, reason));
+            }
+        }
+        let checks = check_page(project, page.pairs, options.quick).await?;
         repair_pairs(catalog, options, &checks, summary).await?;
         for check in checks {
             for hash in &check.named {
@@ -147,7 +157,8 @@ async fn rows_and_files(
     if options.repair {
         catalog.remove_stale_files();
     }
-    if !options.in_use {
+    // The files of a pair that cannot be read would look unreferenced.
+    if !options.in_use && is_readable {
         unreferenced_files(project, named, options.repair, summary).await?;
     }
     Ok(())

@@ -3,12 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::finding::{Finding, Kind};
-use crate::catalog::{AuditedPair, AuditedResult, InputVersion};
+use crate::catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
 use crate::domain::{
-    ArtifactSet, ContentHash, JobStatus, PairId, RegisterOutcome, Stage, ThresholdMetric,
+    ArtifactSet, ContentHash, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
+    ThresholdMetric,
 };
 use crate::runner::{metric_results, result_hash};
 use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
+
+/// Largest relative difference between a number and its copy in a column.
+const ROUNDING: f64 = 1e-12;
 
 /// Result of the check of one pair.
 #[derive(Debug)]
@@ -108,7 +112,7 @@ fn state(pair: &AuditedPair) -> Vec<Finding> {
     // Without the depth row, the hashes are unknown, and the metrics are computed again anyway.
     if let (JobStatus::Done, Some(last)) = (status, last)
         && pair.results.contains_key(&Stage::Depth)
-        && metrics_of(pair, last).is_none_or(|metrics| metrics != pair.metrics)
+        && metrics_of(pair, last).is_none_or(|metrics| !agree(&metrics, &pair.metrics))
     {
         add(
             Kind::Metrics,
@@ -134,11 +138,11 @@ fn has_its_hash(result: &AuditedResult) -> bool {
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
 }
 
-/// Returns the hash of each metric's result, computed from the results of the stages.
+/// Returns the result of each metric, computed from the results of the stages.
 fn metrics_of(
     pair: &AuditedPair,
     register: &AuditedResult,
-) -> Option<BTreeMap<ThresholdMetric, ContentHash>> {
+) -> Option<BTreeMap<ThresholdMetric, MetricResult>> {
     let outcome: RegisterOutcome = serde_json::from_str(&register.outcome).ok()?;
     let files = serde_json::from_str(&register.files).ok()?;
     let depth = pair.results.get(&Stage::Depth);
@@ -147,9 +151,50 @@ fn metrics_of(
     let results = metric_results(&outcome.metrics, &files, depth.as_ref()).into_iter();
     Some(
         results
-            .map(|result| (result.outcome.metric, result.result_hash))
+            .map(|result| (result.outcome.metric, result))
             .collect(),
     )
+}
+
+/// Returns whether the rows of the metrics agree with the results that they are copied from. SQLite converts the numbers
+/// from text, which may change their last digit.
+fn agree(
+    computed: &BTreeMap<ThresholdMetric, MetricResult>,
+    stored: &BTreeMap<ThresholdMetric, MetricResult>,
+) -> bool {
+    let is_close = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
+    computed.len() == stored.len()
+        && computed.iter().zip(stored).all(|((_, one), (_, other))| {
+            let (a, b) = (&one.outcome, &other.outcome);
+            let numbers = numbers(a).into_iter().zip(numbers(b));
+            one.result_hash == other.result_hash
+                && (a.metric, a.threshold_level, a.at_bound)
+                    == (b.metric, b.threshold_level, b.at_bound)
+                && a.print_from_depth == b.print_from_depth
+                && a.confidence.is_some() == b.confidence.is_some()
+                && numbers.into_iter().all(|(a, b)| is_close(a, b))
+        })
+}
+
+/// Returns the numbers of a metric's result that are stored in columns of their own.
+fn numbers(outcome: &MetricOutcome) -> [f64; 14] {
+    let scores = &outcome.scores;
+    [
+        outcome.threshold_depth,
+        outcome.angle_deg,
+        outcome.scale,
+        outcome.shift_px[0],
+        outcome.shift_px[1],
+        outcome.margin,
+        outcome.confidence.unwrap_or(0.0),
+        scores.ssim,
+        scores.nl_ssim,
+        scores.iou,
+        scores.iou_box,
+        scores.dice,
+        scores.density_print,
+        scores.density_depth,
+    ]
 }
 
 /// Lists input files that are missing, unreadable or changed since they were read. They are not damage, because a run
@@ -183,8 +228,9 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::{Kind, result_hash, state};
-    use crate::catalog::{AuditedPair, AuditedResult, KnownInputs};
-    use crate::domain::{ArtifactSet, ContentHash, JobStatus, PairId, Stage};
+    use crate::catalog::{AuditedPair, AuditedResult, KnownInputs, MetricResult};
+    use crate::domain::test_values::metric_outcome;
+    use crate::domain::{ArtifactSet, ContentHash, JobStatus, PairId, Stage, ThresholdMetric};
 
     fn pair(status: JobStatus, cursor: i64) -> AuditedPair {
         let outcome = r#"{"ink":0,"metrics":[]}"#.to_owned();
@@ -248,10 +294,12 @@ mod tests {
         failed.has_failure = true;
         assert_eq!(found(&failed), []);
         let mut done = pair(JobStatus::Done, 4);
-        done.metrics.insert(
-            crate::domain::ThresholdMetric::Ensemble,
-            ContentHash::of(b""),
-        );
+        let metric = metric_outcome(ThresholdMetric::Ensemble, 0.9);
+        let result = MetricResult {
+            result_hash: ContentHash::of(b""),
+            outcome: metric,
+        };
+        done.metrics.insert(ThresholdMetric::Ensemble, result);
         assert_eq!(found(&done), [(Kind::Metrics, Stage::Register)]);
     }
 }

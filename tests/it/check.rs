@@ -290,12 +290,19 @@ fn rows_that_cannot_be_read_are_damage_for_every_command() {
         let project = done(dir.path());
         sql(&project, statements);
         let found = at(&project, &["check"]).expect(12);
-        assert!(found.out.contains("column"), "{statements}: {}", found.out);
+        assert!(
+            found.out.contains("differs from its checksum"),
+            "{statements}: {}",
+            found.out
+        );
         let unread = at(&project, &["export", "-o", "export"]).expect(12);
         assert!(unread.err.contains("`check`"), "{}", unread.err);
         if statements.contains("id = 2") {
             for text in [&found.out, &unread.err] {
-                assert!(text.contains("row 2 of the pairs"), "{text}");
+                assert!(
+                    text.contains("row 2 of the table pair (pair upright-0001)"),
+                    "{text}"
+                );
             }
         }
     }

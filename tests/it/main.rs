@@ -5,6 +5,7 @@ mod agreement;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
+mod bit_flips;
 mod browser;
 mod check;
 mod cli;

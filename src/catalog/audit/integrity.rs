@@ -11,11 +11,13 @@ use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
+use crate::catalog::queue::lease::MetricResult;
 use crate::catalog::records::model::PairAttributes;
 use crate::catalog::records::pair_work::{self, KnownInputs};
-use crate::catalog::records::stage_results;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
+use crate::domain::{
+    ContentHash, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage, ThresholdMetric,
+};
 
 /// Largest number of broken references that a check lists.
 const LINES: usize = 50;
@@ -43,7 +45,7 @@ pub struct CounterDrift {
 }
 
 /// A pair as stored, with unparsed results.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AuditedPair {
     /// The user's id.
     pub name: PairName,
@@ -53,10 +55,21 @@ pub struct AuditedPair {
     pub job: Option<(JobStatus, i64)>,
     /// Whether a failure is stored.
     pub has_failure: bool,
-    /// Every stored result, also of stages that are to run again.
+    /// Every stored result, also of stages that are to run again. Results with invalid values are left out.
     pub results: BTreeMap<Stage, AuditedResult>,
-    /// Hash of each metric with a row.
-    pub metrics: BTreeMap<ThresholdMetric, ContentHash>,
+    /// The rows of the metrics. Rows with invalid values are left out.
+    pub metrics: BTreeMap<ThresholdMetric, MetricResult>,
+}
+
+/// Pairs that a check has read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AuditPage {
+    /// The pairs, sorted by id.
+    pub pairs: Vec<AuditedPair>,
+    /// Pairs with an invalid value, and messages.
+    pub unreadable: Vec<(PairId, String)>,
+    /// Id of the last pair. `None` if there are no more pairs.
+    pub last: Option<PairId>,
 }
 
 /// A stored result, left unparsed so that a check can also read invalid values.
@@ -105,6 +118,9 @@ WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
 pub(crate) const RESULTS: &str = "
 SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
+
+const METRICS: &str = "
+SELECT m.* FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = wanted.value";
 
 impl Catalog {
     /// Runs SQLite's integrity check. Returns at most 50 faults, or none if the file is sound. With `quick`, does not
@@ -191,34 +207,32 @@ impl Catalog {
         Ok(Drift { counters, marks })
     }
 
-    /// Returns up to `limit` pairs with ids above `after`, sorted by id. Returns an empty list at the end.
+    /// Reads up to `limit` pairs with ids above `after`.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails, or if a stored value is invalid.
-    pub async fn audit_page(
-        &self,
-        after: Option<PairId>,
-        limit: usize,
-    ) -> Result<Vec<AuditedPair>> {
+    /// Returns an error if a database operation fails.
+    pub async fn audit_page(&self, after: Option<PairId>, limit: usize) -> Result<AuditPage> {
         let mut conn = self.snapshot().await?;
         let query = sqlx::query(PAGE).bind(after.map_or(0, |pair| pair.0));
         let found = query.bind(limit as i64).fetch_all(&mut *conn).await?;
-        let mut pairs = found
-            .iter()
-            .map(readable_pair)
-            .collect::<Result<Vec<_>>>()?;
-        let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
-        let mut results = stored(&mut conn, &ids).await?;
-        let mut metrics: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
-        for ((id, metric), hash) in stage_results::metric_hashes(&mut conn, &ids).await? {
-            metrics.entry(id).or_default().insert(metric, hash);
+        let mut page = AuditPage::default();
+        for row in &found {
+            let id = PairId(row.try_get("id")?);
+            page.last = Some(id);
+            match pair(row) {
+                Ok(pair) => page.pairs.push(pair),
+                Err(error) => page.unreadable.push((id, error.to_string())),
+            }
         }
-        for pair in &mut pairs {
+        let ids = json_array(page.pairs.iter().map(|pair| pair.inputs.pair.0));
+        let mut results = stored_results(&mut conn, &ids).await?;
+        let mut metrics = stored_metrics(&mut conn, &ids).await?;
+        for pair in &mut page.pairs {
             let id = pair.inputs.pair.0;
             pair.results = results.remove(&id).unwrap_or_default();
             pair.metrics = metrics.remove(&id).unwrap_or_default();
         }
-        Ok(pairs)
+        Ok(page)
     }
 }
 
@@ -278,12 +292,6 @@ pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
     objects(&mut conn).await
 }
 
-/// Reads a pair; an error names its row.
-fn readable_pair(row: &SqliteRow) -> Result<AuditedPair> {
-    let id: i64 = row.try_get("id")?;
-    pair(row).map_err(|error| error.in_pair(id))
-}
-
 fn pair(row: &SqliteRow) -> Result<AuditedPair> {
     // Every column must be readable, also those that are not checked otherwise.
     PairAttributes::from_row(row)?;
@@ -298,17 +306,63 @@ fn pair(row: &SqliteRow) -> Result<AuditedPair> {
     })
 }
 
-async fn stored(
+/// Returns the results by pair and stage. Leaves out rows with invalid values.
+async fn stored_results(
     conn: &mut SqliteConnection,
-    pairs: &[i64],
+    pairs: &str,
 ) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
-    let query = sqlx::query(RESULTS).bind(json_array(pairs.iter().copied()));
+    let query = sqlx::query(RESULTS).bind(pairs);
     let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
     for row in &query.fetch_all(conn).await? {
-        let of_pair = results.entry(row.try_get("pair")?).or_default();
-        of_pair.insert(row.try_get("stage")?, AuditedResult::from_row(row)?);
+        if let (Ok(stage), Ok(result)) = (row.try_get("stage"), AuditedResult::from_row(row)) {
+            let of_pair = results.entry(row.try_get("pair")?).or_default();
+            of_pair.insert(stage, result);
+        }
     }
     Ok(results)
+}
+
+/// Returns the rows of the metrics by pair. Leaves out rows with invalid values.
+async fn stored_metrics(
+    conn: &mut SqliteConnection,
+    pairs: &str,
+) -> Result<BTreeMap<i64, BTreeMap<ThresholdMetric, MetricResult>>> {
+    let query = sqlx::query(METRICS).bind(pairs);
+    let mut metrics: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+    for row in &query.fetch_all(conn).await? {
+        if let Ok(result) = metric(row) {
+            let of_pair = metrics.entry(row.try_get("pair")?).or_default();
+            of_pair.insert(result.outcome.metric, result);
+        }
+    }
+    Ok(metrics)
+}
+
+fn metric(row: &SqliteRow) -> Result<MetricResult> {
+    Ok(MetricResult {
+        outcome: MetricOutcome {
+            metric: row.try_get("metric")?,
+            threshold_level: row.try_get("threshold_level")?,
+            threshold_depth: row.try_get("threshold_depth")?,
+            print_from_depth: row.try_get("print_from_depth")?,
+            angle_deg: row.try_get("angle_deg")?,
+            scale: row.try_get("scale")?,
+            shift_px: [row.try_get("shift_x_px")?, row.try_get("shift_y_px")?],
+            scores: Scores {
+                ssim: row.try_get("ssim")?,
+                nl_ssim: row.try_get("nl_ssim")?,
+                iou: row.try_get("iou")?,
+                iou_box: row.try_get("iou_box")?,
+                dice: row.try_get("dice")?,
+                density_print: row.try_get("density_print")?,
+                density_depth: row.try_get("density_depth")?,
+            },
+            margin: row.try_get("margin")?,
+            confidence: row.try_get("confidence")?,
+            at_bound: row.try_get("at_bound")?,
+        },
+        result_hash: row.try_get("result_hash")?,
+    })
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema. Versions 1 to 5 were never released.
-const SCHEMA_VERSION: i64 = 6;
+const SCHEMA_VERSION: i64 = 7;
 /// Read connections per process.
 const READERS: u32 = 4;
 

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::rows::json_array;
+use crate::catalog::records::checksums::{self, SealedTable};
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::PairName;
 
@@ -41,8 +42,10 @@ pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)
         if let Some(name) = unknown.fetch_optional(&mut *conn).await? {
             return Err(CatalogError::UnknownPair(name));
         }
-        let set = sqlx::query(SET).bind(items);
-        stored += set.fetch_all(&mut *conn).await?.len() as u64;
+        let set = sqlx::query_scalar(SET).bind(items);
+        let pairs: Vec<i64> = set.fetch_all(&mut *conn).await?;
+        checksums::seal(conn, SealedTable::Truth, &pairs).await?;
+        stored += pairs.len() as u64;
     }
     Ok(stored)
 }

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use sqlx::SqliteConnection;
+use sqlx::{FromRow as _, Row as _, SqliteConnection};
 use tokio::sync::mpsc;
 
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
+use crate::catalog::records::checksums::{self, SealedTable};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -64,7 +65,8 @@ ON CONFLICT (name) DO UPDATE SET
     mesh_stat = iif(mesh_path = excluded.mesh_path, mesh_stat, ''), mesh_path = excluded.mesh_path,
     print_stat = iif(print_path = excluded.print_path, print_stat, ''), print_path = excluded.print_path,
     unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
-    block = excluded.block, meta = excluded.meta, attributes = excluded.attributes";
+    block = excluded.block, meta = excluded.meta, attributes = excluded.attributes
+RETURNING id";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
@@ -145,23 +147,34 @@ async fn import_chunk(
     summary: &mut ImportSummary,
 ) -> Result<()> {
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
-    let known = sqlx::query_as(SELECT).bind(&names);
-    let known: Vec<PairAttributes> = known.fetch_all(&mut *conn).await?;
-    let known = known.into_iter().map(|old| (old.name.clone(), old));
-    let mut known: BTreeMap<_, _> = known.collect();
+    let known = sqlx::query(SELECT).bind(&names);
+    let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
+    for row in &known.fetch_all(&mut *conn).await? {
+        // A row with an invalid value is replaced.
+        stored.insert(row.try_get("name")?, PairAttributes::from_row(row).ok());
+    }
     for row in chunk {
-        match known.insert(row.name.clone(), row.clone()) {
-            None => summary.added += 1,
-            Some(old) if old == *row => summary.unchanged += 1,
-            Some(old) => summary.changed.push(PairChange {
-                name: row.name.clone(),
-                fields: differing(&old, row),
-            }),
-        }
+        let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
+            None => {
+                summary.added += 1;
+                continue;
+            }
+            Some(Some(old)) if old == *row => {
+                summary.unchanged += 1;
+                continue;
+            }
+            Some(Some(old)) => differing(&old, row),
+            Some(None) => vec!["a damaged value"],
+        };
+        summary.changed.push(PairChange {
+            name: row.name.clone(),
+            fields,
+        });
     }
     let items = json_array(chunk.iter().map(item));
-    let upsert = sqlx::query(UPSERT).bind(items).bind(now);
-    upsert.execute(&mut *conn).await?;
+    let upsert = sqlx::query_scalar(UPSERT).bind(items).bind(now);
+    let rows: Vec<i64> = upsert.fetch_all(&mut *conn).await?;
+    checksums::seal(conn, SealedTable::Pair, &rows).await?;
     sqlx::query(NEW_JOBS).bind(names).execute(conn).await?;
     Ok(())
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::catalog::records::checksums::{self, SealedTable};
 use crate::catalog::records::review_answers::pair_id;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
@@ -57,7 +58,9 @@ pub struct StoredAlignment {
 const INSERT: &str = "
 INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, seen, print_from_depth, print_from_mesh,
     iou, dice, reviewer, note, at)
-VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT (event) DO NOTHING";
+SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13
+WHERE NOT EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1)
+RETURNING id";
 
 const LOG: &str = "
 SELECT a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash,
@@ -83,7 +86,7 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let pair = pair_id(conn, &made.pair).await?;
-                let stored = sqlx::query(INSERT)
+                let stored: Option<i64> = sqlx::query_scalar(INSERT)
                     .bind(&made.event)
                     .bind(pair)
                     .bind(&made.mesh_hash.as_bytes()[..])
@@ -97,9 +100,10 @@ impl Catalog {
                     .bind(&made.reviewer)
                     .bind(&made.note)
                     .bind(now)
-                    .execute(conn)
+                    .fetch_optional(&mut *conn)
                     .await?;
-                Ok(stored.rows_affected() > 0)
+                checksums::seal(conn, SealedTable::ManualAlignment, stored.as_slice()).await?;
+                Ok(stored.is_some())
             })
         })
         .await

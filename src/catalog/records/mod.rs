@@ -1,5 +1,6 @@
 //! Data of pairs: imports, results, verdicts, review answers and counts.
 
+pub(crate) mod checksums;
 pub(crate) mod ground_truth;
 pub(crate) mod import;
 pub(crate) mod manual_alignments;

@@ -4,6 +4,7 @@ use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _, SqliteConnection};
 
+use crate::catalog::records::checksums::{self, SealedTable};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -100,7 +101,8 @@ pub struct AttentionCheckAnswer {
 const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
     verdict, reviewer, reason, note, at)
-VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)";
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)
+RETURNING id";
 
 /// Whether an answer with this event is stored.
 const KNOWN: &str = "
@@ -123,14 +125,23 @@ SELECT c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "c
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
 ORDER BY c.id"#;
 
-/// Statements that undo what a reviewer stored under an event id. A second undo has no effect.
-const UNDO: [&str; 3] = [
-    "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
-        WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
-    "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
-        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
-    "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
-        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
+/// Statements that undo what a reviewer stored under an event id, with their tables. A second undo has no effect.
+const UNDO: [(SealedTable, &str); 3] = [
+    (
+        SealedTable::VerdictUndo,
+        "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
+        WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING act",
+    ),
+    (
+        SealedTable::AnswerUndo,
+        "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
+        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING answer",
+    ),
+    (
+        SealedTable::ManualAlignmentUndo,
+        "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
+        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING alignment",
+    ),
 ];
 
 /// Whether a reviewer stored anything under an event id, undone or not.
@@ -199,13 +210,10 @@ impl Catalog {
                 if !exists {
                     return Err(CatalogError::NothingToUndo(Some(reviewer)));
                 }
-                for undo in UNDO {
-                    sqlx::query(undo)
-                        .bind(&event)
-                        .bind(&reviewer)
-                        .bind(now)
-                        .execute(&mut *conn)
-                        .await?;
+                for (table, undo) in UNDO {
+                    let undo = sqlx::query_scalar(undo).bind(&event).bind(&reviewer);
+                    let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
+                    checksums::seal(conn, table, &undone).await?;
                 }
                 Ok(())
             })
@@ -262,7 +270,7 @@ async fn insert_check(
     now: UnixMillis,
 ) -> Result<()> {
     let look = &given.look;
-    sqlx::query(INSERT_CHECK)
+    let row: i64 = sqlx::query_scalar(INSERT_CHECK)
         .bind(&look.event)
         .bind(pair)
         .bind(metric.name())
@@ -277,7 +285,7 @@ async fn insert_check(
         .bind(given.reason.map(Reason::name))
         .bind(&given.note)
         .bind(given.at.unwrap_or(now))
-        .execute(conn)
+        .fetch_one(&mut *conn)
         .await?;
-    Ok(())
+    checksums::seal(conn, SealedTable::Answer, &[row]).await
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::rows::json_array;
+use crate::catalog::records::checksums::{self, SealedTable};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
@@ -102,7 +103,7 @@ INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, 
     event, seen, shown_ms, angle_read_deg, review_order)
 SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
-RETURNING act";
+RETURNING id, act";
 
 /// Selects the verdict log. If not NULL, `?1` limits it to one action and `?2` to one pair.
 const LOG: &str = "
@@ -166,6 +167,7 @@ impl Catalog {
                     .bind(now)
                     .execute(&mut *conn)
                     .await?;
+                checksums::seal(conn, SealedTable::VerdictUndo, &[act]).await?;
                 let query = sqlx::query_as(LOG).bind(act).bind(None::<&str>);
                 Ok(query.fetch_all(conn).await?)
             })
@@ -220,7 +222,7 @@ pub(crate) async fn insert(
     now: UnixMillis,
 ) -> Result<Option<i64>> {
     let look = &new.look;
-    let act = sqlx::query_scalar(INSERT)
+    let inserted: Option<(i64, i64)> = sqlx::query_as(INSERT)
         .bind(act)
         .bind(pair)
         .bind(metric.name())
@@ -235,9 +237,13 @@ pub(crate) async fn insert(
         .bind(look.shown_ms.map(u64::cast_signed))
         .bind(look.angle_read_deg)
         .bind(look.review_order.map(ReviewOrder::name))
-        .fetch_optional(conn)
+        .fetch_optional(&mut *conn)
         .await?;
-    Ok(act)
+    let Some((row, act)) = inserted else {
+        return Ok(None);
+    };
+    checksums::seal(conn, SealedTable::Verdict, &[row]).await?;
+    Ok(Some(act))
 }
 
 /// Reads the log of one pair or all.

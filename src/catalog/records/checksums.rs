@@ -1,0 +1,343 @@
+//! Checksums of the rows that no run can compute again, so that a check finds changed, added and removed rows.
+//!
+//! The table `checksum` has a row for each row of the tables in [`SealedTable`], written in the same transaction. A
+//! checksum is the first 64 bits of a BLAKE3 hash of the row's columns. In a log that only grows, it also covers the
+//! checksum of the row before, so that a row cannot be removed together with its checksum.
+
+use serde_json::json;
+use sqlx::error::BoxDynError;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Decode, Row as _, Sqlite, SqliteConnection, TypeInfo as _, ValueRef as _};
+
+use crate::catalog::db::rows::json_array;
+use crate::catalog::{Catalog, CatalogError, Result};
+use crate::domain::{ContentHash, enum_names};
+
+/// Number of rows that are read at a time.
+const PAGE: i64 = 2000;
+
+/// A table whose rows have checksums.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SealedTable {
+    /// Pairs as imported.
+    Pair,
+    /// True alignments.
+    Truth,
+    /// The log of verdicts.
+    Verdict,
+    /// Undone verdicts.
+    VerdictUndo,
+    /// The log of answers to attention checks.
+    Answer,
+    /// Undone answers to attention checks.
+    AnswerUndo,
+    /// The log of manual alignments.
+    ManualAlignment,
+    /// Undone manual alignments.
+    ManualAlignmentUndo,
+}
+
+enum_names! { pub SealedTable, "a table with checksums":
+    Pair = "pair", Truth = "truth", Verdict = "verdict", VerdictUndo = "verdict_undo",
+    Answer = "attention_check_answer", AnswerUndo = "attention_check_undo",
+    ManualAlignment = "manual_alignment", ManualAlignmentUndo = "manual_alignment_undo",
+}
+
+/// What is wrong with a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowFault {
+    /// The row differs from its checksum.
+    Changed,
+    /// The row is missing, but its checksum is stored.
+    Removed,
+    /// The row has no checksum.
+    Added,
+    /// Rows at the end of a log are missing, with their checksums.
+    CutOff,
+}
+
+/// A row that does not agree with its checksum.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultyRow {
+    /// The table.
+    pub table: SealedTable,
+    /// The row's number.
+    pub row: i64,
+    /// Name of the pair that the row belongs to, if it is known. The name may be damaged too.
+    pub pair: Option<String>,
+    /// What is wrong.
+    pub fault: RowFault,
+}
+
+impl std::fmt::Display for FaultyRow {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (row, table) = (self.row, self.table);
+        let of_pair = self.pair.as_ref();
+        let of_pair = of_pair.map_or_else(String::new, |pair| format!(" (pair {pair})"));
+        match self.fault {
+            RowFault::Changed => {
+                write!(
+                    f,
+                    "row {row} of the table {table}{of_pair} differs from its checksum"
+                )
+            }
+            RowFault::Removed => write!(f, "row {row} of the table {table} is missing"),
+            RowFault::Added => write!(f, "row {row} of the table {table}{of_pair} has no checksum"),
+            RowFault::CutOff => write!(
+                f,
+                "the last rows of the table {table}, up to row {row}, are missing"
+            ),
+        }
+    }
+}
+
+/// The statements of one table.
+struct Statements {
+    /// Selects the rows of a list of numbers.
+    listed: &'static str,
+    /// Selects a page of rows with their checksums.
+    page: &'static str,
+    /// Selects the numbers of checksums without a row.
+    removed: &'static str,
+    /// Whether a checksum covers the checksum before.
+    is_chained: bool,
+}
+
+/// Builds the statements of a table from its name, its key, the columns that are covered, and the row's pair.
+///
+/// The first columns of a row are its number, its checksum, the checksum before, and the name of its pair.
+macro_rules! statements {
+    ($table:literal, $key:literal, $columns:literal, $pair:literal, $is_chained:literal) => {
+        Statements {
+            listed: concat!(
+                "SELECT t.",
+                $key,
+                ", NULL, NULL, NULL, ",
+                $columns,
+                " FROM json_each(?1) AS wanted CROSS JOIN ",
+                $table,
+                " AS t ON t.",
+                $key,
+                " = wanted.value ORDER BY 1"
+            ),
+            page: concat!(
+                "SELECT t.",
+                $key,
+                ", c.value, (SELECT value FROM checksum WHERE record = ?1 AND row < t.",
+                $key,
+                " ORDER BY row DESC LIMIT 1), (SELECT p.name FROM pair AS p WHERE p.id = ",
+                $pair,
+                "), ",
+                $columns,
+                " FROM ",
+                $table,
+                " AS t LEFT JOIN checksum AS c ON c.record = ?1 AND c.row = t.",
+                $key,
+                " WHERE t.",
+                $key,
+                " > ?2 ORDER BY 1 LIMIT ?3"
+            ),
+            removed: concat!(
+                "SELECT row FROM checksum AS c WHERE record = ?1 AND NOT EXISTS (SELECT 1 FROM ",
+                $table,
+                " AS t WHERE t.",
+                $key,
+                " = c.row) ORDER BY 1"
+            ),
+            is_chained: $is_chained,
+        }
+    };
+}
+
+impl SealedTable {
+    #[rustfmt::skip]
+    const fn statements(self) -> Statements {
+        match self {
+            Self::Pair => statements!("pair", "id",
+                "t.name, t.mesh_path, t.print_path, t.unit, t.scanned_face_down, t.character, t.block, t.meta, \
+                 t.attributes, t.imported",
+                "t.id", false),
+            Self::Truth => statements!("truth", "pair", "t.body", "t.pair", false),
+            Self::Verdict => statements!("verdict", "id", "t.*", "t.pair", true),
+            Self::VerdictUndo => statements!("verdict_undo", "act", "t.*",
+                "(SELECT v.pair FROM verdict AS v WHERE v.act = t.act)", false),
+            Self::Answer => statements!("attention_check_answer", "id", "t.*", "t.pair", true),
+            Self::AnswerUndo => statements!("attention_check_undo", "answer", "t.*",
+                "(SELECT a.pair FROM attention_check_answer AS a WHERE a.id = t.answer)", false),
+            Self::ManualAlignment => statements!("manual_alignment", "id", "t.*", "t.pair", true),
+            Self::ManualAlignmentUndo => statements!("manual_alignment_undo", "alignment", "t.*",
+                "(SELECT a.pair FROM manual_alignment AS a WHERE a.id = t.alignment)", false),
+        }
+    }
+
+    /// Returns the number by which the table `checksum` refers to this table.
+    const fn code(self) -> i64 {
+        self as i64
+    }
+}
+
+/// Index of the first covered column in the rows of [`Statements`].
+const COVERED: usize = 4;
+
+const LAST: &str =
+    "SELECT value FROM checksum WHERE record = ?1 AND row < ?2 ORDER BY row DESC LIMIT 1";
+
+const STORE: &str = "
+INSERT INTO checksum (record, row, value) SELECT ?1, value ->> 0, value ->> 1 FROM json_each(?2) WHERE true
+ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
+
+/// Selects the largest row number that a log has had, if its rows with larger numbers than ?2 are missing.
+const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
+
+/// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
+pub(crate) async fn seal(
+    conn: &mut SqliteConnection,
+    table: SealedTable,
+    rows: &[i64],
+) -> Result<()> {
+    let Some(first) = rows.iter().min() else {
+        return Ok(());
+    };
+    let statements = table.statements();
+    let mut before: Option<i64> = None;
+    if statements.is_chained {
+        let last = sqlx::query_scalar(LAST).bind(table.code()).bind(first);
+        before = last.fetch_optional(&mut *conn).await?;
+    }
+    let listed = sqlx::query(statements.listed).bind(json_array(rows.iter().copied()));
+    let mut sealed = Vec::new();
+    for row in &listed.fetch_all(&mut *conn).await? {
+        let value = checksum(table, row, before)?;
+        sealed.push(json!([row.try_get::<i64, _>(0)?, value]));
+        before = statements.is_chained.then_some(value);
+    }
+    let store = sqlx::query(STORE).bind(table.code());
+    store.bind(json_array(sealed)).execute(conn).await?;
+    Ok(())
+}
+
+/// Returns the first 64 bits of the hash of a row's covered columns, its table, its number and the checksum before.
+fn checksum(table: SealedTable, row: &SqliteRow, before: Option<i64>) -> Result<i64> {
+    let mut bytes = Vec::with_capacity(512);
+    bytes.extend(table.code().to_le_bytes());
+    bytes.extend(row.try_get::<i64, _>(0)?.to_le_bytes());
+    bytes.extend(before.unwrap_or(0).to_le_bytes());
+    for column in COVERED..row.len() {
+        add_value(&mut bytes, row, column).map_err(|source| sqlx::Error::ColumnDecode {
+            index: column.to_string(),
+            source,
+        })?;
+    }
+    let hash = ContentHash::of(&bytes);
+    let (first, _) = hash.as_bytes().split_at(8);
+    Ok(i64::from_le_bytes(first.try_into().unwrap_or_default()))
+}
+
+/// Appends the type, the length and the bytes of a stored value. Text may be invalid UTF-8.
+fn add_value(bytes: &mut Vec<u8>, row: &SqliteRow, column: usize) -> Result<(), BoxDynError> {
+    let value = row.try_get_raw(column)?;
+    let type_info = value.type_info();
+    let name = type_info.name();
+    bytes.extend(name.as_bytes());
+    match name {
+        "NULL" => {}
+        "INTEGER" => bytes.extend(<i64 as Decode<Sqlite>>::decode(value)?.to_le_bytes()),
+        "REAL" => bytes.extend(<f64 as Decode<Sqlite>>::decode(value)?.to_le_bytes()),
+        _ => {
+            let content = <&[u8] as Decode<Sqlite>>::decode(value)?;
+            bytes.extend((content.len() as u64).to_le_bytes());
+            bytes.extend(content);
+        }
+    }
+    Ok(())
+}
+
+impl Catalog {
+    /// Compares the rows of all tables in [`SealedTable`] with their checksums. Returns the rows that do not agree.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn faulty_rows(&self) -> Result<Vec<FaultyRow>> {
+        let mut conn = self.snapshot().await?;
+        let mut faulty = Vec::new();
+        for table in SealedTable::ALL {
+            faulty_rows(&mut conn, table, &mut faulty).await?;
+        }
+        Ok(faulty)
+    }
+
+    /// Fails if a pair, a true alignment, a verdict or a manual alignment was changed outside of this program.
+    ///
+    /// # Errors
+    /// Returns an error that names the first faulty row, or an error if a database operation fails.
+    pub async fn require_sealed(&self) -> Result<()> {
+        match self.faulty_rows().await?.first() {
+            None => Ok(()),
+            Some(faulty) => Err(CatalogError::Corrupt(faulty.to_string())),
+        }
+    }
+}
+
+async fn faulty_rows(
+    conn: &mut SqliteConnection,
+    table: SealedTable,
+    faulty: &mut Vec<FaultyRow>,
+) -> Result<()> {
+    let statements = table.statements();
+    let fault = |row, pair, fault| FaultyRow {
+        table,
+        row,
+        pair,
+        fault,
+    };
+    let mut after = i64::MIN;
+    loop {
+        let page = sqlx::query(statements.page).bind(table.code());
+        let page = page.bind(after).bind(PAGE).fetch_all(&mut *conn).await?;
+        let Some(last) = page.last() else { break };
+        after = last.try_get(0)?;
+        for row in &page {
+            let stored: Option<i64> = row.try_get(1)?;
+            let before = if statements.is_chained {
+                row.try_get(2)?
+            } else {
+                None
+            };
+            if stored != Some(checksum(table, row, before)?) {
+                let kind = stored.map_or(RowFault::Added, |_| RowFault::Changed);
+                faulty.push(fault(row.try_get(0)?, pair_name(row)?, kind));
+            }
+        }
+    }
+    let removed = sqlx::query_scalar(statements.removed).bind(table.code());
+    let removed: Vec<i64> = removed.fetch_all(&mut *conn).await?;
+    faulty.extend(
+        removed
+            .into_iter()
+            .map(|row| fault(row, None, RowFault::Removed)),
+    );
+    if statements.is_chained {
+        let last: Option<i64> = sqlx::query_scalar(LAST_ROW)
+            .bind(table.code())
+            .fetch_one(&mut *conn)
+            .await?;
+        let cut_off = sqlx::query_scalar(CUT_OFF)
+            .bind(table.name())
+            .bind(last.unwrap_or(0));
+        let cut_off: Option<i64> = cut_off.fetch_optional(&mut *conn).await?;
+        faulty.extend(cut_off.map(|row| fault(row, None, RowFault::CutOff)));
+    }
+    Ok(())
+}
+
+const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
+
+/// Returns the name of a row's pair. Invalid UTF-8 is replaced, because the name may be what is damaged.
+fn pair_name(row: &SqliteRow) -> Result<Option<String>> {
+    let value = row.try_get_raw(3)?;
+    if value.is_null() {
+        return Ok(None);
+    }
+    let name = <&[u8] as Decode<Sqlite>>::decode(value).map_err(sqlx::Error::Decode)?;
+    Ok(Some(String::from_utf8_lossy(name).into_owned()))
+}

@@ -1,0 +1,170 @@
+//! Single flipped bits of the catalog. A check finds each one, or no output changes. `MOCBAN_TRIALS` sets the number.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use mocban::store::Project;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+
+use crate::check::{at, below, done, sql};
+use crate::page::{Page, answer};
+use crate::resume::copy;
+use crate::test_size::trials;
+
+/// Judges the pairs of a project: verdicts, undone verdicts, answers to attention checks and a manual alignment.
+fn judge(project: &Project) {
+    for (pair, verdict) in [("upright-0000", "pass"), ("upright-0001", "unsure")] {
+        let set = ["verdict", "set", pair, verdict, "--reviewer", "hà"];
+        at(project, &set).expect(0);
+    }
+    at(project, &["verdict", "undo", "--reviewer", "hà"]).expect(0);
+    let page = Page::open(project, "lan", &["--attention-checks", "1"]);
+    let queue = page.queue();
+    for (k, item) in queue.iter().enumerate() {
+        let body = answer(&format!("e{k}"), item, "pass");
+        assert_eq!(
+            page.post("/api/answer", &body).expect("a reply").status,
+            200
+        );
+    }
+    let undo = json!({ "event": "e0" });
+    assert_eq!(page.post("/api/undo", &undo).expect("a reply").status, 200);
+    let id = queue[0]["id"].as_str().expect("an id");
+    let start = page.get(&format!("/api/alignment/{id}")).json();
+    let map = &start["view_from_depth"];
+    let align = json!({ "event": "a1", "item": id, "view_from_depth": map, "note": null });
+    assert_eq!(
+        page.post("/api/align", &align).expect("a reply").status,
+        200
+    );
+}
+
+/// What users see of a project.
+#[derive(Debug, PartialEq)]
+struct Outputs {
+    texts: Vec<String>,
+    export: BTreeMap<PathBuf, Vec<u8>>,
+}
+
+/// Returns the outputs, or the exit codes of the commands if one of them fails.
+fn outputs(project: &Project) -> Result<Outputs, Vec<i32>> {
+    let export = project.dir().with_file_name("export");
+    let _ = std::fs::remove_dir_all(&export);
+    let path = export.to_str().expect("UTF-8");
+    let commands = [
+        &["report", "-f", "json"][..],
+        &["verdict", "log", "--json"],
+        &["status", "--json"],
+        &["export", "-o", path],
+    ];
+    let calls: Vec<_> = commands.iter().map(|args| at(project, args)).collect();
+    if calls.iter().any(|call| call.code != 0) {
+        return Err(calls.iter().map(|call| call.code).collect());
+    }
+    Ok(Outputs {
+        texts: calls[..3].iter().map(|call| call.out.clone()).collect(),
+        export: below(&export).into_iter().collect(),
+    })
+}
+
+#[test]
+fn every_flipped_bit_is_found_or_changes_no_output() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let original = done(dir.path());
+    judge(&original);
+    at(&original, &["check"]).expect(0);
+    let expected = outputs(&original).expect("outputs");
+    let intact = std::fs::read(original.catalog_path()).expect("read");
+    let mut rng = ChaCha8Rng::seed_from_u64(20);
+    let mut tally: BTreeMap<&str, usize> = BTreeMap::new();
+    for trial in 0..trials(30) {
+        let project = copy(&original, &dir.path().join(format!("p{trial}")));
+        let (byte, bit) = (rng.random_range(0..intact.len()), rng.random_range(0..8));
+        let mut flipped = intact.clone();
+        flipped[byte] ^= 1 << bit;
+        std::fs::write(project.catalog_path(), &flipped).expect("written");
+        let at_bit = format!("byte {byte} bit {bit}");
+        let code = at(&project, &["check"]).code;
+        let outcome = match code {
+            0 => {
+                assert_eq!(
+                    outputs(&project).as_ref(),
+                    Ok(&expected),
+                    "{at_bit}: not found"
+                );
+                "harmless"
+            }
+            12 if at(&project, &["check", "--repair"]).code == 0 => {
+                at(&project, &["run"]).expect(0);
+                at(&project, &["check"]).expect(0);
+                let healed = outputs(&project).expect("outputs");
+                assert_eq!(healed.export, expected.export, "{at_bit}: healed");
+                "healed"
+            }
+            12 => "found",
+            code => panic!("{at_bit}: check ended with {code}"),
+        };
+        *tally.entry(outcome).or_default() += 1;
+        std::fs::remove_dir_all(project.dir()).expect("removed");
+    }
+    eprintln!("{tally:?}");
+}
+
+#[test]
+fn changed_added_and_removed_rows_are_named_with_their_pair() {
+    let cases = [
+        (
+            "DROP TRIGGER verdict_no_update; UPDATE verdict SET verdict = 'fail' WHERE id = 1",
+            "row 1 of the table verdict (pair upright-0000) differs from its checksum",
+        ),
+        (
+            "DROP TRIGGER verdict_no_delete; DELETE FROM verdict WHERE id = 2;
+            DELETE FROM checksum WHERE record = 2 AND row = 2",
+            "row 3 of the table verdict (pair upright-0000) differs from its checksum",
+        ),
+        (
+            "DROP TRIGGER verdict_no_delete; DELETE FROM verdict WHERE id = 4;
+            DELETE FROM checksum WHERE record = 2 AND row = 4",
+            "the last rows of the table verdict, up to row 4, are missing",
+        ),
+        (
+            "DELETE FROM truth WHERE pair = 1",
+            "row 1 of the table truth is missing",
+        ),
+        (
+            "INSERT INTO verdict_undo (act, at) VALUES (1, 7)",
+            "row 1 of the table verdict_undo (pair upright-0000) has no checksum",
+        ),
+        (
+            "UPDATE pair SET character = 'x' WHERE id = 2",
+            "row 2 of the table pair (pair upright-0001) differs from its checksum",
+        ),
+    ];
+    for (statements, says) in cases {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = done(dir.path());
+        sql(&project, statements);
+        let found = at(&project, &["check", "--repair"]).expect(12);
+        assert!(found.out.contains(says), "{statements}: {}", found.out);
+        for command in [&["report"][..], &["verdict", "log"], &["export", "-o", "x"]] {
+            at(&project, command).expect(12);
+        }
+    }
+}
+
+#[test]
+fn an_import_replaces_a_damaged_row() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    for damage in ["CAST(x'ff' AS TEXT)", "'other'"] {
+        sql(
+            &project,
+            &format!("UPDATE pair SET character = {damage} WHERE id = 2"),
+        );
+        at(&project, &["check"]).expect(12);
+        at(&project, &["import", "data/manifest.csv"]).expect(0);
+        at(&project, &["check"]).expect(0);
+    }
+}
