@@ -11,7 +11,7 @@ use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
 use crate::catalog::db::request::{Message, Reply, Work};
-use crate::catalog::db::writer;
+use crate::catalog::db::writer::{self, WriteConnection};
 
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;
@@ -58,7 +58,8 @@ impl Catalog {
         let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let writer = writer::run(conn, Arc::clone(&path), inbox, Arc::clone(&delay));
+        let writer = WriteConnection::new(conn, Arc::clone(&path));
+        let writer = writer::run(writer, inbox, Arc::clone(&delay));
         tokio::spawn(writer);
         Ok(Self {
             reader_pool,
@@ -109,11 +110,10 @@ impl Catalog {
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
     ) -> Result<T> {
-        let path = Arc::clone(&self.path);
         self.reply_to(|reply| {
-            Message::Transaction(Box::new(move |conn| {
+            Message::Transaction(Box::new(move |writer| {
                 Box::pin(async move {
-                    let _ = reply.send(writer::run_transaction(conn, &path, work).await);
+                    let _ = reply.send(writer.run_transaction(work).await);
                 })
             }))
         })

@@ -7,7 +7,8 @@ use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
 use super::exit::{ExitCode, Refusal};
-use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, lock_owner};
+use super::time_text::utc;
+use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use crate::config::ConfigError;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, StoreError, TargetLockError};
@@ -43,6 +44,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         CatalogError::Missing(_) => Some(ExitCode::NoProject),
         CatalogError::NetworkFileSystem { .. } => Some(ExitCode::Usage),
         CatalogError::Corrupt(_) | CatalogError::Json(_) => Some(ExitCode::Damaged),
+        error if error.log_loss().is_some() => Some(ExitCode::Damaged),
         CatalogError::UnknownPair(_)
         | CatalogError::NoResult(_)
         | CatalogError::NoMetricResult(..)
@@ -147,6 +149,9 @@ pub(super) fn catalog_path(project: &Path) -> String {
 /// explains it.
 pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
     let path = catalog_path(project);
+    if let Some(loss) = error.log_loss() {
+        return Some(log_lost(&path, loss));
+    }
     Some(match error.kind() {
         Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
             CatalogError::Damaged(path.into()).to_string()
@@ -159,7 +164,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         ),
         Some(CatalogErrorKind::Busy) => locked(&path, lock_owner(Path::new(&path))),
         Some(CatalogErrorKind::Disk) => format!(
-            "{path}: the disk reported an error ({}); check the disk and try again, everything stored so far is safe",
+            "{path}: the disk reported an error ({}), or another program changed the catalog's files; check the disk, then run `check`",
             root_cause(error)
         ),
         Some(CatalogErrorKind::Contradiction) => format!(
@@ -172,6 +177,20 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             _ => return None,
         },
     })
+}
+
+fn log_lost(path: &str, loss: LogLoss) -> String {
+    let what = format!("another program deleted, replaced or cut {path}-wal during this command");
+    match loss {
+        LogLoss::Nothing => format!(
+            "{what}; nothing stored is lost, but no more can be stored: start the command again"
+        ),
+        LogLoss::Since(at) => format!(
+            "{what}; results and verdicts stored since {} may be lost: `check` tells whether the catalog is whole, \
+             `run` computes missing results again, a backup replaces a damaged catalog",
+            utc(at)
+        ),
+    }
 }
 
 fn locked(path: &str, owner: Option<LockOwner>) -> String {

@@ -129,6 +129,11 @@ pub(super) async fn run_with(
     let counts = scheduler.run(&mut received, &mut on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let ended = catalog.end_worker(scheduler.worker(), clock.now()).await;
+    // A lost log explains other errors.
+    let ended = match ended {
+        Err(error) if error.log_loss().is_some() => return Err(error.into()),
+        ended => ended,
+    };
     let counts = counts?;
     ended?;
     let status = catalog.status(fingerprints).await?;

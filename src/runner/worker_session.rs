@@ -26,7 +26,7 @@ pub(super) enum HeartbeatOutcome {
     Alive,
     /// The heartbeat came after the leases had expired. Another worker may have leased the pairs since.
     Expired,
-    /// No heartbeat could be stored for as long as a lease lasts.
+    /// No heartbeat could be stored for as long as a lease lasts, or none can be stored any more.
     Unwritable(CatalogError),
 }
 
@@ -61,7 +61,7 @@ impl WorkerSession {
             Ok(false) => HeartbeatOutcome::Expired,
             Err(error) => {
                 tracing::warn!(%error, "the heartbeat could not be stored");
-                if self.last_heartbeat < alive_since {
+                if self.last_heartbeat < alive_since || error.log_loss().is_some() {
                     HeartbeatOutcome::Unwritable(error)
                 } else {
                     HeartbeatOutcome::Alive
@@ -91,24 +91,25 @@ impl WorkerSession {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let holders = catalog.lease_holders().await?;
         let dead = self.liveness.observe(&holders, self.worker, now);
-        let mut ready = 0;
+        let (mut ready, mut poisoned) = (0, Vec::new());
         if !dead.is_empty() {
             let recovered = catalog.recover(DeadWorker::Workers(dead), now).await?;
-            // The scheduler waits for this, so the next heartbeat must not be missed.
-            let limits = ReadLimits {
-                timeout: context.timing.heartbeat_every,
-                stop: context.stop.clone(),
-                until: StopLevel::Drain,
-            };
-            let (project, poisoned) = (&context.project, &recovered.poisoned);
-            input_changes::store_of_poisoned(project, catalog, poisoned, &limits).await?;
             ready += recovered.ready;
+            poisoned.extend(recovered.poisoned);
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
             let margin = context.timing.deadline_margin.as_millis() as i64;
             let overdue = catalog.recover_overdue(self.worker, margin, now).await?;
             ready += overdue.ready;
+            poisoned.extend(overdue.poisoned);
         }
+        // The scheduler waits for this, so the next heartbeat must not be missed.
+        let limits = ReadLimits {
+            timeout: context.timing.heartbeat_every,
+            stop: context.stop.clone(),
+            until: StopLevel::Drain,
+        };
+        input_changes::store_of_poisoned(&context.project, catalog, &poisoned, &limits).await?;
         Ok(ready)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::catalog::db::log_watch::LogLoss;
 use crate::domain::{PairName, ThresholdMetric};
 
 /// An error of the catalog.
@@ -68,6 +69,14 @@ pub enum CatalogError {
         "{0} holds changes that are not in the catalog yet, and the folder is read-only; copy the project to a writable folder"
     )]
     NotCheckpointed(PathBuf),
+    /// Another program deleted, replaced or cut the write-ahead log while the catalog was open.
+    #[error("{log} was deleted, replaced or cut short by another program")]
+    LogLost {
+        /// The log.
+        log: PathBuf,
+        /// What may be missing in the catalog.
+        loss: LogLoss,
+    },
     /// The directory is on a network file system.
     #[error(
         "{path} is on a network file system ({kind}), where the catalog could be damaged: its write-ahead log is shared through memory; put the project on a local disk, its meshes and prints may stay where they are"
@@ -157,6 +166,15 @@ impl From<sqlx::Error> for CatalogError {
 }
 
 impl CatalogError {
+    /// Returns what may be missing if the write-ahead log was deleted, replaced or cut. Otherwise returns `None`.
+    pub fn log_loss(&self) -> Option<LogLoss> {
+        match self {
+            Self::LogLost { loss, .. } => Some(*loss),
+            Self::Shared(error) => error.log_loss(),
+            _ => None,
+        }
+    }
+
     /// Names the pair whose row holds an invalid value.
     pub(crate) fn in_pair(self, pair: i64) -> Self {
         match self {

@@ -8,6 +8,7 @@ pub(crate) mod error;
 pub(crate) mod error_kind;
 pub(crate) mod group_commit;
 pub(crate) mod lock_owner;
+pub(crate) mod log_watch;
 pub(crate) mod network_fs;
 pub(crate) mod open;
 pub(crate) mod request;

@@ -2,10 +2,10 @@
 
 use std::pin::Pin;
 
-use sqlx::SqliteConnection;
 use tokio::sync::oneshot;
 
 use crate::catalog::db::error::Result;
+use crate::catalog::db::writer::WriteConnection;
 use crate::catalog::queue::checkpoint::LeasedCheckpoints;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
 use crate::catalog::queue::lease::{Lease, StageFailure};
@@ -26,7 +26,7 @@ pub(crate) enum Request {
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 /// A separate transaction, which sends its own reply.
 pub(crate) type TransactionTask =
-    Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
+    Box<dyn for<'c> FnOnce(&'c mut WriteConnection) -> Work<'c, ()> + Send>;
 
 /// A message to the writer task.
 pub(crate) enum Message {
