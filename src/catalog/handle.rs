@@ -10,8 +10,9 @@ use tokio::sync::{mpsc, oneshot};
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
-use crate::catalog::db::request::{Message, Reply, Work};
-use crate::catalog::db::writer::{self, WriteConnection};
+use crate::catalog::db::request::{Message, Reply};
+use crate::catalog::db::write_connection::{Work, WriteConnection};
+use crate::catalog::db::writer;
 
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;

@@ -15,10 +15,9 @@ mod tests;
 
 pub use audit::integrity::{AuditPage, AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use db::commit_delay::Waiting;
-pub use db::error::{CatalogError, Result};
+pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
-pub use db::log_watch::LogLoss;
 pub use handle::Catalog;
 pub use new_catalog::NewCatalog;
 pub use queue::claim::ClaimRequest;

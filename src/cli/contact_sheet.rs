@@ -2,18 +2,17 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
+use super::files;
 use super::select;
 use super::table::count;
 use crate::domain::ThresholdMetric;
 use crate::export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
 use crate::raster::png_rgb8;
-use crate::store::write_atomic;
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
@@ -35,6 +34,9 @@ pub(super) struct ContactSheetArgs {
     /// Pairs per row
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u16).range(1..=12))]
     pub(super) columns: u16,
+    /// Replace an earlier file even if images are missing in the new one
+    #[arg(long)]
+    pub(super) allow_missing: bool,
 }
 
 impl Default for ContactSheetArgs {
@@ -46,6 +48,7 @@ impl Default for ContactSheetArgs {
             order: ContactSheetOrder::Worst,
             limit: 60,
             columns: 5,
+            allow_missing: false,
         }
     }
 }
@@ -98,10 +101,10 @@ pub(super) async fn write(
         Some(path) => path.clone(),
         None => project.dir().join("sheet.png"),
     };
-    write_atomic(&path, &png_rgb8(&sheet.picture))
-        .with_context(|| format!("cannot write {}", path.display()))?;
     for (pair, why) in &sheet.problems {
         context.warn(&format!("{pair} is not drawn completely: {why}"));
     }
+    let is_complete = args.allow_missing || sheet.problems.is_empty();
+    files::write_output(&path, &png_rgb8(&sheet.picture), is_complete)?;
     Ok((path, sheet))
 }

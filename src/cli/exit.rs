@@ -69,6 +69,9 @@ pub(super) enum Refusal {
     /// A wrong command line that clap alone cannot detect.
     #[error("{0}")]
     Usage(String),
+    /// An output that would lack images, and would replace an earlier file.
+    #[error("{0}")]
+    Incomplete(String),
 }
 
 impl Refusal {
@@ -77,6 +80,7 @@ impl Refusal {
         match self {
             Self::NothingSelected(_) => ExitCode::NothingSelected,
             Self::Usage(_) => ExitCode::Usage,
+            Self::Incomplete(_) => ExitCode::SomeFailed,
         }
     }
 }

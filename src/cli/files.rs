@@ -7,7 +7,7 @@ use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::domain::sanitize;
-use crate::store::{open_regular, read_file_or_pipe};
+use crate::store::{open_regular, read_file_or_pipe, write_atomic};
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
@@ -44,6 +44,19 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
         anyhow::bail!("{shown} is longer than 1 MiB");
     }
     Ok(Some(bytes))
+}
+
+/// Writes a file of images. An incomplete one does not replace an earlier file, which may be complete.
+pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+    let shown = path.display();
+    let failed = || format!("cannot write {shown}");
+    if !is_complete && metadata(path).with_context(failed)?.is_some() {
+        let text = format!(
+            "the earlier {shown} was kept, because images are missing in the new one; put the files back, or add --allow-missing to replace it"
+        );
+        return Err(Refusal::Incomplete(text).into());
+    }
+    write_atomic(path, bytes).with_context(failed)
 }
 
 /// Lists a directory.
@@ -98,7 +111,19 @@ fn refusal(action: &str, path: &Path, error: &std::io::Error) -> Refusal {
 mod tests {
     use std::path::Path;
 
-    use super::is_jsonl;
+    use super::{is_jsonl, write_output};
+
+    #[test]
+    fn an_incomplete_file_replaces_none() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("sheet.png");
+        let content = || std::fs::read(&path).expect("a file");
+        write_output(&path, b"incomplete", false).expect("a new file");
+        write_output(&path, b"complete", true).expect("replaced");
+        let refused = write_output(&path, b"incomplete", false).expect_err("kept");
+        assert!(refused.to_string().contains("was kept"), "{refused}");
+        assert_eq!(content(), b"complete");
+    }
 
     #[test]
     fn format_follows_from_the_extension_then_from_the_content() {

@@ -2,21 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
 use super::compare::side_by_side;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
-use super::output;
 use super::time_text::day;
+use super::{files, output};
 use crate::catalog::Catalog;
 use crate::export::{GallerySelection, draw_gallery};
 use crate::report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
 };
-use crate::store::{Project, write_atomic};
+use crate::store::Project;
 
 /// Seed of the random choice of images; the HTML page states it.
 const IMAGE_SEED: u64 = 1;
@@ -45,6 +44,9 @@ pub(super) struct ReportArgs {
     /// Exit with code 21 unless every pair is done and every result is judged pass or fail
     #[arg(long)]
     pub(super) require_complete: bool,
+    /// Replace an earlier file even if images are missing in the new one
+    #[arg(long)]
+    pub(super) allow_missing: bool,
 }
 
 /// Parses a number from 0 to 1.
@@ -69,12 +71,12 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
-    let mut is_complete = true;
+    let mut is_complete = report.unusable_truths == 0;
     let text = if let Some(other) = &args.compare {
         compared(&report, other, format, context).await?
     } else if format == ReportFormat::Html {
         let (page, has_all) = pictured(&report, pictures, (&project, &catalog), context).await?;
-        is_complete = has_all;
+        is_complete &= has_all;
         page
     } else {
         render(&report, format)
@@ -82,9 +84,8 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     catalog.close().await;
     match &args.output {
         Some(path) => {
-            let shown = path.display();
-            write_atomic(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
-            context.info(&format!("the report is in {shown}"));
+            files::write_output(path, text.as_bytes(), args.allow_missing || is_complete)?;
+            context.info(&format!("the report is in {}", path.display()));
         }
         None if format == ReportFormat::Json => output::print_json_text(&text)?,
         None => output::print(&text)?,

@@ -26,8 +26,8 @@ pub(super) struct RunArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs processed at the same time, such as 4G or 512M, estimated from the sizes of meshes and
-    /// prints; a pair that needs more runs alone [default: most of the free memory]
+    /// Memory for the pairs processed at the same time, such as 4G or 512M, estimated from the file sizes of meshes and
+    /// the image sizes of prints; a pair that needs more runs alone [default: most of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
     /// Print what would run and why, without running it

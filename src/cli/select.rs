@@ -25,10 +25,10 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
     }
 }
 
-/// Looks up pairs by their ids. Returns `None` if no id is given; callers then select all pairs.
+/// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
 ///
 /// # Errors
-/// Like [`pairs`].
+/// Returns an error if a pair does not exist.
 pub(super) async fn some_or_all(
     catalog: &Catalog,
     typed: &[String],

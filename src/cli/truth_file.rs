@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::files::RefusedLine;
-use crate::domain::PairName;
+use crate::domain::{PairName, UniqueKeys};
 use crate::report::ground_truth::TruthRecord;
 
 /// One true alignment and its line number.
@@ -33,7 +33,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLin
             continue;
         }
         let refuse = |reason: String| RefusedLine::new(line, &reason);
-        let value: Value =
+        let UniqueKeys(value) =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
         if let Some(first) = lines.insert(record.id.clone(), line) {
@@ -92,6 +92,12 @@ mod tests {
         assert_eq!(
             twice,
             "data/truth.jsonl: line 2: pair a is already on line 1; nothing was imported"
+        );
+        let key = LINE.replace("\"d\":0", "\"d\":0,\"d\":1");
+        let key = read(&format!("{LINE}\n\n{key}")).expect_err("a key twice");
+        assert!(
+            key.contains("line 3: not JSON: the key \"d\" is given twice"),
+            "{key}"
         );
         let broken = read("{\"id\":\n").expect_err("cut off");
         assert!(

@@ -36,7 +36,7 @@ impl JobStatus {
     }
 }
 
-/// A pair is never quarantined before this many workers died while they leased only this pair.
+/// Number of workers that died while they leased only this pair, below which a pair is never quarantined.
 pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair must be quarantined because it probably kills its workers.

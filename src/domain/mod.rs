@@ -18,6 +18,7 @@ mod stage;
 #[cfg(test)]
 pub(crate) mod test_values;
 mod transform;
+mod unique_keys;
 mod unit;
 mod verdict;
 
@@ -39,6 +40,7 @@ pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
+pub use unique_keys::UniqueKeys;
 pub use unit::LengthUnit;
 pub use verdict::{Reason, Verdict};
 

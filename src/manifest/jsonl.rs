@@ -10,6 +10,10 @@ use super::draft::{DraftRow, RowCollector};
 use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
+use crate::domain::UniqueKeys;
+
+/// End of the message about a key that an object has twice, as [`UniqueKeys`] words it.
+const TWICE: &str = "is given twice";
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
@@ -47,13 +51,13 @@ pub fn read_jsonl(
 fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
-    let JsonEntries(object) = serde_json::from_str(text).map_err(|error| not_an_object(&error))?;
+    let JsonEntries(object) = serde_json::from_str(text).map_err(|error| wrong_json(&error))?;
     let mut draft = DraftRow::new(line);
     let mut keys = BTreeSet::new();
     for (key, value) in object {
         let known = known_column(key.trim());
         if !keys.insert(known.map_or_else(|| key.clone(), ToOwned::to_owned)) {
-            return Err(format!("the key {key:?} is given twice"));
+            return Err(format!("the key {key:?} {TWICE}"));
         }
         match (known, value) {
             (_, Value::Null) => {}
@@ -89,8 +93,8 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<JsonEntries, A::Error> {
         let mut entries = Vec::new();
-        while let Some(entry) = map.next_entry()? {
-            entries.push(entry);
+        while let Some((key, UniqueKeys(value))) = map.next_entry()? {
+            entries.push((key, value));
         }
         Ok(JsonEntries(entries))
     }
@@ -109,9 +113,13 @@ fn cell(name: &str, value: Value) -> Result<String, String> {
 }
 
 /// Formats a parser error without its line number. The number is always 1, because each line is parsed separately.
-fn not_an_object(error: &serde_json::Error) -> String {
+fn wrong_json(error: &serde_json::Error) -> String {
     let message = error.to_string();
-    let reason = message.split(" at line ").next().unwrap_or(&message);
+    let reason = message.rsplit_once(" at line ");
+    let reason = reason.map_or(&*message, |(reason, _)| reason);
+    if reason.ends_with(TWICE) {
+        return reason.to_owned();
+    }
     format!("not a JSON object, column {}: {reason}", error.column())
 }
 
@@ -160,6 +168,10 @@ mod tests {
             (
                 r#"{"id":"b","mesh":"m","print":"p","folio":1,"folio":1}"#,
                 "folio",
+            ),
+            (
+                r#"{"id":"b","mesh":"m","print":"p","folio":[{"a":1,"b":{"a":1},"a":2}]}"#,
+                "a",
             ),
         ] {
             let refusal = parse(&format!("{good}\n{twice}\n")).expect_err("refused");

@@ -51,6 +51,9 @@ pub struct Report {
     /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
+    /// Number of pairs whose true alignment cannot be used; a warning names the first.
+    #[serde(skip)]
+    pub unusable_truths: u64,
     /// Caveats on the numbers, in whole sentences.
     pub warnings: Vec<String>,
 }

@@ -105,7 +105,8 @@ struct Readers<T: ReadItem> {
 }
 
 impl<T: ReadItem> Readers<T> {
-    /// Starts a thread that reads items until none is left. If the thread cannot start, the items time out.
+    /// Starts a thread that reads items until the queue is empty. Items that no thread reads end with a timeout, for
+    /// example if no thread could start.
     fn start_thread(&self) {
         let (queue, sender) = (Arc::clone(&self.queue), self.sender.clone());
         let work = move || {

@@ -27,7 +27,7 @@ pub(super) struct StoredStage {
 pub(super) struct FileInUse(Arc<Mutex<Option<PathBuf>>>);
 
 impl FileInUse {
-    /// Notes that a file is being read, until `None` is given.
+    /// Stores the path of the file that is read from now on. `None` means that no file is read.
     pub(super) fn set(&self, path: Option<&Path>) {
         let mut file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *file = path.map(Path::to_owned);

@@ -183,8 +183,8 @@ impl RunStart<'_> {
         Ok(())
     }
 
-    /// Recovers the leases of dead processes, then lets other processes join. Does nothing if another process may be
-    /// running. Returns how many pairs are ready again.
+    /// Recovers the leases of dead processes, then lets other processes join. Does nothing if this process has joined a
+    /// run, because other processes then hold valid leases. Returns how many pairs are ready again.
     async fn recover(&self, lock: &mut RunLock, worker: WorkerId) -> Result<u64, RunError> {
         if !lock.is_exclusive() {
             return Ok(0);

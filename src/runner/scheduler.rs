@@ -135,7 +135,8 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // This process has no other pair in progress, so a pair that must run alone can be claimed.
+        // This process has no other pair in progress, so it may claim a pair that must run alone. Pairs of other
+        // processes may still be in progress.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -16,6 +17,7 @@ use serde_json::{Value, json};
 use crate::cli::{Call, call, mocban};
 use crate::crowd::watched;
 use crate::page::{NO_CHECKS, Page, Site, answer, read_project};
+use crate::renamed::held;
 use crate::resume::{copy, project, results, run};
 use crate::test_size::trials;
 
@@ -204,6 +206,53 @@ fn a_lost_log_of_the_catalog_loses_only_what_is_computed_again() {
         assert_whole(&p);
         call(&mut run(&p, &[])).expect(0);
         assert_eq!(results(&p), target.expected);
+    }
+}
+
+/// How another program harms the log of the catalog.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum LogAttack {
+    Delete,
+    Replace,
+    Cut,
+}
+
+impl LogAttack {
+    fn act(self, log: &Path) {
+        let file = OpenOptions::new().write(true).open(log).expect("a log");
+        assert!(file.metadata().expect("a length").len() > 0);
+        match self {
+            Self::Delete => std::fs::remove_file(log).expect("removed"),
+            Self::Replace => {
+                std::fs::remove_file(log).expect("removed");
+                std::fs::write(log, "").expect("written");
+            }
+            Self::Cut => file.set_len(0).expect("cut"),
+        }
+    }
+}
+
+#[test]
+fn a_run_whose_log_is_deleted_replaced_or_cut_stops_and_claims_nothing_false() {
+    let target = Target::new(8);
+    for attack in [LogAttack::Delete, LogAttack::Replace, LogAttack::Cut] {
+        for failpoint in ["fit:computed", "depth:written", "register:synced"] {
+            let p = target.copy_of(&target.fresh);
+            let hold = target.dir.path().join("hold");
+            let child = held(&p, failpoint, &hold);
+            attack.act(&p.dir().join("catalog.sqlite-wal"));
+            std::fs::remove_file(&hold).expect("released");
+            let ended = child.wait_with_output().expect("an end");
+            let err = String::from_utf8(ended.stderr).expect("UTF-8");
+            assert_eq!(ended.status.code(), Some(12), "{attack:?}: {err}");
+            let wanted = "another program deleted, replaced or cut";
+            assert!(err.contains(wanted) && !err.contains("is safe"), "{err}");
+            let may_lose = err.contains("may be lost");
+            assert_eq!(may_lose, attack == LogAttack::Cut, "{attack:?}: {err}");
+            assert_whole(&p);
+            call(&mut run(&p, &[])).expect(0);
+            assert_eq!(results(&p), target.expected);
+        }
     }
 }
 

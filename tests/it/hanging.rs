@@ -165,7 +165,7 @@ fn an_input_that_became_a_pipe_is_named_by_every_command() {
     let named = |path: &Path| format!("{} is a pipe, not a file", path.display());
     let commands: [(&[&str], i32); 7] = [
         (&["export", "-o", "exported"], 3),
-        (&["report"], 0),
+        (&["report"], 3),
         (&["report", "--format", "html", "-o", "report.html"], 3),
         (&["contact-sheet", "-o", "sheet.png"], 3),
         (&["show", "upright-0000"], 0),

@@ -229,6 +229,35 @@ fn export_that_would_lack_files_leaves_the_previous_one() {
 }
 
 #[test]
+fn pictures_that_would_lack_images_leave_the_previous_file() {
+    let dir = empty();
+    let project = done(dir.path());
+    let commands = [
+        &["contact-sheet", "-o", "../sheet.png"][..],
+        &["report", "-f", "html", "-o", "../report.html"],
+    ];
+    let read = |args: &[&str]| std::fs::read(project.dir().join(args[args.len() - 1]));
+    let before = commands.map(|args| {
+        at(&project, args).expect(0);
+        read(args).expect("a file")
+    });
+    let one = std::fs::read_dir(project.artifacts_dir()).expect("a folder");
+    for folder in one.flatten().filter(|entry| entry.path().is_dir()) {
+        std::fs::remove_dir_all(folder.path()).expect("removed");
+    }
+    for (args, before) in commands.iter().zip(before) {
+        let again = at(&project, args).expect(3);
+        let wanted = "was kept, because images are missing in the new one";
+        assert!(again.err.contains(wanted), "{}", again.err);
+        assert!(read(args).expect("a file") == before);
+        let mut allowed = vec![args[0], "--allow-missing"];
+        allowed.extend(&args[1..]);
+        at(&project, &allowed).expect(3);
+        assert!(read(args).expect("a file") != before);
+    }
+}
+
+#[test]
 fn report_and_export_warn_about_stale_results() {
     let dir = empty();
     let project = done(dir.path());

@@ -11,7 +11,7 @@ use crate::resume::{copy, results, run};
 use crate::uninterrupted::Comparison;
 
 /// Starts a run that waits at a failpoint, and returns it when it waits.
-fn held(project: &Project, failpoint: &str, hold: &Path) -> Child {
+pub(crate) fn held(project: &Project, failpoint: &str, hold: &Path) -> Child {
     let mut child = run(project, &["-j", "1"])
         .env("MOCBAN_HOLD_AT", failpoint)
         .env("MOCBAN_HOLD_FILE", hold)

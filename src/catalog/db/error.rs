@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::catalog::db::log_watch::LogLoss;
-use crate::domain::{PairName, ThresholdMetric};
+use crate::domain::{PairName, ThresholdMetric, UnixMillis};
 
 /// An error of the catalog.
 #[derive(Debug, thiserror::Error)]
@@ -152,6 +151,15 @@ pub enum CatalogError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+/// What may be missing in the catalog after its write-ahead log was deleted, replaced or cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogLoss {
+    /// Nothing: all commits are in the catalog's main file.
+    Nothing,
+    /// Commits after this time.
+    Since(UnixMillis),
 }
 
 impl From<sqlx::Error> for CatalogError {

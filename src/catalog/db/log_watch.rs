@@ -10,7 +10,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::error::{CatalogError, LogLoss, Result};
 use crate::catalog::db::lock_owner::sidecar;
 use crate::domain::UnixMillis;
 
@@ -20,15 +20,6 @@ const LOG_HEADER: u64 = 32;
 const FRAME_HEADER: u64 = 24;
 /// Numbers of pages of the log, and of these in the catalog's main file: (busy, log, checkpointed).
 type LogState = (i64, i64, i64);
-
-/// What may be missing in the catalog after its write-ahead log was deleted, replaced or cut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LogLoss {
-    /// Nothing: all commits are in the catalog's main file.
-    Nothing,
-    /// Commits after this time.
-    Since(UnixMillis),
-}
 
 /// The log of the open write connection.
 #[derive(Debug)]
@@ -67,7 +58,11 @@ impl FileId {
 
     fn state(&self) -> FileState {
         match std::fs::metadata(&self.path) {
-            Ok(found) if self.number.is_none_or(|is| is == (found.dev(), found.ino())) => {
+            Ok(found)
+                if self
+                    .number
+                    .is_none_or(|is| is == (found.dev(), found.ino())) =>
+            {
                 FileState::Same(found.len())
             }
             Ok(_) => FileState::Gone,
@@ -136,7 +131,14 @@ impl LogWatch {
             FileState::Gone => {
                 let copied = checkpoint(conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
                 let is_whole = matches!(copied, Ok((0, log, saved)) if log == saved);
-                Some(if is_whole { LogLoss::Nothing } else { since })
+                // SQLite would read another log at its place.
+                let is_clear =
+                    std::fs::metadata(&self.log.path).map_or(true, |other| other.len() == 0);
+                Some(if is_whole && is_clear {
+                    LogLoss::Nothing
+                } else {
+                    since
+                })
             }
         }
     }

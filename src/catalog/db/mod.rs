@@ -15,4 +15,5 @@ pub(crate) mod request;
 pub(crate) mod rows;
 pub(crate) mod script;
 pub(crate) mod unplaced;
+pub(crate) mod write_connection;
 pub(crate) mod writer;

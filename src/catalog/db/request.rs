@@ -1,11 +1,9 @@
 //! Messages to the writer task: requests that share a commit, separate transactions, and the senders for replies.
 
-use std::pin::Pin;
-
 use tokio::sync::oneshot;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::writer::WriteConnection;
+use crate::catalog::db::write_connection::{Work, WriteConnection};
 use crate::catalog::queue::checkpoint::LeasedCheckpoints;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
 use crate::catalog::queue::lease::{Lease, StageFailure};
@@ -22,8 +20,6 @@ pub(crate) enum Request {
     Claim(ClaimRequest, Reply<Vec<Lease>>),
 }
 
-/// A future that borrows the write connection.
-pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 /// A separate transaction, which sends its own reply.
 pub(crate) type TransactionTask =
     Box<dyn for<'c> FnOnce(&'c mut WriteConnection) -> Work<'c, ()> + Send>;

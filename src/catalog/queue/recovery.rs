@@ -68,6 +68,7 @@ RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint"
 /// Marks workers as dead, unless they ended properly.
 const DIED: &str =
     "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT value FROM json_each(?1))";
+/// Marks all workers except one as dead. Skips workers that are too old for [`DEATHS`], which alone reads the mark.
 const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::request::Work;
 use crate::catalog::db::rows::json_array;
+use crate::catalog::db::write_connection::Work;
 use crate::catalog::queue::counters::{CounterKey, Deltas, KeyedJob};
 use crate::catalog::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
 use crate::catalog::queue::fragments::fingerprint_before;

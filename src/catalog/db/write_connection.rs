@@ -1,0 +1,86 @@
+//! The write connection of a catalog, which never writes to a log that another program deleted, replaced or cut.
+
+use std::path::Path;
+use std::pin::Pin;
+use std::sync::Arc;
+
+use sqlx::{Connection as _, SqliteConnection};
+
+use crate::catalog::db::busy_retry::retry_while_busy;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::log_watch::LogWatch;
+
+/// A future that borrows the write connection.
+pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
+
+/// The write connection, and the log that its commits go to.
+pub(crate) struct WriteConnection {
+    pub(crate) conn: SqliteConnection,
+    pub(crate) path: Arc<Path>,
+    log: LogWatch,
+}
+
+impl WriteConnection {
+    pub(crate) fn new(conn: SqliteConnection, path: Arc<Path>) -> Self {
+        let log = LogWatch::new(&path);
+        Self { conn, path, log }
+    }
+
+    /// Checks the log. Must be called before and after each commit, so that a reply is sent only for what is stored.
+    ///
+    /// # Errors
+    /// Returns an error if another program deleted, replaced or cut the log.
+    pub(crate) async fn check_log(&mut self) -> Result<()> {
+        self.log.check(&mut self.conn).await
+    }
+
+    /// Runs `work` in a separate transaction. Rolls it back if `work` or the commit fails.
+    pub(crate) async fn run_transaction<T>(
+        &mut self,
+        work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
+    ) -> Result<T> {
+        self.check_log().await?;
+        let Self { conn, path, .. } = self;
+        retry_while_busy!(path, execute(conn, "BEGIN IMMEDIATE").await)?;
+        let mut outcome = work(&mut *conn).await;
+        if outcome.is_ok()
+            && let Err(error) = execute(conn, "COMMIT").await
+        {
+            outcome = Err(error);
+        }
+        if outcome.is_err() {
+            rollback(conn).await;
+        }
+        self.check_log().await?;
+        outcome
+    }
+
+    /// Checkpoints the log, unless it is lost.
+    pub(crate) async fn checkpoint_log(&mut self, pragma: &'static str) {
+        self.log.checkpoint(&mut self.conn, pragma).await;
+    }
+
+    /// Checkpoints the log and closes the connection.
+    pub(crate) async fn close(mut self) {
+        self.checkpoint_log("PRAGMA wal_checkpoint(TRUNCATE)").await;
+        if self.log.is_lost() {
+            // Closing would copy pages of the damaged log to the catalog. The end of the process does not.
+            std::mem::forget(self.conn);
+        } else if let Err(error) = self.conn.close().await {
+            tracing::warn!(%error, "the catalog did not close cleanly");
+        }
+    }
+}
+
+/// Rolls the current transaction back.
+pub(crate) async fn rollback(conn: &mut SqliteConnection) {
+    // SQLite has already rolled back after some errors, such as a full disk.
+    if let Err(error) = execute(conn, "ROLLBACK").await {
+        tracing::debug!(%error, "nothing to roll back");
+    }
+}
+
+async fn execute(conn: &mut SqliteConnection, sql: &'static str) -> Result<()> {
+    sqlx::query(sql).execute(conn).await?;
+    Ok(())
+}
