@@ -19,8 +19,8 @@ impl NewCatalog {
     /// Begins a catalog at `path`, whose folder must exist. Returns `None` if the path is taken.
     ///
     /// # Errors
-    /// If the folder is not writable, is on a network file system or holds the log of a removed catalog, or the
-    /// database returns an error.
+    /// Returns an error if the folder is not writable, is on a network file system or holds the log of a removed
+    /// catalog, or if the database fails.
     pub async fn begin(path: &Path) -> Result<Option<Self>> {
         network_fs::refuse(path)?;
         if path.symlink_metadata().is_ok() {
@@ -44,7 +44,7 @@ impl NewCatalog {
     /// created one there meanwhile.
     ///
     /// # Errors
-    /// If the disk returns an error.
+    /// Returns an error if the disk returns one.
     pub async fn place(self) -> Result<bool> {
         self.catalog.close().await;
         self.file.place()
@@ -60,7 +60,7 @@ impl Catalog {
     /// Opens the catalog, or creates it.
     ///
     /// # Errors
-    /// If the file is not a catalog or is on a network file system, or the database returns an error.
+    /// Returns an error if the file is not a catalog or is on a network file system, or if the database fails.
     pub async fn create(path: &Path) -> Result<Self> {
         if let Some(new) = NewCatalog::begin(path).await? {
             new.place().await?;

@@ -198,7 +198,7 @@ impl World {
 }
 
 impl World {
-    /// Asserts that counters and inspection of every pair give the same plan, for current and for changed settings.
+    /// Asserts that a plan for all pairs, made from counters, equals a plan that inspects each named pair.
     async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

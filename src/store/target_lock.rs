@@ -37,7 +37,8 @@ pub enum TargetLockError {
 }
 
 impl TargetLock {
-    /// Acquires the right to replace an output, which need not exist. The lock file is a hidden file next to the output.
+    /// Acquires the right to replace an output, which need not exist. The lock file is a hidden file next to the
+    /// output.
     ///
     /// # Errors
     /// Returns an error if another process has the lock, or the lock file cannot be used.

@@ -94,7 +94,8 @@ ORDER BY 1";
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
-/// Selects each fingerprint, with the cursor of jobs whose last result has this fingerprint.
+/// Selects each fingerprint with the cursor that follows its stage. Jobs without results have cursor 0 and fingerprint
+/// 0.
 const FINGERPRINTS: &str =
     "SELECT 0 AS cursor, 0 AS id UNION ALL SELECT stage + 1, id FROM fingerprint";
 
@@ -184,7 +185,7 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
-        // One transaction, so that the writes of a concurrent run do not look like drift.
+        // Read in one transaction, so that the writes of a concurrent run do not look like drift.
         let mut conn = self.snapshot().await?;
         let counters = counter_drift(&mut conn).await?;
         let mut marks = Vec::new();

@@ -14,15 +14,15 @@ use crate::catalog::{Catalog, CatalogError, Result};
 /// because the copy is never read.
 const READ_FAILED: [&str; 2] = ["266", "522"];
 
-/// Longest absolute path that SQLite opens, in bytes, less the ending of a journal.
+/// Longest absolute path of a catalog that SQLite opens, in bytes. SQLite also needs room for the ending of a journal.
 const MAX_PATH: usize = 500;
 
 const HAS_SETTINGS: &str =
     "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND name = 'backup_settings'";
 
 impl Catalog {
-    /// Writes a backup to a new file: the catalog as of one moment, and the bytes of the project's settings file if there
-    /// is one. Verifies the backup. Does not sync the file to disk.
+    /// Writes a backup to a new file: the catalog as of one moment, and the bytes of the project's settings file if
+    /// there is one. Verifies the backup. Does not sync the file to disk.
     ///
     /// # Errors
     /// Returns an error if the path is not UTF-8, the copy fails, or the copy is damaged. May leave a partial copy.
@@ -44,7 +44,8 @@ impl Catalog {
     /// the backup holds. Does not sync the file to disk.
     ///
     /// # Errors
-    /// Returns an error if the backup is not a catalog, the copy fails, or the copy is damaged. May leave a partial copy.
+    /// Returns an error if the backup is not a catalog, the copy fails, or the copy is damaged. May leave a partial
+    /// copy.
     pub async fn restore_backup(backup: &Path, file: &Path) -> Result<Option<Vec<u8>>> {
         let options = SqliteConnectOptions::new().filename(backup);
         let unreadable = |error| disk_error(backup, error);
@@ -79,8 +80,7 @@ async fn vacuum_into(conn: &mut SqliteConnection, file: &Path) -> Result<sqlx::R
     Ok(copied.map(|_| ()))
 }
 
-/// Opens a copy for writing. No other process knows the copy, and an incomplete copy is discarded, so there is no
-/// journal.
+/// Opens a copy for writing. The journal is kept in memory, because an incomplete copy is discarded anyway.
 async fn open_copy(file: &Path) -> sqlx::Result<SqliteConnection> {
     let options = SqliteConnectOptions::new().filename(file);
     let options = options.create_if_missing(false);

@@ -75,8 +75,8 @@ impl UnplacedFile {
         &self.file
     }
 
-    /// Gives the file its name durably, unless that name is taken. Returns whether the file got the name. No connection
-    /// may be open.
+    /// Renames the file to the target durably, unless the target exists. Returns whether the file was renamed. All
+    /// connections to the file must be closed.
     ///
     /// # Errors
     /// Returns an error if SQLite left part of the content in the log, or the disk returns an error.

@@ -89,7 +89,7 @@ pub(crate) const ROWS: [&str; 6] = [
     CLEAR_FAILURE,
 ];
 
-/// Adds the statement `ADVANCE` to a script. Its rows are the jobs that it changed.
+/// Adds the statement `ADVANCE` to a script. The statement returns one row for each job that it changed.
 pub(crate) fn add_advance<'i>(
     script: &mut Script,
     checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,

@@ -80,7 +80,7 @@ WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.toke
     AND job.status = 1
 RETURNING pair, token";
 
-/// Stores a heartbeat, unless the worker has ended or its last heartbeat is too old. Others may consider it dead then.
+/// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead.
 pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 

@@ -64,7 +64,7 @@ pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r Fai
         .find(|row| (row.pair, row.token) == (lease.pair.0, lease.token))
 }
 
-/// Adds the statement `FAIL` to a script. Its rows are the jobs that it changed.
+/// Adds the statement `FAIL` to a script. The statement returns one row for each job that it changed.
 pub(crate) fn add_failures<'i>(
     script: &mut Script,
     failures: impl Iterator<Item = &'i (Lease, StageFailure)>,

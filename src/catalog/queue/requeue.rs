@@ -40,7 +40,7 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1
 RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
-/// Selects one page of a group's jobs without the dirty mark, sorted by pair.
+/// Selects one page of the clean jobs with one stage, status and fingerprint, sorted by pair.
 pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
