@@ -13,6 +13,7 @@ mod records;
 #[cfg(test)]
 mod tests;
 
+pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{AuditPage, AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};

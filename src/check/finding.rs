@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::catalog::{CounterDrift, FaultyRow, SealedTable};
+use crate::catalog::{CounterDrift, FaultyFingerprint, FaultyRow, SealedTable};
 use crate::domain::{PairId, PairName, Stage};
 
 /// What the user can do about a damaged pair.
@@ -18,6 +18,8 @@ pub enum Kind {
     Schema,
     /// A row that no run can compute again differs from its checksum, is missing, or has an invalid value.
     Row,
+    /// The hash of a fingerprint does not follow from its settings.
+    Fingerprint,
     /// A row references a missing row.
     Reference,
     /// A counter differs from the number of jobs.
@@ -47,6 +49,7 @@ impl Kind {
             Self::Database => "faults of the database",
             Self::Schema => "tables, indexes or triggers that differ from the schema",
             Self::Row => "damaged rows that no run can compute again",
+            Self::Fingerprint => "fingerprints that differ from their settings",
             Self::Reference => "rows that reference a missing row",
             Self::Counter => "wrong counters",
             Self::JobMissing => "pairs without a job",
@@ -104,6 +107,16 @@ impl Finding {
             pair: name.and_then(|name| name.parse().ok()),
             ..Self::new(Kind::Row, format!("{faulty}; {remedy}"))
         }
+    }
+
+    /// Describes a faulty fingerprint.
+    pub(super) fn fingerprint(faulty: &FaultyFingerprint) -> Self {
+        let stage = faulty.stage.map_or("unknown", Stage::name);
+        let what = format!(
+            "row {} of the table fingerprint (stage {stage}) differs from its hash; `check --repair` and `run` compute its results again",
+            faulty.row
+        );
+        Self::new(Kind::Fingerprint, what)
     }
 
     /// Describes a pair with an invalid value.

@@ -127,6 +127,7 @@ async fn rows_and_files(
         summary.add(Finding::new(Kind::Reference, line));
     }
     counters(catalog, options, summary).await?;
+    fingerprints(catalog, options, summary).await?;
     let faulty = catalog.faulty_rows().await?;
     for row in &faulty {
         summary.add(Finding::row(row));
@@ -199,6 +200,22 @@ async fn counters(
         catalog.rebuild_counters().await?;
         summary.mark_repaired(Kind::Counter, 0);
         summary.repaired.counters = true;
+    }
+    Ok(())
+}
+
+async fn fingerprints(
+    catalog: &Catalog,
+    options: CheckOptions,
+    summary: &mut CheckSummary,
+) -> Result<(), CheckError> {
+    let faulty = catalog.faulty_fingerprints().await?;
+    for fingerprint in &faulty {
+        summary.add(Finding::fingerprint(fingerprint));
+    }
+    if options.repair && !faulty.is_empty() {
+        catalog.retire_fingerprints(faulty).await?;
+        summary.mark_repaired(Kind::Fingerprint, 0);
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
 //! Checks and repairs of the catalog.
 
+pub(crate) mod fingerprint_hashes;
 pub(crate) mod integrity;
 pub(crate) mod repair;

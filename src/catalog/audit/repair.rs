@@ -1,4 +1,4 @@
-//! Repairs damage that a check found, while no run is active. Never changes verdicts or stored results.
+//! Repairs damage that a check found, while no run is active. Never changes verdicts.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
@@ -33,6 +33,12 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
+/// Removes the results that are to be computed again, because their values may be invalid.
+const REMOVE_RESULTS: &str = "
+DELETE FROM stage_result WHERE (pair, stage) IN (
+    SELECT item.value ->> 0, later.value FROM json_each(?1) AS item, json_each('[0,1,2,3]') AS later
+    WHERE later.value >= item.value ->> 1)";
+
 /// Recreates every counter with the value 0.
 const RESET_COUNTERS: [&str; 3] = [
     "DELETE FROM counter",
@@ -55,8 +61,8 @@ const MARK_DIRTY: &str = concat!(
 );
 
 impl Catalog {
-    /// Sends each pair back to the given stage, and adds missing jobs. The counters must be correct: see
-    /// [`Catalog::rebuild_counters`].
+    /// Sends each pair back to the given stage, removes its results from there on, and adds missing jobs. The counters
+    /// must be correct: see [`Catalog::rebuild_counters`].
     ///
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is changed.
@@ -143,6 +149,10 @@ async fn restore(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Resu
     for key in after {
         deltas.add(key, 1);
     }
+    sqlx::query(REMOVE_RESULTS)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
     sqlx::query(CLEAR_FAILURES)
         .bind(&items)
         .execute(&mut *conn)

@@ -32,8 +32,7 @@ impl Fingerprints {
         let mut upstream: Option<ContentHash> = None;
         Self(Stage::ALL.map(|stage| {
             let fields = fields(stage);
-            let whole = json!({ "stage": stage, "fields": fields, "upstream": upstream });
-            let hash = ContentHash::of(whole.to_string().as_bytes());
+            let hash = hash_of(stage, &fields, upstream);
             upstream = Some(hash);
             Fingerprint { hash, fields }
         }))
@@ -49,6 +48,12 @@ impl Fingerprints {
         let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
         hashes.map(ContentHash::to_hex).join(" ")
     }
+}
+
+/// Returns the hash of a stage's fingerprint. `upstream` is the hash of the fingerprint of the stage before.
+pub(crate) fn hash_of(stage: Stage, fields: &Value, upstream: Option<ContentHash>) -> ContentHash {
+    let whole = json!({ "stage": stage, "fields": fields, "upstream": upstream });
+    ContentHash::of(whole.to_string().as_bytes())
 }
 
 /// Row ids of the current fingerprints.

@@ -1,0 +1,95 @@
+//! Checks the fingerprints that jobs use against their settings, and repairs them.
+
+use serde_json::Value;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqliteConnection};
+
+use crate::catalog::queue::fingerprint::hash_of;
+use crate::catalog::{Catalog, Result};
+use crate::domain::{ContentHash, Stage};
+
+/// A fingerprint whose hash does not follow from its settings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultyFingerprint {
+    /// The row.
+    pub row: i64,
+    /// The stage, unless it is invalid.
+    pub stage: Option<Stage>,
+}
+
+/// Selects the fingerprints of the jobs and the ones before them, in the order of the stages.
+const USED: &str = "
+WITH RECURSIVE used (id) AS (
+    SELECT DISTINCT fingerprint FROM job WHERE fingerprint IS NOT NULL
+    UNION SELECT f.upstream FROM used JOIN fingerprint AS f ON f.id = used.id WHERE f.upstream IS NOT NULL)
+SELECT f.id, f.stage, f.hash, f.fields, (SELECT b.hash FROM fingerprint AS b WHERE b.id = f.upstream) AS upstream
+FROM used JOIN fingerprint AS f ON f.id = used.id ORDER BY f.stage, f.id";
+
+const SET: &str = "UPDATE fingerprint SET hash = ?2, fields = ?3 WHERE id = ?1";
+
+/// Makes the next run compare all results with its settings.
+const MARK_ALL: &str = "UPDATE job SET dirty = 1 WHERE dirty = 0";
+
+impl Catalog {
+    /// Returns the fingerprints of jobs whose hash does not follow from their settings.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn faulty_fingerprints(&self) -> Result<Vec<FaultyFingerprint>> {
+        let mut conn = self.read_conn().await?;
+        let used = sqlx::query(USED).fetch_all(&mut *conn).await?;
+        let mut faulty = Vec::new();
+        for row in &used {
+            if !is_sound(row) {
+                faulty.push(FaultyFingerprint {
+                    row: row.try_get("id")?,
+                    stage: row.try_get("stage").ok(),
+                });
+            }
+        }
+        Ok(faulty)
+    }
+
+    /// Makes each faulty fingerprint differ from that of any settings, so that the next run computes its results again.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails. In that case nothing is changed.
+    pub async fn retire_fingerprints(&self, faulty: Vec<FaultyFingerprint>) -> Result<()> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                for fingerprint in &faulty {
+                    retire(conn, fingerprint).await?;
+                }
+                sqlx::query(MARK_ALL).execute(conn).await?;
+                Ok(())
+            })
+        })
+        .await
+    }
+}
+
+fn is_sound(row: &SqliteRow) -> bool {
+    let (Ok(stage), Ok(hash), Ok(fields), Ok(upstream)) = (
+        row.try_get::<Stage, _>("stage"),
+        row.try_get::<ContentHash, _>("hash"),
+        row.try_get::<&str, _>("fields"),
+        row.try_get::<Option<ContentHash>, _>("upstream"),
+    ) else {
+        return false;
+    };
+    serde_json::from_str::<Value>(fields)
+        .is_ok_and(|fields| hash_of(stage, &fields, upstream) == hash)
+}
+
+/// Replaces the settings of a fingerprint by a note, and its hash by a hash of the note.
+async fn retire(conn: &mut SqliteConnection, faulty: &FaultyFingerprint) -> Result<()> {
+    let fields = serde_json::json!({ "damaged_row": faulty.row });
+    let stage = faulty.stage.unwrap_or(Stage::Fit);
+    let upstream = "SELECT b.hash FROM fingerprint AS f JOIN fingerprint AS b ON b.id = f.upstream WHERE f.id = ?1";
+    let upstream = sqlx::query_scalar(upstream).bind(faulty.row);
+    let upstream: Option<ContentHash> = upstream.fetch_optional(&mut *conn).await?;
+    let hash = hash_of(stage, &fields, upstream);
+    let set = sqlx::query(SET).bind(faulty.row).bind(&hash.as_bytes()[..]);
+    set.bind(fields.to_string()).execute(conn).await?;
+    Ok(())
+}
