@@ -13,8 +13,9 @@ mod records;
 #[cfg(test)]
 mod tests;
 
+pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
-pub use audit::integrity::{AuditPage, AuditedPair, AuditedResult, CounterDrift, Drift};
+pub use audit::integrity::{CounterDrift, Drift};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;

@@ -3,7 +3,7 @@
 use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
-use crate::catalog::audit::integrity;
+use crate::catalog::audit::audited_pairs;
 use crate::catalog::audit::repair;
 use crate::catalog::db::open;
 use crate::catalog::queue::checkpoint;
@@ -174,13 +174,13 @@ async fn queries_of_inputs_and_counts_are_paged_or_small() {
 
 #[tokio::test]
 async fn pages_of_results_are_searched_by_key() {
-    for sql in [pair_results::PAGE, integrity::PAGE] {
+    for sql in [pair_results::PAGE, audited_pairs::PAGE] {
         let page = plan(sql).await;
         assert_only(&page, &[]);
     }
     for sql in [
         stage_results::STAGE_RESULTS,
-        integrity::RESULTS,
+        audited_pairs::RESULTS,
         stage_results::METRIC_HASHES,
         verdicts::COUNTED,
     ] {

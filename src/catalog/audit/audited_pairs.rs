@@ -1,0 +1,171 @@
+//! Reads pairs with their results for a check. Rows with invalid values do not stop the check.
+
+use std::collections::BTreeMap;
+
+use sqlx::sqlite::SqliteRow;
+use sqlx::{FromRow as _, Row as _, SqliteConnection};
+
+use crate::catalog::db::rows::json_array;
+use crate::catalog::queue::lease::MetricResult;
+use crate::catalog::records::model::PairAttributes;
+use crate::catalog::records::pair_work::{self, KnownInputs};
+use crate::catalog::{Catalog, Result};
+use crate::domain::{
+    ContentHash, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage, ThresholdMetric,
+};
+
+/// A pair as stored, with unparsed results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AuditedPair {
+    /// The user's id.
+    pub name: PairName,
+    /// Id of the pair, with the paths and hashes of its input files as last read.
+    pub inputs: KnownInputs,
+    /// Status and cursor of the pair's job. `None` if there is no job.
+    pub job: Option<(JobStatus, i64)>,
+    /// Whether a failure is stored.
+    pub has_failure: bool,
+    /// Every stored result, also of stages that are to run again. Results with invalid values are left out.
+    pub results: BTreeMap<Stage, AuditedResult>,
+    /// The rows of the metrics. Rows with invalid values are left out.
+    pub metrics: BTreeMap<ThresholdMetric, MetricResult>,
+}
+
+/// Pairs that a check has read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AuditPage {
+    /// The pairs, sorted by id.
+    pub pairs: Vec<AuditedPair>,
+    /// Pairs with an invalid value, and messages.
+    pub unreadable: Vec<(PairId, String)>,
+    /// Id of the last pair. `None` if there are no more pairs.
+    pub last: Option<PairId>,
+}
+
+/// A stored result, left unparsed so that a check can also read invalid values.
+#[derive(Debug, Clone, PartialEq, Eq, sqlx_macros::FromRow)]
+pub struct AuditedResult {
+    /// The outcome as JSON text.
+    pub outcome: String,
+    /// The artifacts as JSON text.
+    pub files: String,
+    /// Stored hash of the outcome and the artifacts.
+    pub result_hash: ContentHash,
+}
+
+pub(crate) const PAGE: &str = "
+SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
+    p.unit, p.scanned_face_down, p.character, p.block, p.meta,
+    j.stage, j.status, f.pair IS NOT NULL AS has_failure
+FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
+WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
+
+pub(crate) const RESULTS: &str = "
+SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
+FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
+
+const METRICS: &str = "
+SELECT m.* FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = wanted.value";
+
+impl Catalog {
+    /// Reads up to `limit` pairs with ids above `after`.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn audit_page(&self, after: Option<PairId>, limit: usize) -> Result<AuditPage> {
+        let mut conn = self.snapshot().await?;
+        let query = sqlx::query(PAGE).bind(after.map_or(0, |pair| pair.0));
+        let found = query.bind(limit as i64).fetch_all(&mut *conn).await?;
+        let mut page = AuditPage::default();
+        for row in &found {
+            let id = PairId(row.try_get("id")?);
+            page.last = Some(id);
+            match pair(row) {
+                Ok(pair) => page.pairs.push(pair),
+                Err(error) => page.unreadable.push((id, error.to_string())),
+            }
+        }
+        let ids = json_array(page.pairs.iter().map(|pair| pair.inputs.pair.0));
+        let mut results = stored_results(&mut conn, &ids).await?;
+        let mut metrics = stored_metrics(&mut conn, &ids).await?;
+        for pair in &mut page.pairs {
+            let id = pair.inputs.pair.0;
+            pair.results = results.remove(&id).unwrap_or_default();
+            pair.metrics = metrics.remove(&id).unwrap_or_default();
+        }
+        Ok(page)
+    }
+}
+
+fn pair(row: &SqliteRow) -> Result<AuditedPair> {
+    // Every column must be readable, also those that are not checked otherwise.
+    PairAttributes::from_row(row)?;
+    let status: Option<JobStatus> = row.try_get("status")?;
+    Ok(AuditedPair {
+        name: row.try_get("name")?,
+        inputs: pair_work::known_inputs(row)?,
+        job: status.zip(row.try_get("stage")?),
+        has_failure: row.try_get("has_failure")?,
+        results: BTreeMap::new(),
+        metrics: BTreeMap::new(),
+    })
+}
+
+/// Returns the results by pair and stage. Leaves out rows with invalid values.
+async fn stored_results(
+    conn: &mut SqliteConnection,
+    pairs: &str,
+) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
+    let query = sqlx::query(RESULTS).bind(pairs);
+    let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+    for row in &query.fetch_all(conn).await? {
+        if let (Ok(stage), Ok(result)) = (row.try_get("stage"), AuditedResult::from_row(row)) {
+            let of_pair = results.entry(row.try_get("pair")?).or_default();
+            of_pair.insert(stage, result);
+        }
+    }
+    Ok(results)
+}
+
+/// Returns the rows of the metrics by pair. Leaves out rows with invalid values.
+async fn stored_metrics(
+    conn: &mut SqliteConnection,
+    pairs: &str,
+) -> Result<BTreeMap<i64, BTreeMap<ThresholdMetric, MetricResult>>> {
+    let query = sqlx::query(METRICS).bind(pairs);
+    let mut metrics: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+    for row in &query.fetch_all(conn).await? {
+        if let Ok(result) = metric(row) {
+            let of_pair = metrics.entry(row.try_get("pair")?).or_default();
+            of_pair.insert(result.outcome.metric, result);
+        }
+    }
+    Ok(metrics)
+}
+
+fn metric(row: &SqliteRow) -> Result<MetricResult> {
+    Ok(MetricResult {
+        outcome: MetricOutcome {
+            metric: row.try_get("metric")?,
+            threshold_level: row.try_get("threshold_level")?,
+            threshold_depth: row.try_get("threshold_depth")?,
+            print_from_depth: row.try_get("print_from_depth")?,
+            angle_deg: row.try_get("angle_deg")?,
+            scale: row.try_get("scale")?,
+            shift_px: [row.try_get("shift_x_px")?, row.try_get("shift_y_px")?],
+            scores: Scores {
+                ssim: row.try_get("ssim")?,
+                nl_ssim: row.try_get("nl_ssim")?,
+                iou: row.try_get("iou")?,
+                iou_box: row.try_get("iou_box")?,
+                dice: row.try_get("dice")?,
+                density_print: row.try_get("density_print")?,
+                density_depth: row.try_get("density_depth")?,
+            },
+            margin: row.try_get("margin")?,
+            confidence: row.try_get("confidence")?,
+            at_bound: row.try_get("at_bound")?,
+        },
+        result_hash: row.try_get("result_hash")?,
+    })
+}
