@@ -27,7 +27,8 @@
 //!     `register/mod.rs` (pose, thresholds, scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash
-//! 13. `src/catalog/db/group_commit.rs`: stores all requests that wait for the single writer in one transaction
+//! 13. `src/catalog/db/group_commit.rs`: stores all requests that wait for the writer task of this process in one
+//!     transaction; several processes take turns by SQLite's lock (`busy_retry.rs`)
 //! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
 //! 15. `src/catalog/records/pair_results.rs`: reads results back; the scores come from `stage_result.outcome`
 //! 16. `src/report/build.rs`: iterates over all pairs
@@ -37,14 +38,19 @@
 //!
 //! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `stage_inputs.rs` and
 //! `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns the write connection),
-//! `records/stage_results.rs` (the SQL that reads results) and `cli/report.rs`.
+//! `records/stage_results.rs` (the SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its
+//! catalog gets its name), `records/pair_work.rs` (attributes and earlier results of leased pairs),
+//! `records/checksums.rs` (checksums of the rows that no run can compute again) and `cli/report.rs`. `src/failpoint.rs`
+//! lists the points of this path at which tests kill the process.
 //!
 //! ## A lost lease
 //!
-//! A worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process recovers the job:
-//! at the start of a run (`src/runner/run.rs`), during a run (`src/runner/worker_session.rs`) or in a repair. The
-//! statements are in `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`. Each of them increases the job's
-//! fencing token.
+//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if a process that joined the
+//! run recovers the job because the stage is more than a minute past its deadline (both in
+//! `src/runner/worker_session.rs`). The start of a run (`src/runner/run.rs`) and a repair recover only jobs of dead
+//! processes, because they hold the lock `run.members` alone. After a refused heartbeat, a process recovers the jobs of
+//! its own old id (`register_again`). The statements are in `src/catalog/queue/recovery.rs` and
+//! `src/catalog/audit/repair.rs`. Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
 //! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
@@ -53,7 +59,7 @@
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
-//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; `pair_task.rs` notices at the next finished stage, and the thread ends after the stage that it has begun by then |
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; `pair_task.rs` notices at the next finished stage, and the thread ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
 //! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
 //! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process registers as a new worker; its running pairs end at their next write |
 //! | claim | no leases | `prefetch.rs` | nothing, until the next heartbeat |
