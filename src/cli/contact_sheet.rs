@@ -34,7 +34,7 @@ pub(super) struct ContactSheetArgs {
     /// Pairs per row
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u16).range(1..=12))]
     pub(super) columns: u16,
-    /// Replace an earlier file even if images are missing in the new one
+    /// Replace an earlier file even if the new one lacks images
     #[arg(long)]
     pub(super) allow_missing: bool,
 }

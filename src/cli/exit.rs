@@ -69,7 +69,7 @@ pub(super) enum Refusal {
     /// A wrong command line that clap alone cannot detect.
     #[error("{0}")]
     Usage(String),
-    /// An output that would lack images, and would replace an earlier file.
+    /// An output that is not complete, and would replace an earlier file.
     #[error("{0}")]
     Incomplete(String),
 }

@@ -46,13 +46,13 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Writes a file of images. An incomplete one does not replace an earlier file, which may be complete.
+/// Writes a file whose parts may be missing. An incomplete one does not replace an earlier file, which may be complete.
 pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {
         let text = format!(
-            "the earlier {shown} was kept, because images are missing in the new one; put the files back, or add --allow-missing to replace it"
+            "the earlier {shown} was kept, because the new one lacks what the warnings say; put the files back, or add --allow-missing to replace it"
         );
         return Err(Refusal::Incomplete(text).into());
     }

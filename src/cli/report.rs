@@ -44,7 +44,7 @@ pub(super) struct ReportArgs {
     /// Exit with code 21 unless every pair is done and every result is judged pass or fail
     #[arg(long)]
     pub(super) require_complete: bool,
-    /// Replace an earlier file even if images are missing in the new one
+    /// Replace an earlier file even if the new one lacks images or true alignments
     #[arg(long)]
     pub(super) allow_missing: bool,
 }
@@ -71,7 +71,10 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
-    let mut is_complete = report.unusable_truths == 0;
+    if let Some(problem) = &report.unusable_truth {
+        context.warn(&format!("the report lacks the true alignment of {problem}"));
+    }
+    let mut is_complete = report.unusable_truth.is_none();
     let text = if let Some(other) = &args.compare {
         compared(&report, other, format, context).await?
     } else if format == ReportFormat::Html {

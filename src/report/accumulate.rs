@@ -172,7 +172,7 @@ impl ReportAccumulator {
                 .filter_map(|(stage, ms)| StageTimes::of(stage, ms))
                 .collect(),
             attention_checks: self.attention_checks,
-            unusable_truths: self.truth_problems.count,
+            unusable_truth: self.truth_problems.first,
         }
     }
 }

@@ -51,9 +51,9 @@ pub struct Report {
     /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
-    /// Number of pairs whose true alignment cannot be used; a warning names the first.
+    /// The first pair whose true alignment cannot be used, with the reason.
     #[serde(skip)]
-    pub unusable_truths: u64,
+    pub unusable_truth: Option<String>,
     /// Caveats on the numbers, in whole sentences.
     pub warnings: Vec<String>,
 }

@@ -247,7 +247,7 @@ fn pictures_that_would_lack_images_leave_the_previous_file() {
     }
     for (args, before) in commands.iter().zip(before) {
         let again = at(&project, args).expect(3);
-        let wanted = "was kept, because images are missing in the new one";
+        let wanted = "was kept, because the new one lacks what the warnings say";
         assert!(again.err.contains(wanted), "{}", again.err);
         assert!(read(args).expect("a file") == before);
         let mut allowed = vec![args[0], "--allow-missing"];
