@@ -110,8 +110,9 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("sync", ".b.*", EIO), End::Fails),
     (Fault::once("sync", "*", EIO).and_later(), End::Fails),
     (Fault::once("rename", "b.sqlite", EIO), End::Fails),
-    // SQLite cannot end a transaction of the copy if its journal cannot be removed.
-    (Fault::once("unlink", ".b.*", EIO), End::Either),
+    // SQLite cannot finish the copy if it cannot remove the copy's journal.
+    (Fault::once("unlink", ".b.*-journal", EIO), End::Fails),
+    (Fault::once("unlink", ".b.*lock", EIO), End::Succeeds),
     (Fault::once("read", CATALOG, EIO), End::Fails),
     (Fault::once("read", "p/mocban.toml", EIO), End::Fails),
 ];
