@@ -120,7 +120,7 @@ CREATE TABLE stage_result (
     CHECK (stage < 2 OR print_hash IS NOT NULL)
 ) STRICT;
 
--- The scores of each threshold metric; verdicts are bound to its result_hash.
+-- The scores of each threshold metric. A verdict refers to a result by its result_hash.
 CREATE TABLE metric_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
@@ -255,7 +255,7 @@ CREATE TRIGGER manual_alignment_no_delete BEFORE DELETE ON manual_alignment BEGI
 CREATE TRIGGER manual_alignment_undo_no_update BEFORE UPDATE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_delete BEFORE DELETE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 
--- Checksums of the rows of other tables, which `record` numbers: see `SealedTable` in `src/catalog/records/checksums.rs`.
+-- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`.
 CREATE TABLE checksum (
     record INTEGER NOT NULL,
     row INTEGER NOT NULL,
