@@ -216,7 +216,7 @@ mod tests {
             recover_every,
             ..
         } = Timing::DEFAULT;
-        // One recovery records the last heartbeat. A later recovery finds it older than a lease.
+        // A recovery records the last heartbeat. A later one, after a lease length, sees the same heartbeat.
         assert!(lease + recover_every * 2 <= Duration::from_mins(1));
         assert!(lease >= heartbeat_every * 4);
     }

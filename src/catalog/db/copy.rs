@@ -10,11 +10,11 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity, wrong_identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
-/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. They concern the source,
-/// because the copy is never read.
+/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. While a catalog is
+/// copied, only the original is read.
 const READ_FAILED: [&str; 2] = ["266", "522"];
 
-/// Longest absolute path of a catalog that SQLite opens, in bytes. SQLite also needs room for the ending of a journal.
+/// A longer absolute path, in bytes, is taken to be the reason why SQLite cannot open a file.
 const MAX_PATH: usize = 500;
 
 const HAS_SETTINGS: &str =

@@ -21,7 +21,7 @@ const MAX_TOPS: f64 = 0.85;
 /// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
 /// then rests on walls or specks, not on strokes.
 const MIN_TOPS: f64 = 0.05;
-/// The depth of the carving ignores this fraction of the heights at either end: 1 divided by this constant.
+/// When the depth of the carving is measured, one height in this many is ignored at either end.
 const TRIMMED_ONE_IN: usize = 100;
 
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
@@ -82,7 +82,7 @@ pub fn fit(
 struct FitEffort {
     /// Longest side of a rendering, in pixels.
     px: usize,
-    /// The search ends if the stroke tops slope less than this against the viewing plane.
+    /// The view is not rotated further once the stroke tops slope less than this.
     slope: f64,
     /// Largest angle, in radians, by which rendered heights are rotated. Beyond this angle, walls hide too much of the
     /// surface, and the mesh is rendered again.

@@ -10,7 +10,7 @@ use crate::stages::score::SsimWindow;
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
     /// Largest scale from depth map to print that the pose search tries, 1..=2. The smallest scale is its reciprocal.
-    /// Scale 1 makes the longest sides of both images equal.
+    /// Scale 1 gives both areas with data the same longest side.
     pub scale_band: f64,
     /// Working size of the refinement, 32..=1024: the longest side of the area with data, in pixels.
     pub working_px: u32,
