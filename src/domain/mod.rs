@@ -40,6 +40,7 @@ pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
+pub(crate) use unique_keys::KEY_TWICE;
 pub use unique_keys::UniqueKeys;
 pub use unit::LengthUnit;
 pub use verdict::{Reason, Verdict};

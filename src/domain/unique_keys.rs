@@ -5,6 +5,9 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
+/// End of the message about a key that an object has twice.
+pub(crate) const KEY_TWICE: &str = "is given twice";
+
 /// A JSON value. Its objects, nested ones included, have no key twice; a [`Value`] would keep only the last one.
 ///
 /// ```
@@ -71,7 +74,7 @@ impl<'de> Visitor<'de> for ValueVisitor {
         let mut object = Map::new();
         while let Some((key, UniqueKeys(value))) = entries.next_entry::<String, _>()? {
             if object.contains_key(&key) {
-                return Err(A::Error::custom(format!("the key {key:?} is given twice")));
+                return Err(A::Error::custom(format!("the key {key:?} {KEY_TWICE}")));
             }
             object.insert(key, value);
         }

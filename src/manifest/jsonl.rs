@@ -10,10 +10,7 @@ use super::draft::{DraftRow, RowCollector};
 use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
-use crate::domain::UniqueKeys;
-
-/// End of the message about a key that an object has twice, as [`UniqueKeys`] words it.
-const TWICE: &str = "is given twice";
+use crate::domain::{KEY_TWICE, UniqueKeys};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///
@@ -57,7 +54,7 @@ fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
     for (key, value) in object {
         let known = known_column(key.trim());
         if !keys.insert(known.map_or_else(|| key.clone(), ToOwned::to_owned)) {
-            return Err(format!("the key {key:?} {TWICE}"));
+            return Err(format!("the key {key:?} {KEY_TWICE}"));
         }
         match (known, value) {
             (_, Value::Null) => {}
@@ -117,7 +114,7 @@ fn wrong_json(error: &serde_json::Error) -> String {
     let message = error.to_string();
     let reason = message.rsplit_once(" at line ");
     let reason = reason.map_or(&*message, |(reason, _)| reason);
-    if reason.ends_with(TWICE) {
+    if reason.ends_with(KEY_TWICE) {
         return reason.to_owned();
     }
     format!("not a JSON object, column {}: {reason}", error.column())
