@@ -35,7 +35,7 @@ pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;
 pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
-pub use records::checksums::{FaultyRow, RowFault, SealedTable};
+pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{

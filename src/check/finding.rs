@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::catalog::{CounterDrift, FaultyFingerprint, FaultyRow, SealedTable};
+use crate::catalog::{ChecksummedTable, CounterDrift, FaultyFingerprint, FaultyRow};
 use crate::domain::{PairId, PairName, Stage};
 
 /// What the user can do about a damaged pair.
@@ -91,14 +91,14 @@ impl Finding {
     /// Describes a row that does not agree with its checksum, and what the user can do.
     pub(super) fn row(faulty: &FaultyRow) -> Self {
         let remedy = match faulty.table {
-            SealedTable::Pair => IMPORT,
-            SealedTable::Truth => "import the true alignments again, or restore a backup",
-            SealedTable::Verdict
-            | SealedTable::VerdictUndo
-            | SealedTable::Answer
-            | SealedTable::AnswerUndo
-            | SealedTable::ManualAlignment
-            | SealedTable::ManualAlignmentUndo => {
+            ChecksummedTable::Pair => IMPORT,
+            ChecksummedTable::Truth => "import the true alignments again, or restore a backup",
+            ChecksummedTable::Verdict
+            | ChecksummedTable::VerdictUndo
+            | ChecksummedTable::Answer
+            | ChecksummedTable::AnswerUndo
+            | ChecksummedTable::ManualAlignment
+            | ChecksummedTable::ManualAlignmentUndo => {
                 "restore a backup, then import the verdicts that were given since"
             }
         };

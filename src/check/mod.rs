@@ -13,7 +13,7 @@ pub use summary::{CheckSummary, Found, Notes, Repaired, Unreferenced};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::catalog::{
-    AuditedPair, Catalog, CatalogError, CatalogErrorKind, Drift, FaultyRow, SealedTable,
+    AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
 };
 use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
@@ -141,7 +141,8 @@ async fn rows_and_files(
         after = Some(last);
         is_readable &= page.unreadable.is_empty();
         for (pair, reason) in &page.unreadable {
-            let is_listed = |row: &FaultyRow| (row.table, row.row) == (SealedTable::Pair, pair.0);
+            let is_listed =
+                |row: &FaultyRow| (row.table, row.row) == (ChecksummedTable::Pair, pair.0);
             if !faulty.iter().any(is_listed) {
                 summary.add(Finding::unreadable(*pair, reason));
             }

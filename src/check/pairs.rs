@@ -157,7 +157,7 @@ fn metrics_of(
 }
 
 /// Returns whether the rows of the metrics agree with the results that they are copied from. SQLite converts the numbers
-/// from text, which may change their last digit.
+/// from text, and guarantees only 15 digits.
 fn agree(
     computed: &BTreeMap<ThresholdMetric, MetricResult>,
     stored: &BTreeMap<ThresholdMetric, MetricResult>,

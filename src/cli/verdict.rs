@@ -196,7 +196,7 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
         Some(typed) => Some(select::pair(&catalog, typed).await?),
         None => None,
     };
-    catalog.require_sealed().await?;
+    catalog.verify_checksums().await?;
     let events = catalog.verdict_log(pair.as_ref()).await?;
     catalog.close().await;
     if context.global.json {

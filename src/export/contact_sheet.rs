@@ -124,7 +124,7 @@ async fn choose(
     project: &Project,
     options: &ContactSheetOptions,
 ) -> Result<(Vec<SheetCandidate>, usize), DrawError> {
-    catalog.require_sealed().await?;
+    catalog.verify_checksums().await?;
     let (mut chosen, mut of) = (Vec::new(), 0);
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {

@@ -77,7 +77,7 @@ pub async fn to_jsonl(
     dir: &Path,
     options: JsonlOptions,
 ) -> Result<ExportSummary, ExportError> {
-    catalog.require_sealed().await?;
+    catalog.verify_checksums().await?;
     let folder = Folder::begin(dir)?;
     let path = folder.path().join(LINES);
     let mut lines = BufWriter::new(File::create(&path).map_err(at(&path))?);

@@ -95,7 +95,7 @@ pub struct ReviewerRecord {
 /// # Errors
 /// Returns an error if the catalog cannot be read.
 pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
-    catalog.require_sealed().await?;
+    catalog.verify_checksums().await?;
     let mut counts = AgreementCounts::default();
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {

@@ -149,7 +149,13 @@ fn changed_added_and_removed_rows_are_named_with_their_pair() {
         sql(&project, statements);
         let found = at(&project, &["check", "--repair"]).expect(12);
         assert!(found.out.contains(says), "{statements}: {}", found.out);
-        for command in [&["report"][..], &["verdict", "log"], &["export", "-o", "x"]] {
+        for command in [
+            &["report"][..],
+            &["verdict", "log"],
+            &["export", "-o", "x"],
+            &["contact-sheet"],
+            &["agreement"],
+        ] {
             at(&project, command).expect(12);
         }
     }

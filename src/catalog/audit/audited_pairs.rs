@@ -7,7 +7,6 @@ use sqlx::{FromRow as _, Row as _, SqliteConnection};
 
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::lease::MetricResult;
-use crate::catalog::records::model::PairAttributes;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{
@@ -55,7 +54,6 @@ pub struct AuditedResult {
 
 pub(crate) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
-    p.unit, p.scanned_face_down, p.character, p.block, p.meta,
     j.stage, j.status, f.pair IS NOT NULL AS has_failure
 FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
 WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
@@ -86,8 +84,8 @@ impl Catalog {
             }
         }
         let ids = json_array(page.pairs.iter().map(|pair| pair.inputs.pair.0));
-        let mut results = stored_results(&mut conn, &ids).await?;
-        let mut metrics = stored_metrics(&mut conn, &ids).await?;
+        let mut results = by_pair(&mut conn, RESULTS, &ids, result).await?;
+        let mut metrics = by_pair(&mut conn, METRICS, &ids, metric).await?;
         for pair in &mut page.pairs {
             let id = pair.inputs.pair.0;
             pair.results = results.remove(&id).unwrap_or_default();
@@ -98,8 +96,6 @@ impl Catalog {
 }
 
 fn pair(row: &SqliteRow) -> Result<AuditedPair> {
-    // Every column must be readable, also those that are not checked otherwise.
-    PairAttributes::from_row(row)?;
     let status: Option<JobStatus> = row.try_get("status")?;
     Ok(AuditedPair {
         name: row.try_get("name")?,
@@ -111,42 +107,32 @@ fn pair(row: &SqliteRow) -> Result<AuditedPair> {
     })
 }
 
-/// Returns the results by pair and stage. Leaves out rows with invalid values.
-async fn stored_results(
+/// Returns what `read` makes of the rows of a query, by pair. Leaves out rows with invalid values.
+async fn by_pair<K: Ord, V>(
     conn: &mut SqliteConnection,
+    query: &'static str,
     pairs: &str,
-) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
-    let query = sqlx::query(RESULTS).bind(pairs);
-    let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
-    for row in &query.fetch_all(conn).await? {
-        if let (Ok(stage), Ok(result)) = (row.try_get("stage"), AuditedResult::from_row(row)) {
-            let of_pair = results.entry(row.try_get("pair")?).or_default();
-            of_pair.insert(stage, result);
+    read: impl Fn(&SqliteRow) -> Result<(K, V)>,
+) -> Result<BTreeMap<i64, BTreeMap<K, V>>> {
+    let mut found: BTreeMap<i64, BTreeMap<K, V>> = BTreeMap::new();
+    for row in &sqlx::query(query).bind(pairs).fetch_all(conn).await? {
+        if let Ok((key, value)) = read(row) {
+            let of_pair = found.entry(row.try_get("pair")?).or_default();
+            of_pair.insert(key, value);
         }
     }
-    Ok(results)
+    Ok(found)
 }
 
-/// Returns the rows of the metrics by pair. Leaves out rows with invalid values.
-async fn stored_metrics(
-    conn: &mut SqliteConnection,
-    pairs: &str,
-) -> Result<BTreeMap<i64, BTreeMap<ThresholdMetric, MetricResult>>> {
-    let query = sqlx::query(METRICS).bind(pairs);
-    let mut metrics: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
-    for row in &query.fetch_all(conn).await? {
-        if let Ok(result) = metric(row) {
-            let of_pair = metrics.entry(row.try_get("pair")?).or_default();
-            of_pair.insert(result.outcome.metric, result);
-        }
-    }
-    Ok(metrics)
+fn result(row: &SqliteRow) -> Result<(Stage, AuditedResult)> {
+    Ok((row.try_get("stage")?, AuditedResult::from_row(row)?))
 }
 
-fn metric(row: &SqliteRow) -> Result<MetricResult> {
-    Ok(MetricResult {
+fn metric(row: &SqliteRow) -> Result<(ThresholdMetric, MetricResult)> {
+    let metric = row.try_get("metric")?;
+    let result = MetricResult {
         outcome: MetricOutcome {
-            metric: row.try_get("metric")?,
+            metric,
             threshold_level: row.try_get("threshold_level")?,
             threshold_depth: row.try_get("threshold_depth")?,
             print_from_depth: row.try_get("print_from_depth")?,
@@ -167,5 +153,6 @@ fn metric(row: &SqliteRow) -> Result<MetricResult> {
             at_bound: row.try_get("at_bound")?,
         },
         result_hash: row.try_get("result_hash")?,
-    })
+    };
+    Ok((metric, result))
 }

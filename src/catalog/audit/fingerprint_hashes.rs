@@ -27,6 +27,9 @@ FROM used JOIN fingerprint AS f ON f.id = used.id ORDER BY f.stage, f.id";
 
 const SET: &str = "UPDATE fingerprint SET hash = ?2, fields = ?3 WHERE id = ?1";
 
+const UPSTREAM: &str = "
+SELECT b.hash FROM fingerprint AS f JOIN fingerprint AS b ON b.id = f.upstream WHERE f.id = ?1";
+
 /// Makes the next run compare all results with its settings.
 const MARK_ALL: &str = "UPDATE job SET dirty = 1 WHERE dirty = 0";
 
@@ -85,8 +88,7 @@ fn is_sound(row: &SqliteRow) -> bool {
 async fn retire(conn: &mut SqliteConnection, faulty: &FaultyFingerprint) -> Result<()> {
     let fields = serde_json::json!({ "damaged_row": faulty.row });
     let stage = faulty.stage.unwrap_or(Stage::Fit);
-    let upstream = "SELECT b.hash FROM fingerprint AS f JOIN fingerprint AS b ON b.id = f.upstream WHERE f.id = ?1";
-    let upstream = sqlx::query_scalar(upstream).bind(faulty.row);
+    let upstream = sqlx::query_scalar(UPSTREAM).bind(faulty.row);
     let upstream: Option<ContentHash> = upstream.fetch_optional(&mut *conn).await?;
     let hash = hash_of(stage, &fields, upstream);
     let set = sqlx::query(SET).bind(faulty.row).bind(&hash.as_bytes()[..]);

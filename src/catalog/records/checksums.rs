@@ -1,8 +1,8 @@
 //! Checksums of the rows that no run can compute again, so that a check finds changed, added and removed rows.
 //!
-//! The table `checksum` has a row for each row of the tables in [`SealedTable`], written in the same transaction. A
-//! checksum is the first 64 bits of a BLAKE3 hash of the row's columns. In a log that only grows, it also covers the
-//! checksum of the row before, so that a row cannot be removed together with its checksum.
+//! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction. A
+//! checksum is the first 64 bits of a BLAKE3 hash of the row's columns. In an append-only log, it also covers the
+//! previous row's checksum. This reveals a row that was removed together with its checksum.
 
 use serde_json::json;
 use sqlx::error::BoxDynError;
@@ -18,7 +18,7 @@ const PAGE: i64 = 2000;
 
 /// A table whose rows have checksums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum SealedTable {
+pub enum ChecksummedTable {
     /// Pairs as imported.
     Pair,
     /// True alignments.
@@ -37,7 +37,7 @@ pub enum SealedTable {
     ManualAlignmentUndo,
 }
 
-enum_names! { pub SealedTable, "a table with checksums":
+enum_names! { pub ChecksummedTable, "a table with checksums":
     Pair = "pair", Truth = "truth", Verdict = "verdict", VerdictUndo = "verdict_undo",
     Answer = "attention_check_answer", AnswerUndo = "attention_check_undo",
     ManualAlignment = "manual_alignment", ManualAlignmentUndo = "manual_alignment_undo",
@@ -60,7 +60,7 @@ pub enum RowFault {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FaultyRow {
     /// The table.
-    pub table: SealedTable,
+    pub table: ChecksummedTable,
     /// The row's number.
     pub row: i64,
     /// Name of the pair that the row belongs to, if it is known. The name may be damaged too.
@@ -93,19 +93,20 @@ impl std::fmt::Display for FaultyRow {
 
 /// The statements of one table.
 struct Statements {
-    /// Selects the rows of a list of numbers.
+    /// Selects the rows with the listed numbers.
     listed: &'static str,
     /// Selects a page of rows with their checksums.
     page: &'static str,
     /// Selects the numbers of checksums without a row.
     removed: &'static str,
-    /// Whether a checksum covers the checksum before.
+    /// Whether a checksum covers the previous checksum.
     is_chained: bool,
 }
 
-/// Builds the statements of a table from its name, its key, the columns that are covered, and the row's pair.
+/// Builds the statements of a table from its name, its key, the columns that a checksum covers, and the id of a row's
+/// pair.
 ///
-/// The first columns of a row are its number, its checksum, the checksum before, and the name of its pair.
+/// The first columns of a selected row are its number, its checksum, the previous checksum, and the name of its pair.
 macro_rules! statements {
     ($table:literal, $key:literal, $columns:literal, $pair:literal, $is_chained:literal) => {
         Statements {
@@ -149,7 +150,7 @@ macro_rules! statements {
     };
 }
 
-impl SealedTable {
+impl ChecksummedTable {
     #[rustfmt::skip]
     const fn statements(self) -> Statements {
         match self {
@@ -186,13 +187,15 @@ const STORE: &str = "
 INSERT INTO checksum (record, row, value) SELECT ?1, value ->> 0, value ->> 1 FROM json_each(?2) WHERE true
 ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
 
-/// Selects the largest row number that a log has had, if its rows with larger numbers than ?2 are missing.
+const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
+
+/// Selects the largest row number that a log has ever had, if it exceeds ?2.
 const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
 
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
-pub(crate) async fn seal(
+pub(crate) async fn store(
     conn: &mut SqliteConnection,
-    table: SealedTable,
+    table: ChecksummedTable,
     rows: &[i64],
 ) -> Result<()> {
     let Some(first) = rows.iter().min() else {
@@ -205,19 +208,20 @@ pub(crate) async fn seal(
         before = last.fetch_optional(&mut *conn).await?;
     }
     let listed = sqlx::query(statements.listed).bind(json_array(rows.iter().copied()));
-    let mut sealed = Vec::new();
+    let mut checksums = Vec::new();
     for row in &listed.fetch_all(&mut *conn).await? {
         let value = checksum(table, row, before)?;
-        sealed.push(json!([row.try_get::<i64, _>(0)?, value]));
+        checksums.push(json!([row.try_get::<i64, _>(0)?, value]));
         before = statements.is_chained.then_some(value);
     }
     let store = sqlx::query(STORE).bind(table.code());
-    store.bind(json_array(sealed)).execute(conn).await?;
+    store.bind(json_array(checksums)).execute(conn).await?;
     Ok(())
 }
 
-/// Returns the first 64 bits of the hash of a row's covered columns, its table, its number and the checksum before.
-fn checksum(table: SealedTable, row: &SqliteRow, before: Option<i64>) -> Result<i64> {
+/// Returns the first 64 bits of a hash. The hash covers the table, the row's number, the previous checksum, and the
+/// columns from [`COVERED`] on.
+fn checksum(table: ChecksummedTable, row: &SqliteRow, before: Option<i64>) -> Result<i64> {
     let mut bytes = Vec::with_capacity(512);
     bytes.extend(table.code().to_le_bytes());
     bytes.extend(row.try_get::<i64, _>(0)?.to_le_bytes());
@@ -253,24 +257,24 @@ fn add_value(bytes: &mut Vec<u8>, row: &SqliteRow, column: usize) -> Result<(), 
 }
 
 impl Catalog {
-    /// Compares the rows of all tables in [`SealedTable`] with their checksums. Returns the rows that do not agree.
+    /// Compares the rows of all tables in [`ChecksummedTable`] with their checksums. Returns the rows that do not agree.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn faulty_rows(&self) -> Result<Vec<FaultyRow>> {
         let mut conn = self.snapshot().await?;
         let mut faulty = Vec::new();
-        for table in SealedTable::ALL {
+        for table in ChecksummedTable::ALL {
             faulty_rows(&mut conn, table, &mut faulty).await?;
         }
         Ok(faulty)
     }
 
-    /// Fails if a pair, a true alignment, a verdict or a manual alignment was changed outside of this program.
+    /// Verifies the checksums of all tables in [`ChecksummedTable`].
     ///
     /// # Errors
     /// Returns an error that names the first faulty row, or an error if a database operation fails.
-    pub async fn require_sealed(&self) -> Result<()> {
+    pub async fn verify_checksums(&self) -> Result<()> {
         match self.faulty_rows().await?.first() {
             None => Ok(()),
             Some(faulty) => Err(CatalogError::Corrupt(faulty.to_string())),
@@ -280,7 +284,7 @@ impl Catalog {
 
 async fn faulty_rows(
     conn: &mut SqliteConnection,
-    table: SealedTable,
+    table: ChecksummedTable,
     faulty: &mut Vec<FaultyRow>,
 ) -> Result<()> {
     let statements = table.statements();
@@ -329,8 +333,6 @@ async fn faulty_rows(
     }
     Ok(())
 }
-
-const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
 
 /// Returns the name of a row's pair. Invalid UTF-8 is replaced, because the name may be what is damaged.
 fn pair_name(row: &SqliteRow) -> Result<Option<String>> {

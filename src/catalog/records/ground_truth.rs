@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::rows::json_array;
-use crate::catalog::records::checksums::{self, SealedTable};
+use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::PairName;
 
@@ -44,7 +44,7 @@ pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)
         }
         let set = sqlx::query_scalar(SET).bind(items);
         let pairs: Vec<i64> = set.fetch_all(&mut *conn).await?;
-        checksums::seal(conn, SealedTable::Truth, &pairs).await?;
+        checksums::store(conn, ChecksummedTable::Truth, &pairs).await?;
         stored += pairs.len() as u64;
     }
     Ok(stored)

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
-use crate::catalog::records::checksums::{self, SealedTable};
+use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -174,7 +174,7 @@ async fn import_chunk(
     let items = json_array(chunk.iter().map(item));
     let upsert = sqlx::query_scalar(UPSERT).bind(items).bind(now);
     let rows: Vec<i64> = upsert.fetch_all(&mut *conn).await?;
-    checksums::seal(conn, SealedTable::Pair, &rows).await?;
+    checksums::store(conn, ChecksummedTable::Pair, &rows).await?;
     sqlx::query(NEW_JOBS).bind(names).execute(conn).await?;
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::catalog::records::checksums::{self, SealedTable};
+use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_answers::pair_id;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
@@ -102,7 +102,8 @@ impl Catalog {
                     .bind(now)
                     .fetch_optional(&mut *conn)
                     .await?;
-                checksums::seal(conn, SealedTable::ManualAlignment, stored.as_slice()).await?;
+                checksums::store(conn, ChecksummedTable::ManualAlignment, stored.as_slice())
+                    .await?;
                 Ok(stored.is_some())
             })
         })

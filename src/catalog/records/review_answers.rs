@@ -4,7 +4,7 @@ use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _, SqliteConnection};
 
-use crate::catalog::records::checksums::{self, SealedTable};
+use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -126,19 +126,19 @@ FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN atten
 ORDER BY c.id"#;
 
 /// Statements that undo what a reviewer stored under an event id, with their tables. A second undo has no effect.
-const UNDO: [(SealedTable, &str); 3] = [
+const UNDO: [(ChecksummedTable, &str); 3] = [
     (
-        SealedTable::VerdictUndo,
+        ChecksummedTable::VerdictUndo,
         "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING act",
     ),
     (
-        SealedTable::AnswerUndo,
+        ChecksummedTable::AnswerUndo,
         "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING answer",
     ),
     (
-        SealedTable::ManualAlignmentUndo,
+        ChecksummedTable::ManualAlignmentUndo,
         "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING alignment",
     ),
@@ -213,7 +213,7 @@ impl Catalog {
                 for (table, undo) in UNDO {
                     let undo = sqlx::query_scalar(undo).bind(&event).bind(&reviewer);
                     let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
-                    checksums::seal(conn, table, &undone).await?;
+                    checksums::store(conn, table, &undone).await?;
                 }
                 Ok(())
             })
@@ -287,5 +287,5 @@ async fn insert_check(
         .bind(given.at.unwrap_or(now))
         .fetch_one(&mut *conn)
         .await?;
-    checksums::seal(conn, SealedTable::Answer, &[row]).await
+    checksums::store(conn, ChecksummedTable::Answer, &[row]).await
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::rows::json_array;
-use crate::catalog::records::checksums::{self, SealedTable};
+use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
@@ -167,7 +167,7 @@ impl Catalog {
                     .bind(now)
                     .execute(&mut *conn)
                     .await?;
-                checksums::seal(conn, SealedTable::VerdictUndo, &[act]).await?;
+                checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
                 let query = sqlx::query_as(LOG).bind(act).bind(None::<&str>);
                 Ok(query.fetch_all(conn).await?)
             })
@@ -242,7 +242,7 @@ pub(crate) async fn insert(
     let Some((row, act)) = inserted else {
         return Ok(None);
     };
-    checksums::seal(conn, SealedTable::Verdict, &[row]).await?;
+    checksums::store(conn, ChecksummedTable::Verdict, &[row]).await?;
     Ok(Some(act))
 }
 
