@@ -21,9 +21,9 @@ use tokio::time::Instant;
 pub(super) struct ConnectionLimits {
     /// Maximum number of open connections.
     pub(super) connections: usize,
-    /// Maximum time until the header of the next request is complete. This limits idle connections as well.
+    /// Maximum wait for a complete request header. A connection without a request is closed after this time too.
     pub(super) header: Duration,
-    /// Maximum time from the response to the next request. This limits clients that do not read the response.
+    /// Maximum time from a response to the next request. Closes connections whose client does not read the response.
     pub(super) response: Duration,
     /// Maximum time that the shutdown waits for a response.
     pub(super) shutdown: Duration,
@@ -137,7 +137,7 @@ pub(super) async fn serve_connection(
             // Errors concern only this client, which may have closed the connection at any time.
             _ = served.as_mut() => return ConnectionEnd::Closed,
             () = activity.idle_for(limits.response) => return ConnectionEnd::Closed,
-            // The connection is polled only here, so no request can begin between the check and the return.
+            // No request can begin between the check and the return, because only this loop polls the connection.
             () = activity.close.notified() => if activity.idle_since().is_some() {
                 return ConnectionEnd::Closed;
             },

@@ -1,7 +1,7 @@
-//! Accepts connections of the review page. The number of connections, the time for a request's header, the time without
-//! a request, and the time for the shutdown are limited, so that no client can stop the server or keep it running.
+//! Accepts connections of the review page. Their number and all waiting times are limited, so that no client can block
+//! the server or delay its shutdown.
 //!
-//! `axum::serve` has none of these limits. See <https://github.com/tokio-rs/axum/issues/2741>.
+//! `axum::serve` has no such limits. See <https://github.com/tokio-rs/axum/issues/2741>.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,8 +63,8 @@ impl OpenConnections {
     ) -> std::convert::Infallible {
         loop {
             let Ok((stream, _)) = listener.accept().await else {
-                // If file descriptors are lacking, a closed connection frees one. Any other error concerns only the
-                // connection that was not accepted.
+                // If the process has no free file descriptor, closing an idle connection frees one. Any other error
+                // concerns only the connection that was not accepted.
                 self.close_idle();
                 tokio::time::sleep(Duration::from_millis(100)).await;
                 continue;

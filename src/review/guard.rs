@@ -132,12 +132,12 @@ fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
     Ok(())
 }
 
-/// Reads the body, so that a handler that has begun does not wait for the client.
+/// Reads the whole body first, so that no handler waits for a slow client.
 async fn with_whole_body(request: Request) -> Result<Request, Rejection> {
     let (head, body) = request.into_parts();
     match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, BODY_LIMIT)).await {
         Ok(Ok(body)) => Ok(Request::from_parts(head, body.into())),
-        // If the client closed the connection, this reason is wrong, but nobody reads it.
+        // Also returned if the client closed the connection, but then nobody reads it.
         Ok(Err(_)) => Err(TOO_LARGE),
         Err(_) => Err(TOO_SLOW),
     }

@@ -280,7 +280,7 @@ impl ImageCache {
         self.read(item, read).await
     }
 
-    /// Calls `read` on another thread with the current results of the item's pair, for one item at a time.
+    /// Calls `read` with the current results of the item's pair, on another thread. Only one call runs at a time.
     async fn read<T: Send + 'static>(
         &self,
         item: &Arc<ReviewItem>,
@@ -292,7 +292,7 @@ impl ImageCache {
         let pair = found.ok_or(ImageError::Gone)?.results;
         let (project, item) = (self.project.clone(), Arc::clone(item));
         tokio::task::spawn_blocking(move || {
-            // A task continues after its client has left, so the task holds the permit.
+            // The task itself holds the permit, because it continues even if the client leaves.
             let _permit = permit;
             read(&project, &pair, &item)
         })

@@ -13,8 +13,8 @@ use crate::raster::ImageLimits;
 pub struct QueueOptions {
     /// Name of the reviewer.
     pub reviewer: String,
-    /// Metrics whose results are reviewed. If empty, all metrics are. Results of other metrics get no verdict, even if
-    /// they look the same. They are not a random sample, so such verdicts would bias the measured accuracy.
+    /// Metrics whose results are reviewed. If empty, the results of all metrics are reviewed. A result of another
+    /// metric gets no verdict, even if it looks the same as a reviewed one.
     pub metrics: Vec<ThresholdMetric>,
     /// Order of the results.
     pub order: ReviewOrder,

@@ -29,7 +29,7 @@ fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Ma
     }
 }
 
-/// Returns the response to the start address: a page that leads on to the review page.
+/// Returns the page at the start address. It sends the browser on to the review page.
 pub(super) fn forward(language: Language) -> Markup {
     let title = language.translate("forward");
     let head = html! { meta http-equiv="refresh" content="0;url=/"; };
