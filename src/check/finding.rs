@@ -16,7 +16,7 @@ pub enum Kind {
     Database,
     /// A table, index or trigger differs from the schema.
     Schema,
-    /// A row that no run can compute again differs from its checksum, is missing, or has an invalid value.
+    /// A row that a run cannot restore. It differs from its checksum, is missing, or has an invalid value.
     Row,
     /// The hash of a fingerprint does not follow from its settings.
     Fingerprint,

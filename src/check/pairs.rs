@@ -19,7 +19,7 @@ const ROUNDING: f64 = 1e-12;
 pub(super) struct PairCheck {
     pub(super) pair: PairId,
     pub(super) damage: Vec<Finding>,
-    /// Hashes of all artifacts that the pair's rows reference, even if their stage will run again.
+    /// Hashes of all artifacts that the pair's rows reference, including rows of stages that will run again.
     pub(super) named: Vec<ContentHash>,
     /// Number of files checked.
     pub(super) files: u64,
@@ -34,9 +34,8 @@ impl PairCheck {
     }
 }
 
-/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of the job's next
-/// stage (its cursor) and of later stages are left from an earlier run. Their files count as referenced, but are not
-/// checked.
+/// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of stages that will
+/// run again (from the job's cursor on) are not checked, but their files count as referenced.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
@@ -109,7 +108,7 @@ fn state(pair: &AuditedPair) -> Vec<Finding> {
         }
     }
     let last = pair.results.get(&Stage::Register);
-    // Without the depth row, the hashes are unknown, and the metrics are computed again anyway.
+    // If the depth row is missing, a repair reruns the depth stage and replaces the metrics, so they need no check.
     if let (JobStatus::Done, Some(last)) = (status, last)
         && pair.results.contains_key(&Stage::Depth)
         && metrics_of(pair, last).is_none_or(|metrics| !agree(&metrics, &pair.metrics))
@@ -138,7 +137,7 @@ fn has_its_hash(result: &AuditedResult) -> bool {
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
 }
 
-/// Returns the result of each metric, computed from the results of the stages.
+/// Returns the result of each metric, derived from the results of the register and depth stages.
 fn metrics_of(
     pair: &AuditedPair,
     register: &AuditedResult,
@@ -156,8 +155,8 @@ fn metrics_of(
     )
 }
 
-/// Returns whether the rows of the metrics agree with the results that they are copied from. SQLite converts the numbers
-/// from text, and guarantees only 15 digits.
+/// Returns whether the rows of the metrics agree with the results of the stages. SQLite converts the rows' numbers from
+/// text and guarantees only 15 digits, so small differences are allowed.
 fn agree(
     computed: &BTreeMap<ThresholdMetric, MetricResult>,
     stored: &BTreeMap<ThresholdMetric, MetricResult>,

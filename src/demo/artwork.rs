@@ -111,8 +111,8 @@ impl Artwork {
     }
 }
 
-/// Draws the outward offset of the outline in mm. A stroke widens by twice the offset, which is 2.6-4.4 % of the
-/// character's size.
+/// Draws the outward offset of the outline in mm. A stroke widens by twice the offset: by 2.6-4.4 % of the character's
+/// size.
 fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }

@@ -93,7 +93,7 @@ struct ManifestLine {
 /// Writes the dataset below `dir`, unless a complete dataset with the same options is already there.
 ///
 /// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`, then `dataset.json`. If a run is killed
-/// before that, the next run replaces all files. Calls `is_stopped` before each pair.
+/// before it writes `dataset.json`, the next run replaces all files. Calls `is_stopped` before each pair.
 ///
 /// # Errors
 /// Returns an error if an image cannot be encoded, a file cannot be written or `is_stopped` returns true.

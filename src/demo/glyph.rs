@@ -8,8 +8,8 @@ use crate::raster::Grid;
 /// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. See `assets/LICENSE-mocban-demo-mincho.txt`.
 const FONT: &[u8] = include_bytes!("../../assets/mocban-demo-mincho.ttf");
 
-/// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, and
-/// the height of a single horizontal bar is too small for that.
+/// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so a
+/// character such as a single horizontal bar is too flat.
 const MIN_HEIGHT_BY_WIDTH: f32 = 0.5;
 
 /// The embedded font.
@@ -36,8 +36,8 @@ impl Glyphs {
         &self.characters
     }
 
-    /// Draws a character into `coverage`, the share of ink, 0..=1, in each sample's cell. The character's bounding box
-    /// is centred on `centre_mm`, and its longest side is `size_mm`.
+    /// Draws a character into `coverage`, which holds the inked share, 0..=1, of each sample's cell. The character's
+    /// bounding box is centred on `centre_mm`, and its longest side is `size_mm`.
     pub(super) fn ink(
         &self,
         character: char,

@@ -5,7 +5,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::raster::{Grid, Mask};
 
-/// A square grid of samples around the character's centre. On the print, u points right and v down. Both are in mm.
+/// A square grid of samples around the character's centre. Its coordinates (u, v) are in mm. On the print, u points
+/// right and v points down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampleFrame {
     /// Number of samples per side.

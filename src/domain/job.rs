@@ -36,7 +36,7 @@ impl JobStatus {
     }
 }
 
-/// Number of workers that died while they leased only this pair, below which a pair is never quarantined.
+/// A pair is quarantined for killing workers only after this number of them died while they leased no other pair.
 pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair must be quarantined because it probably kills its workers.

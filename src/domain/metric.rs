@@ -6,7 +6,7 @@ use super::enum_names;
 
 /// How the threshold between strokes and background of a depth map is selected (paper III-C).
 ///
-/// `P` is the ink mask of the print. `D(t)` is the depth mask: the heights at and above threshold `t`. The default
+/// `P` is the ink mask of the print. `D(t)` is the depth mask: the pixels at or above the height `t`. The default
 /// method compares the masks after alignment, where both images have data. It tries 40 evenly spaced depths below the
 /// stroke tops, from `register.threshold_min` to `register.threshold_max` (shares of the carving's depth). The paper's
 /// method compares the masks before alignment, over fixed ranges of grey levels. It scales each mask by its bounding
@@ -27,12 +27,13 @@ pub enum ThresholdMetric {
     /// Maximizes the same mean as [`Self::NlSsim`], but only over masks with an area between `A / 1.12` and `1.12 A`.
     /// `A` is the area of [`Self::Relief`]'s mask, clamped to `a(P) / 2.2 ..= 1.15 a(P)`. If no mask qualifies, the
     /// threshold nearest to [`Self::Relief`]'s is used. The score is the mean. The paper's method instead uses the
-    /// better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
+    /// threshold of [`Self::NlSsim`] or [`Self::Density`], whichever gives the higher IoU of the registered masks.
     Ensemble,
-    /// The depth at which the stroke tops end and the walls begin, as a share of the relief, from the histogram of
-    /// heights alone. It is the geometric mean of 0.075 (the usual depth) and a measured depth (clamped to
-    /// 0.02..=0.25). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w + peak)
-    /// / 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's method.
+    /// The depth at which the stroke tops end and the walls begin, as a share of the carving's depth. It is computed
+    /// from the histogram of heights alone: the geometric mean of 0.075 (the usual value) and a measured depth (clamped
+    /// to 0.02..=0.25). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w +
+    /// peak) / 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's
+    /// method.
     Relief,
 }
 
@@ -44,7 +45,7 @@ impl ThresholdMetric {
     /// The paper's three metrics, which both methods compute.
     pub const PAPER: [Self; 3] = [Self::NlSsim, Self::Density, Self::Ensemble];
 
-    /// Returns the name in the printed table. The paper's metrics have the names that the paper uses.
+    /// Returns the name shown in reports. The paper's metrics have the names that the paper uses.
     pub const fn title(self) -> &'static str {
         match self {
             Self::NlSsim => "Non-luminous SSIM",

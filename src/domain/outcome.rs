@@ -35,8 +35,8 @@ pub struct SideEvidence {
     /// are no faces, and under the paper's method.
     pub winding: Option<f64>,
     /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
-    /// stores `|a - b| / (a + b)` instead: the points on one side have the mean distance `a` from their centroid, those
-    /// on the other side `b`.
+    /// stores `|a - b| / (a + b)` instead, where `a` and `b` are the mean distances of the points on either side from
+    /// the centroid of that side.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,
@@ -83,7 +83,7 @@ pub struct DepthScale {
 }
 
 impl DepthScale {
-    /// Returns the height of a level 1..=65535 over the fitted surface, in mesh units.
+    /// Returns the height over the fitted surface, in mesh units, of a depth-map level 1..=65535.
     pub fn height(&self, level: u16) -> f64 {
         self.height_min + f64::from(level.saturating_sub(1)) * self.height_per_level
     }
@@ -219,8 +219,8 @@ pub struct PoseFeatures {
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, divided by the score of the best pose.
     pub mirrored: f64,
-    /// Sensitivity of the pose to its start: the largest distance between the best of three results and another one, as
-    /// a share of the depth map's longest side. The results are refined from starts with slightly different sizes.
+    /// Sensitivity of the pose to its start. The pose is refined from three starts with slightly different sizes. This
+    /// is the largest distance from the best result to another, as a share of the depth map's longest side.
     #[serde(default)]
     pub spread: f64,
 }

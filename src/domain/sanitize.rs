@@ -75,7 +75,7 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Returns a text like [`one_line`]. If more than `most` characters result, the rest is replaced by three dots.
+/// Returns a text like [`one_line`]. If it is longer than `most` characters, it is cut and three dots are added.
 ///
 /// ```
 /// use mocban::domain::sanitize;
@@ -98,8 +98,8 @@ pub fn sanitize(text: &str, most: usize) -> String {
     shown
 }
 
-/// Returns a JSON text in which hidden characters are escaped as in JSON: `\u202e`. Its values stay the same. The text
-/// must not contain raw control characters other than line breaks, as no JSON text does within strings.
+/// Returns a JSON text with the same values, in which hidden characters are written as JSON escapes such as `\u202e`.
+/// Control characters up to U+001F are kept: in valid JSON they are only white space between tokens.
 ///
 /// ```
 /// use mocban::domain::visible_json;

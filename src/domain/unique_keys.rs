@@ -8,7 +8,7 @@ use serde_json::{Map, Number, Value};
 /// End of the message about a key that an object has twice.
 pub(crate) const KEY_TWICE: &str = "is given twice";
 
-/// A JSON value. Its objects, nested ones included, have no key twice; a [`Value`] would keep only the last one.
+/// A JSON value in which no object has the same key twice. A plain [`Value`] would silently keep only the last.
 ///
 /// ```
 /// use mocban::domain::UniqueKeys;

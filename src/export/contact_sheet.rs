@@ -85,9 +85,9 @@ struct SheetCandidate {
     truth_problem: Option<String>,
 }
 
-/// Draws the contact sheet of a project from the current state of its catalog, without unfinished pairs.
+/// Draws the contact sheet of a project. Unfinished pairs are left out.
 ///
-/// An image that cannot be drawn is left blank. If print or depth map cannot be read, the cell states the reason.
+/// An image that cannot be drawn is left blank. If a print or depth map cannot be read, its cell states the reason.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read, or a worker task panics.
@@ -170,7 +170,7 @@ fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetO
     }
 }
 
-/// Draws the cell of a pair. The text is the reason if images of a result cannot be drawn.
+/// Draws the cell of a pair. Also returns the reason if the images of its result cannot be drawn.
 fn cell(
     project: &Project,
     candidate: &SheetCandidate,

@@ -27,7 +27,7 @@ const FILES: [(&str, &[&str]); 4] = [
     ),
 ];
 
-/// Names of files in the folder of a pair and of a metric, without their extensions.
+/// File names, without extensions, in the folders of pairs and of metrics.
 const IMAGES: [&str; 9] = [
     "print",
     "print_mask",
@@ -117,7 +117,7 @@ fn foreign_in_pair(pair: &Path) -> Result<Option<PathBuf>> {
     Ok(None)
 }
 
-/// Returns whether an entry is a regular file with the name of an exported image or of its scale.
+/// Returns whether an entry is a regular file with the name of an exported image, with any extension.
 fn is_image(entry: &DirEntry) -> Result<bool> {
     let name = PathBuf::from(entry.file_name());
     let stem = name.file_stem().unwrap_or_default();

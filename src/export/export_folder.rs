@@ -60,8 +60,8 @@ impl Folder {
     /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be synced or renamed, or the target is no longer an export. The target is
-    /// then kept.
+    /// Returns an error if the folder cannot be synced or renamed, or the target is no longer an export. If the error
+    /// occurs before the target is replaced, the target is kept.
     pub(super) fn finish(self) -> Result<Leftover, FolderError> {
         // Somebody may have put files into the target while the export was written.
         refuse_foreign(self.0.target())?;

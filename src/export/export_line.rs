@@ -126,7 +126,7 @@ pub struct LineManualAlignment {
     pub print_from_mesh: PrintFromMesh,
     /// 3x3: depth-map pixel to print pixel. Null if the depth map has changed since the manual alignment.
     pub print_from_depth: Option<[[f64; 3]; 3]>,
-    /// Intersection over union of the masks, on the canvas used for the scores of this line.
+    /// Intersection over union of the stroke mask and the ink mask, on the canvas used for scores.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,

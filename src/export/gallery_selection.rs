@@ -50,7 +50,7 @@ pub struct GallerySelection {
 struct SelectedResults {
     /// Number of such results in the project.
     total: u64,
-    /// The results to draw, each with a sort key. The key is random in the random sample and 0 elsewhere.
+    /// The results to draw, each with its sort key: a random number in the random sample, and otherwise 0.
     subjects: Vec<(f64, GallerySubject)>,
 }
 

@@ -42,7 +42,7 @@ pub struct ExportSummary {
     pub without_result: u64,
     /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
-    /// Whether the new export was discarded because it lacks files of finished pairs. The earlier export was kept.
+    /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs cannot be read.
     pub kept_earlier: bool,
     /// The path of an earlier export that could not be removed after it was replaced, and why.
     pub leftover: Option<(PathBuf, String)>,
@@ -69,8 +69,8 @@ pub enum ExportError {
 /// incomplete export never replaces an earlier export: the new one is discarded.
 ///
 /// # Errors
-/// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. An earlier
-/// export is then kept, unless the error is that it cannot be removed after its replacement.
+/// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. If the error
+/// occurs before the earlier export is replaced, that export is kept.
 pub async fn to_jsonl(
     catalog: &Catalog,
     project: &Project,

@@ -188,7 +188,7 @@ impl<'a> PairFiles<'a> {
 fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
     match path.parent().map_or(Ok(()), std::fs::create_dir_all) {
-        // A disk error can hide that the folder exists. Writing the file then fails with the true reason, or succeeds.
+        // Also `AlreadyExists` if an existing folder cannot be inspected. Writing the file then shows the true reason.
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {
             return Err(at(&path)(error).into());
         }

@@ -83,8 +83,8 @@ impl SourcePrint {
 
 /// Draws the print, the aligned relief and the overlay of a metric's result. The longest side of each is `side` pixels.
 ///
-/// An image that cannot be drawn is `None`. The text is the reason if the pair has a result whose print or depth map
-/// cannot be read, and otherwise `None`.
+/// An image that cannot be drawn is `None`. If the pair has a result, but its print or depth map cannot be read, also
+/// returns the reason as text.
 pub(super) fn result_images(
     project: &Project,
     pair: &PairResults,
@@ -94,7 +94,7 @@ pub(super) fn result_images(
 ) -> ([Option<Rgb>; 3], Option<String>) {
     let print = match SourcePrint::read(project, pair, limits) {
         Ok(print) => print,
-        // The failure of a pair without a result says what is wrong with the print.
+        // A pair without a result has a stored failure, so the reason is returned only for a pair with a result.
         Err(error) => {
             let has_result = pair.metric(metric).is_some();
             return ([None, None, None], has_result.then(|| error.to_string()));

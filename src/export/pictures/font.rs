@@ -10,7 +10,7 @@ pub(super) const HEIGHT: usize = 7;
 
 /// The rows of each glyph, from the top. Bit 4 of a row is the leftmost dot.
 ///
-/// In the font file, the letter in quotes stands on a line before the rows of its glyph. A `#` is a dot.
+/// In the font file, each glyph is a line with the letter in quotes, followed by the rows. A `#` is a dot.
 static GLYPHS: LazyLock<BTreeMap<char, [u8; HEIGHT]>> = LazyLock::new(|| {
     let lines: Vec<&str> = include_str!("../../../assets/export/font.txt")
         .lines()

@@ -69,8 +69,8 @@ impl PrintView {
         picture
     }
 
-    /// Draws the print, then the edges of the true stroke tops, then those of the depth mask. `tops` is in the print's
-    /// frame.
+    /// Draws the print, the edges of the true stroke tops, and on top the edges of the depth mask. `tops` is in the
+    /// print's frame.
     pub fn overlay_on_truth(
         &self,
         print: &PrintImage,

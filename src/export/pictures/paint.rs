@@ -17,7 +17,8 @@ pub(in crate::export) fn eight_bits(print: &PrintImage) -> Rgb {
     print.rgb.map(|colour| colour.map(narrow))
 }
 
-/// Resizes an image. Each output pixel is the mean of the area it covers or, if enlarged, the nearest source pixel.
+/// Resizes an image. If it shrinks, each output pixel is the mean of the area it covers. If it grows, each is the
+/// nearest source pixel.
 pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();

@@ -40,7 +40,7 @@ fn light(across: f64, down: f64) -> f64 {
     ((toward * (across + down) + sin) / normal).max(0.0)
 }
 
-/// Returns each pixel's mean over 3 x 3 pixels, without missing data. Otherwise scanner noise would hide the strokes.
+/// Returns the mean of the valid pixels among the 3 x 3 around each valid pixel, so that noise does not hide strokes.
 fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     Grid::from_fn(levels.width(), levels.height(), |x, y| {
         if levels.at(x, y) == 0 {

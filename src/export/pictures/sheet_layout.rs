@@ -30,7 +30,7 @@ pub struct ContactSheetCell {
     pub id: String,
     /// Its scores, or why it failed.
     pub note: String,
-    /// Whether the result is missing, failed by reviewers, or off the ground truth.
+    /// Whether the result is missing, was failed by reviewers, or misses the ground truth.
     pub wrong: bool,
     /// Print, aligned relief and overlay, where they exist.
     pub tiles: [Option<Rgb>; TILES],
