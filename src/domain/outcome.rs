@@ -49,7 +49,7 @@ pub struct FitOutcome {
     pub plane_from_mesh: Rigid3,
     /// Curved surface of the stroke tops. `None` if the block is flat.
     pub bow: Option<Bow>,
-    /// Largest minus smallest height of the curved surface over the character, in mesh units; 0 for a flat block.
+    /// Largest minus smallest height of the curved surface within the scan's bounds, in mesh units; 0 for a flat block.
     pub bow_height: f64,
     /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,

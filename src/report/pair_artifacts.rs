@@ -156,8 +156,8 @@ impl<'a> PairArtifacts<'a> {
         Ok(grey.map(|value| *value == INK))
     }
 
-    /// Returns the map from depth-map pixels to print pixels for points on the fitted plane, which `print_from_mesh`
-    /// maps to the print. Returns `None` if `depth_from_plane` is singular.
+    /// Converts `print_from_mesh` to a map from depth-map pixels to print pixels, for points on the fitted plane.
+    /// Returns `None` if `depth_from_plane` is singular.
     ///
     /// # Errors
     /// Returns an error if the result of the fit or depth stage cannot be read.

@@ -5,8 +5,8 @@ use super::number_format::format_count;
 
 /// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
 ///
-/// Every row with an Acc must reach `least` (0..=1). If nobody has passed or failed a result, no row has an Acc, which
-/// is reported as a reason. Only verdicts count, not ground truth.
+/// Every row with an Acc must reach `least` (0..=1). Acc is computed from verdicts alone, without ground truth. If
+/// nobody has passed or failed a result, there is no Acc, and the returned reason says so.
 pub fn below(report: &Report, least: f64) -> Vec<String> {
     let rows = report.rows.iter();
     let judged: Vec<_> = rows

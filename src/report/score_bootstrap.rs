@@ -14,8 +14,8 @@ use crate::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
-/// Number of resampled quantities. Each metric has its scores and its passes. Each two compared metrics have the
-/// differences of their scores.
+/// Number of resampled quantities: the scores and the Acc of each metric, and the score differences of each two
+/// compared metrics.
 const WIDTH: usize = METRICS * SCORES + METRICS + COMPARED_METRICS.len() * SCORES;
 
 /// How the bootstrap was done.
@@ -44,7 +44,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc. `None` unless whole blocks were resampled, and `None` if all results passed or all failed.
+    /// Of Acc. `None` if pairs were resampled instead of blocks, or if all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 
@@ -240,7 +240,7 @@ mod tests {
         assert_eq!(how(&by_block), Some((ResamplingUnit::Block, 14)));
         assert_eq!(by_pair.means[0].acc_by_block, None);
         let [low, high] = by_block.means[0].acc_by_block.expect("14 blocks");
-        // The bounds are from NumPy 2.4.6 with a million resamples, whose standard deviation is 0.045.
+        // Bounds from NumPy 2.4.6 with a million resamples. The standard deviation of the resampled Acc is 0.045.
         assert!(
             (low - 0.762).abs() < 0.006 && (high - 0.929).abs() < 0.006,
             "{low} {high}"

@@ -60,7 +60,7 @@ pub struct ScoreComparison {
     pub n: u64,
     /// Mean of the first minus mean of the second.
     pub difference: f64,
-    /// The 95 % interval of the difference. `None` if there are too few units.
+    /// The 95 % interval of the difference. `None` if there are too few pairs or blocks to resample.
     pub ci95: Option<[f64; 2]>,
     /// Name of the test that gave interval and `p`.
     pub test: &'static str,

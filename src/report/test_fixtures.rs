@@ -161,7 +161,7 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
     }
 }
 
-/// Returns the agreement of two reviewers who both pass `pass` results and disagree on `disputed` more.
+/// Returns the agreement of two reviewers who both pass `pass` results and disagree on `disputed` other results.
 pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
     let mut table = VerdictTable::default();
     (0..pass).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));

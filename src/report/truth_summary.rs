@@ -22,7 +22,7 @@ pub struct TruthSummary {
     pub angle_median_deg: Option<f64>,
     /// Median landmark error, in percent of the character's height.
     pub tre_median_pct: Option<f64>,
-    /// Median `mask_iou` of the results that have a tops mask. `None` if none has one.
+    /// Median `mask_iou` of the results that have a tops mask. `None` if no result has a tops mask.
     pub mask_iou_median: Option<f64>,
     /// Mirrored results.
     pub mirrored: u64,

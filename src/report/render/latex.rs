@@ -100,7 +100,7 @@ fn escape(text: &str) -> String {
         '\n' | '\r' => " ".to_owned(),
         other => other.to_string(),
     };
-    // Before the other escapes: LaTeX would take the backslash of a visible escape for a command.
+    // `visible` comes first, because the backslashes that it adds must be escaped too.
     visible(text).chars().map(escape).collect()
 }
 

@@ -73,7 +73,7 @@ fn escape(text: &str) -> String {
         '\\' | '`' | '*' | '_' | '|' | '<' | '>' | '[' | ']' | '#' | '~' => format!("\\{c}"),
         other => other.to_string(),
     };
-    // Before the other escapes, which keep the backslash of a visible escape.
+    // `one_line` comes first, because the backslashes that it adds must be escaped too.
     one_line(text).chars().map(escape).collect()
 }
 

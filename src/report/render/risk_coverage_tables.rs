@@ -70,7 +70,7 @@ fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
 }
 
 /// Returns a sentence that counts a metric's failures among its least confident results. Returns `None` if there are no
-/// failures, or too few results for 3 % to be one result.
+/// failures, or if 3 % of the results is less than one result.
 fn failures(curve: &RiskCoverageCurve) -> Option<String> {
     let is_enough = curve.n * LEAST_CONFIDENT_PERCENT >= 100;
     // The number is rounded up, so its share is above 3 %.

@@ -14,7 +14,8 @@ pub const BOOTSTRAP_SEED: u64 = 1;
 const MAX_RESAMPLES: usize = 10_000;
 /// Fewest resamples, however many units there are.
 const MIN_RESAMPLES: usize = 1000;
-/// Limit on the draws of all resamples together: a large sample gets fewer resamples, but at least `MIN_RESAMPLES`.
+/// Maximum number of units drawn for all resamples together. A large sample gets fewer resamples, but at least
+/// `MIN_RESAMPLES`.
 const MAX_DRAWS: usize = 50_000_000;
 /// Resamples that one thread adds up in one pass over the units.
 const STREAMS_PER_PASS: usize = 8;
@@ -37,7 +38,8 @@ pub fn resample_count(units: usize) -> usize {
     }
 }
 
-/// Returns the mean of each of the `width` quantities in every resample. Resamples without the quantity are skipped.
+/// Returns the mean of each of the `width` quantities in every resample. Resamples that contain no value of a quantity
+/// are skipped for that quantity.
 ///
 /// All quantities use the same drawn units, so the means of two quantities can be compared resample by resample. The
 /// result depends on the order of the units, not on the number of threads.
@@ -152,7 +154,7 @@ mod tests {
             .collect()
     }
 
-    /// Sums units one after another as they are drawn, as textbooks describe the bootstrap.
+    /// Draws a resample in the plain way: adds one unit after another.
     fn resample_slowly(units: &[QuantitySums], width: usize, stream: u64) -> QuantitySums {
         let mut rng = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
         rng.set_stream(stream);

@@ -67,8 +67,8 @@ pub fn wilson_95(count: u64, n: u64) -> Option<[f64; 2]> {
 
 /// Returns the exact 95 % interval of `count / n`, with both bounds in 0..=1, or `None` if `n` is 0.
 ///
-/// At the lower bound, `count` or more successes have a probability of 2.5 %. At the upper bound, `count` or fewer do.
-/// Source: Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404.
+/// At the lower bound, `count` or more successes have a probability of 2.5 %. At the upper bound, `count` or fewer
+/// successes have that probability. Source: Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404.
 ///
 /// ```
 /// use mocban::report::stats::clopper_pearson_95;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::bootstrap::{QuantitySums, bootstrap_p, percentile_interval_95, resampled_means};
 
-/// Smallest number of units with a quantity for which an interval is computed. With fewer, it would be too narrow.
+/// An interval is computed only if at least this number of units have the quantity. Otherwise it would be too narrow.
 pub const MIN_UNITS: usize = 10;
 /// Largest number of units in a sample. A larger sample is not resampled, because its sampling error is negligible.
 pub const MAX_UNITS: usize = 100_000;
