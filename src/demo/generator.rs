@@ -7,7 +7,7 @@ use super::glyph::Glyphs;
 use super::pair::{DemoPair, drawn_pair};
 use super::tier::Tier;
 
-/// Generates the pairs of a tier from a seed. A pair does not depend on the number of generated pairs.
+/// Generates the pairs of a tier from a seed. Each pair depends only on its index and the generator's settings.
 pub struct PairGenerator {
     glyphs: Glyphs,
     tier: Tier,

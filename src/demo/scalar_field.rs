@@ -5,8 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::raster::{Grid, Mask};
 
-/// A square grid of samples around the character's centre. Its coordinates (u, v) are in mm. On the print, u points
-/// right and v points down.
+/// A square grid of samples centred on the character. Its coordinates in mm are u (right on the print) and v (down).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampleFrame {
     /// Number of samples per side.

@@ -32,8 +32,7 @@ pub enum ThresholdMetric {
     /// The depth at which the stroke tops end and the walls begin, as a share of the carving's depth. It is computed
     /// from the histogram of heights alone: the geometric mean of 0.075 (the usual value) and a measured depth (clamped
     /// to 0.02..=0.25). The measured depth is the first below the peak with a frequency of at most `min(2.5 w, (w +
-    /// peak) / 2)`, where `w` is the median frequency on the walls. There is no score (0). Not part of the paper's
-    /// method.
+    /// peak) / 2)`, where `w` is the median frequency on the walls. The score is 0. Not part of the paper's method.
     Relief,
 }
 

@@ -254,7 +254,7 @@ pub struct MetricOutcome {
 }
 
 impl MetricOutcome {
-    /// Results with a lower confidence should be checked before they are used.
+    /// Results with a confidence below this value should be checked before use.
     pub const LOW_CONFIDENCE: f64 = 0.5;
 
     /// Returns whether the confidence is known and below [`Self::LOW_CONFIDENCE`].

@@ -60,8 +60,8 @@ impl SourcePrint {
         }
     }
 
-    /// Returns the image as a file whose stored pixels are upright: the file itself, or a PNG if the file has an EXIF
-    /// orientation, which some programs ignore.
+    /// Returns a file whose stored pixels are upright: the original, or a PNG if the original has an EXIF orientation.
+    /// Some programs ignore EXIF orientations.
     pub(super) fn upright_file(&self) -> Cow<'_, [u8]> {
         match self.picture.turned {
             None => Cow::Borrowed(&self.file.bytes),
@@ -94,7 +94,7 @@ pub(super) fn result_images(
 ) -> ([Option<Rgb>; 3], Option<String>) {
     let print = match SourcePrint::read(project, pair, limits) {
         Ok(print) => print,
-        // A pair without a result has a stored failure, so the reason is returned only for a pair with a result.
+        // If there is no result, the stored failure of the pair already names the problem.
         Err(error) => {
             let has_result = pair.metric(metric).is_some();
             return ([None, None, None], has_result.then(|| error.to_string()));

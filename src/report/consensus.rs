@@ -10,9 +10,9 @@ pub enum Consensus {
     Unjudged,
     /// Only an earlier result was judged.
     Stale,
-    /// Every reviewer who was not unsure passed the result, or a conflict was adjudicated as a pass.
+    /// All reviewers with a decision passed the result, or a conflict was adjudicated as a pass.
     Passed,
-    /// Every reviewer who was not unsure failed the result, or a conflict was adjudicated as a fail.
+    /// All reviewers with a decision failed the result, or a conflict was adjudicated as a fail.
     Failed,
     /// All reviewers were unsure.
     Unsure,

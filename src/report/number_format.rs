@@ -33,8 +33,8 @@ impl NumberStyle {
 
 /// Formats a number for a report. JSON and CSV reports do not use this format, because they hold all digits.
 ///
-/// Shares and p-values have three decimals, angles two, percentages and seconds one, counts and milliseconds none. A
-/// comma separates thousands. A p-value that would round to 0 is `<0.001`.
+/// The number of decimals is 3 for shares and p-values, 2 for angles, 1 for percentages and seconds, and 0 for counts
+/// and milliseconds. A comma separates thousands. A p-value that would round to 0 is `<0.001`.
 pub fn format_number(value: f64, style: NumberStyle) -> String {
     if style == NumberStyle::PValue && value < 0.0005 {
         return "<0.001".to_owned();

@@ -13,8 +13,7 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
-/// Range of planted rotations in degrees. A result passes within about 5 degrees, so each of these rotations is a
-/// fault, but not an obvious one.
+/// Range of planted rotations in degrees. Each exceeds the 5 degrees of a pass, but is not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
 /// A fault mirrors the relief only if the `IoU` of its strokes with their mirror image is at most this value.
 const MAX_SYMMETRY_IOU: f64 = 0.6;

@@ -1,5 +1,5 @@
 //! Accepts connections of the review page. Their number and all waiting times are limited, so that no client can block
-//! the server or delay its shutdown.
+//! the server or prevent its shutdown.
 //!
 //! `axum::serve` has no such limits. See <https://github.com/tokio-rs/axum/issues/2741>.
 

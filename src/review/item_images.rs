@@ -189,7 +189,7 @@ impl<T> CacheSlots<T> {
         Arc::clone(self.slots.entry(id.to_owned()).or_default())
     }
 
-    /// Records the bytes of a new value, and evicts the oldest values that do not fit with it.
+    /// Records the bytes of a new value. Evicts the oldest values until the rest fits.
     fn add(&mut self, id: &str, bytes: usize) {
         self.stored.push_back((id.to_owned(), bytes));
         let mut sum: usize = self.stored.iter().map(|(_, bytes)| bytes).sum();

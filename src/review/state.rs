@@ -21,8 +21,8 @@ pub(super) struct ServerState {
     /// Accepted values of the `Host` header, with port.
     pub(super) hosts: Vec<String>,
     pub(super) images: ImageCache,
-    /// Every item served since the start, by id. Answers to these items are accepted even if their results were
-    /// replaced.
+    /// Every item served since the server started, by id. Answers to these items are accepted even if their results
+    /// were replaced.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
 }
 

@@ -17,8 +17,7 @@ pub(in crate::export) fn eight_bits(print: &PrintImage) -> Rgb {
     print.rgb.map(|colour| colour.map(narrow))
 }
 
-/// Resizes an image. If it shrinks, each output pixel is the mean of the area it covers. If it grows, each is the
-/// nearest source pixel.
+/// Resizes an image by averaging areas along a shrinking axis, and by nearest pixels along a growing axis.
 pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();

@@ -40,7 +40,7 @@ fn light(across: f64, down: f64) -> f64 {
     ((toward * (across + down) + sin) / normal).max(0.0)
 }
 
-/// Returns the mean of the valid pixels among the 3 x 3 around each valid pixel, so that noise does not hide strokes.
+/// Returns the 3 x 3 mean around each valid pixel, over valid pixels only. Scanner noise would otherwise hide strokes.
 fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     Grid::from_fn(levels.width(), levels.height(), |x, y| {
         if levels.at(x, y) == 0 {

@@ -1,4 +1,4 @@
-//! Tables as HTML, with a caption, column headers, and the first cell of each row as its header.
+//! Tables as HTML. Each has a caption and column headers, and the first cell of a row is the row's header.
 
 use maud::{Markup, html};
 
