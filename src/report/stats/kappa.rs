@@ -80,7 +80,7 @@ impl AgreementTable {
         })
     }
 
-    /// Returns `(observed - chance) / (1 - chance)`, where `chance` computes the agreement expected by chance.
+    /// Returns `(a - c) / (1 - c)`, where a is the observed agreement, and `chance` computes the expected agreement c.
     fn beyond_chance(self, chance: fn(f64, f64) -> f64) -> Option<f64> {
         let share = |count: u64| ratio(count as f64, self.n());
         let observed = share(self.agreed())?;
