@@ -35,8 +35,8 @@ pub struct SideEvidence {
     /// are no faces, and under the paper's method.
     pub winding: Option<f64>,
     /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
-    /// stores `|a - b| / (a + b)` instead, where `a` and `b` are the mean distances of the points on either side from
-    /// the centroid of that side.
+    /// stores `|a - b| / (a + b)` instead. For each side, `a` or `b` is the mean distance of the side's points from
+    /// their centroid.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,
