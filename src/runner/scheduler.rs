@@ -135,8 +135,7 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // This process has no other pair in progress, so it may claim a pair that must run alone. Pairs of other
-        // processes may still be in progress.
+        // This process has no other pair in progress. The catalog refuses the claim while another process has one.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {

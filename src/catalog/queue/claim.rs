@@ -19,7 +19,7 @@ pub struct ClaimRequest {
     pub slots: usize,
     /// Lease only pairs whose next stage is this one or an earlier one.
     pub until: Stage,
-    /// Whether to lease pairs that must run exclusively, or pairs that need not.
+    /// Whether to lease one pair that must run exclusively, or pairs that need not.
     pub exclusive: bool,
     /// Lease only these pairs. `None` for all pairs.
     pub among: Option<PairSelection>,
@@ -52,7 +52,8 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. The limit is `+?`, which hides its value from
+/// Leases the first ready jobs in the order of the index `job_ready`. An exclusive job is leased only while no other job
+/// is leased, by this worker or another one, and while it is leased, no other job is. The limit is `+?`, which hides its value from
 /// SQLite's query planner. With a plain `?`, SQLite would prepare the statement again each time.
 pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
@@ -60,6 +61,7 @@ WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
     ORDER BY prio, stage DESC, pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Like [`CLAIM`], but leases only selected pairs.
@@ -70,6 +72,7 @@ WHERE pair IN (
     WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Gives leases back. Their attempts do not count.
@@ -98,6 +101,11 @@ pub(crate) fn add_heartbeat(
 
 /// Adds a claim to a script.
 pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<Statement<Lease>> {
+    let slots = if request.exclusive {
+        request.slots.min(1)
+    } else {
+        request.slots
+    };
     let statement = match request.among {
         Some(_) => script.add(CLAIM_AMONG),
         None => script.add(CLAIM),
@@ -109,9 +117,10 @@ pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<S
     }
     script.bind(cursor(request.until))?;
     script.bind(i64::from(request.exclusive))?;
-    script.bind(request.slots as i64)?;
+    script.bind(slots as i64)?;
     script.bind(request.worker.0)?;
     script.bind(request.alive_since)?;
+    script.bind(i64::from(request.exclusive))?;
     Ok(statement)
 }
 

@@ -92,8 +92,11 @@ async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
     let world = World::new(2).await;
     let late = world.claim(1).await.remove(0);
     let other = world.recovered_by_another(1).await;
-    assert_eq!(world.claim_as(other, 1).await.len(), 1);
-    let lease = world.claim_exclusive(other).await.remove(0);
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = open::write_conn(&path, false).await.expect("a connection");
+    let shared = sqlx::query("UPDATE job SET exclusive = 0");
+    shared.execute(&mut conn).await.expect("stored");
+    let lease = world.claim_as(other, 2).await.remove(0);
     let mut lost = world.done(Stage::Fit);
     lost.outcome = r#"{"late":true}"#.to_owned();
     // Both requests are sent before either future is polled again.
@@ -307,6 +310,31 @@ async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
     let due = world.catalog.release_due_backoffs(25, 90_000).await;
     assert_eq!(due.expect("stored"), 1);
+    world.assert_counters().await;
+}
+
+/// A pair that must run exclusively waits for the leases of all workers, and all workers wait for its lease.
+#[tokio::test]
+async fn an_exclusive_pair_is_leased_alone_whichever_worker_asks() {
+    let world = World::new(3).await;
+    assert_eq!(world.claim(1).await.len(), 1);
+    let one = world.recovered_by_another(1).await;
+    let two = register(&world.catalog).await;
+    let lease = world.claim_as(one, 1).await.remove(0);
+    for worker in [one, two] {
+        assert!(world.claim_exclusive(worker).await.is_empty());
+    }
+    let released = world.catalog.release(lease).await;
+    assert!(released.expect("an answer"));
+    let alone = world.claim_exclusive(two).await.remove(0);
+    assert!(alone.exclusive());
+    for worker in [one, two] {
+        assert!(world.claim_as(worker, 1).await.is_empty());
+        assert!(world.claim_exclusive(worker).await.is_empty());
+    }
+    let released = world.catalog.release(alone).await;
+    assert!(released.expect("an answer"));
+    assert_eq!(world.claim_as(one, 3).await.len(), 2);
     world.assert_counters().await;
 }
 

@@ -128,6 +128,13 @@ impl Queue {
         if !process.is_alive() {
             return Vec::new();
         }
+        let mut leased = self.jobs.values();
+        let blocks =
+            |job: &Job| job.state.status() == JobStatus::Leased && (exclusive || job.exclusive);
+        if leased.any(blocks) {
+            return Vec::new();
+        }
+        let slots = if exclusive { 1 } else { slots };
         let ready = self.jobs.iter().filter_map(|(pair, job)| match job.state {
             JobState::Ready { stage } if job.exclusive == exclusive => {
                 Some((std::cmp::Reverse(stage), *pair))

@@ -50,6 +50,8 @@ async fn a_claim_scans_the_ready_index_in_order() {
         &[
             "job USING INDEX job_ready",
             "job USING COVERING INDEX job_ready",
+            // All leased jobs, to see whether one of them is exclusive.
+            "job USING INDEX job_leased",
         ],
     );
 }

@@ -41,9 +41,13 @@ impl Game {
             (recover.await, self.model.recover(&[other]))
         } else {
             if let Some(index) = self.somebody() {
+                let exclusive = self.is_likely(0.5);
+                self.claim_by(index, 1, exclusive).await;
                 self.model.processes[index].clock += LEASE / 2;
                 self.heartbeat_of(index).await;
             }
+            self.join().await;
+            let me = self.model.processes.last().expect("it joined").worker;
             let overdue = self.world.catalog.recover_overdue(me, 10, now);
             let expected = self.model.recover_overdue(me, 10);
             self.seen.overdue += expected;
