@@ -105,6 +105,13 @@ SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4,
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING id, act";
 
+/// Returns whether one of the first `?1` verdicts has the same values and was not undone.
+const IS_STORED: &str = "
+SELECT EXISTS (SELECT 1 FROM verdict AS v
+    WHERE v.pair = ?2 AND v.metric = ?3 AND v.reviewer = ?4 AND v.id <= ?1 AND v.at = ?5 AND v.result_hash = ?6
+    AND v.verdict = ?7 AND v.reason IS ?8 AND v.note IS ?9
+    AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act))";
+
 /// Selects the verdict log. If not NULL, `?1` limits it to one action and `?2` to one pair.
 const LOG: &str = "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
@@ -120,8 +127,8 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results in one transaction. Skips each verdict whose `event` is already stored.
-    /// Returns the number of appended verdicts.
+    /// Appends verdicts on the current results in one transaction. Skips each verdict whose `event` is already stored,
+    /// and each verdict with a time of which an equal one was stored before. Returns the number of appended verdicts.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
@@ -129,9 +136,11 @@ impl Catalog {
     pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
+                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
+                let newest: i64 = sqlx::query_scalar(newest).fetch_one(&mut *conn).await?;
                 let mut stored = 0;
                 for verdict in &verdicts {
-                    stored += u64::from(append(conn, verdict, now).await?);
+                    stored += u64::from(append(conn, verdict, newest, now).await?);
                 }
                 Ok(stored)
             })
@@ -185,8 +194,14 @@ impl Catalog {
     }
 }
 
-/// Appends a verdict. Returns `false` if all its rows are already stored.
-async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
+/// Appends a verdict. Returns `false` if all its rows are already stored. An equal verdict counts as stored up to the
+/// row `newest`.
+async fn append(
+    conn: &mut SqliteConnection,
+    new: &NewVerdict,
+    newest: i64,
+    now: UnixMillis,
+) -> Result<bool> {
     let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = sqlx::query_as(JUDGED)
         .bind(new.pair.as_str())
         .fetch_all(&mut *conn)
@@ -203,6 +218,9 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
         if new.metric.is_none_or(|wanted| wanted == metric) {
             found = true;
             let judged = (pair, metric, hash);
+            if is_stored(conn, new, judged, newest).await? {
+                continue;
+            }
             act = insert(conn, new, judged, act, now).await?.or(act);
         }
     }
@@ -210,6 +228,27 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
         Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
         Some(_) | None => Ok(act.is_some()),
     }
+}
+
+/// Returns whether an equal verdict with the same time is among the rows up to `newest`.
+async fn is_stored(
+    conn: &mut SqliteConnection,
+    new: &NewVerdict,
+    (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
+    newest: i64,
+) -> Result<bool> {
+    let Some(at) = new.at else { return Ok(false) };
+    let stored = sqlx::query_scalar(IS_STORED)
+        .bind(newest)
+        .bind(pair)
+        .bind(metric.name())
+        .bind(&new.reviewer)
+        .bind(at)
+        .bind(&result_hash.as_bytes()[..])
+        .bind(new.verdict.name())
+        .bind(new.reason.map(Reason::name))
+        .bind(&new.note);
+    Ok(stored.fetch_one(conn).await?)
 }
 
 /// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row
