@@ -29,8 +29,20 @@ pub(super) struct PairCheck {
 
 impl PairCheck {
     /// Returns the first damaged stage, from which the pair must run again.
-    pub(super) fn back_to(&self) -> Option<Stage> {
+    fn damaged_from(&self) -> Option<Stage> {
         self.damage.iter().filter_map(|finding| finding.stage).min()
+    }
+
+    /// Returns the stage from which a repair queues the pair again. Returns `None` if the pair is not damaged, or if an
+    /// input is missing: then a run could not compute the results again that the repair removes.
+    pub(super) fn back_to(&self) -> Option<Stage> {
+        let can_run = self.inputs_missing.is_empty();
+        self.damaged_from().filter(|_| can_run)
+    }
+
+    /// Returns whether the pair is damaged, and a repair cannot queue it again because an input is missing.
+    pub(super) fn lacks_inputs(&self) -> bool {
+        self.damaged_from().is_some() && self.back_to().is_none()
     }
 }
 

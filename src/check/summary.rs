@@ -72,6 +72,8 @@ pub struct Unreferenced {
 pub struct Repaired {
     /// Number of pairs sent back to an earlier stage.
     pub requeued: u64,
+    /// Number of damaged pairs that were not sent back, because an input is missing.
+    pub not_requeued: u64,
     /// Whether the counters were rebuilt.
     pub counters: bool,
     /// Whether the indexes were rebuilt.
@@ -121,8 +123,11 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair. If `requeued`, a damaged pair was sent back, so its damage counts as repaired.
-    pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
+    /// Adds the check of a pair. With `repair`, a damaged pair was sent back if it has its inputs, and then its damage
+    /// counts as repaired.
+    pub(super) fn count(&mut self, check: PairCheck, repair: bool) {
+        let requeued = repair && check.back_to().is_some();
+        self.repaired.not_requeued += u64::from(repair && check.lacks_inputs());
         self.pairs += 1;
         self.files += check.files;
         for finding in check.damage {

@@ -177,6 +177,10 @@ fn headline(summary: &CheckSummary, palette: Palette) -> String {
     );
     let problems = count(summary.found(), "problem");
     let (tone, verdict) = match (summary.found(), summary.left()) {
+        (0, _) if summary.inputs_missing.count > 0 => (
+            Tone::Warn,
+            "no problems found in the results, but inputs are missing".to_owned(),
+        ),
         (0, _) => (Tone::Good, "no problems found".to_owned()),
         (_, 0) => (Tone::Good, format!("{problems} found, all repaired")),
         (found, left) if left < found => {
@@ -213,6 +217,12 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
     ];
     let parts = parts.iter().filter(|(is_done, _)| *is_done);
     let mut lines: Vec<String> = parts.map(|(_, what)| (*what).to_owned()).collect();
+    if done.not_requeued > 0 {
+        let pairs = count(done.not_requeued, "damaged pair");
+        lines.push(format!(
+            "{pairs} not queued again, because a mesh or print is missing: put it back, then run `check --repair`"
+        ));
+    }
     if repaired && done.requeued > 0 {
         let pairs = count(done.requeued, "pair");
         lines.push(format!(
