@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::backup::{count_rows, is_backup};
 use super::context::Context;
+use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
 use super::files::{self, metadata};
 use super::table::count;
@@ -24,14 +25,24 @@ pub(super) struct RestoreArgs {
     pub(super) backup: PathBuf,
     /// The project directory to create; it may hold meshes and prints already
     pub(super) dir: PathBuf,
+    /// A directory where meshes and prints are looked for that are no longer at their old places
+    #[arg(long, value_name = "DIR")]
+    pub(super) inputs: Option<PathBuf>,
 }
 
 pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let RestoreArgs { backup, dir } = args;
+    let RestoreArgs {
+        backup,
+        dir,
+        inputs,
+    } = args;
     check_backup(&backup)?;
+    if let Some(inputs) = &inputs {
+        check_inputs(inputs)?;
+    }
     check_directory(&Project::at(&dir))?;
     let existed = dir.exists();
-    let restored = restore_into(&backup, &dir).await;
+    let restored = restore_into(&backup, &dir, inputs.as_deref()).await;
     if restored.is_err() && !existed {
         // Fails unless the directory is empty.
         let _ = std::fs::remove_dir(&dir);
@@ -40,14 +51,25 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
     let (pairs, verdicts) = (restored.pairs, restored.verdicts);
     context.print_json(&json!({
         "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
-        "settings": restored.has_settings,
+        "settings": restored.has_settings, "inputs_missing": restored.missing.len(),
     }))?;
+    let advice = match inputs {
+        None => "put meshes and prints at their old places, ",
+        Some(_) => "",
+    };
     context.info(&format!(
-        "{} and {} restored to {}; put meshes and prints at their old places, `run` computes the images again",
+        "{} and {} restored to {}; {advice}`run` computes the images again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         dir.display(),
     ));
+    if let (Some(first), Some(inputs)) = (restored.missing.first(), &inputs) {
+        context.warn(&format!(
+            "{} neither at the old place nor in {}, first {first}; put meshes and prints there before `check --repair`",
+            count(restored.missing.len() as u64, "path"),
+            inputs.display()
+        ));
+    }
     let context = context.at(&dir);
     context.next("check --repair");
     context.next("run");
@@ -59,10 +81,16 @@ struct Restored {
     pairs: u64,
     verdicts: u64,
     has_settings: bool,
+    /// Paths of meshes and prints that `--inputs` did not find.
+    missing: Vec<String>,
 }
 
 /// Creates the project. The catalog comes last: a directory without a catalog is no project.
-async fn restore_into(backup: &Path, dir: &Path) -> anyhow::Result<Restored> {
+async fn restore_into(
+    backup: &Path,
+    dir: &Path,
+    inputs: Option<&Path>,
+) -> anyhow::Result<Restored> {
     let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
     let project = Project::create(dir).with_context(failed)?;
     let catalog = project.catalog_path();
@@ -72,6 +100,13 @@ async fn restore_into(backup: &Path, dir: &Path) -> anyhow::Result<Restored> {
     let settings = Catalog::restore_backup(backup, &new)
         .await
         .with_context(failed)?;
+    let missing = match inputs {
+        None => Vec::new(),
+        Some(inputs) => {
+            let located = locate_inputs(&project, &new, inputs).await;
+            located.map_err(|error| anyhow::anyhow!(describe(&error, staging.path())))?
+        }
+    };
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
     // Another process may have created a project in the meantime.
     check_directory(&project)?;
@@ -83,7 +118,34 @@ async fn restore_into(backup: &Path, dir: &Path) -> anyhow::Result<Restored> {
         pairs,
         verdicts,
         has_settings: settings.is_some(),
+        missing,
     })
+}
+
+/// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
+/// missing meshes and prints.
+async fn locate_inputs(
+    project: &Project,
+    new: &Path,
+    inputs: &Path,
+) -> anyhow::Result<Vec<String>> {
+    let catalog = Catalog::open(new).await?;
+    let (project, inputs) = (project.clone(), inputs.to_owned());
+    let replaced = catalog.replace_input_paths(move |stored| {
+        if project.input_path(stored).exists() {
+            return Some(stored.to_owned());
+        }
+        project.find_input(stored, &inputs).ok()?
+    });
+    let missing = replaced.await;
+    catalog.close().await;
+    // Changes that are still in the write-ahead log would be lost when the file is renamed.
+    let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
+    anyhow::ensure!(
+        log.is_none_or(|log| log.len() == 0),
+        "the disk is full or reported an error"
+    );
+    Ok(missing?)
 }
 
 /// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it.
@@ -99,6 +161,16 @@ fn write_settings(project: &Project, bytes: &[u8], staging: &Path) -> anyhow::Re
     let new = staging.join(SETTINGS_FILE);
     write_synced(&new, bytes)?;
     Ok(rename_into_place(&new, &path)?)
+}
+
+/// Refuses inputs that are not a directory.
+fn check_inputs(inputs: &Path) -> anyhow::Result<()> {
+    let shown = inputs.display();
+    let found = metadata(inputs).with_context(|| format!("cannot read {shown}"))?;
+    if found.is_some_and(|found| found.is_dir()) {
+        return Ok(());
+    }
+    Err(Refusal::Usage(format!("there is no directory {shown}")).into())
 }
 
 /// Refuses a file that is not a backup.

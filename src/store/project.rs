@@ -1,7 +1,7 @@
 //! The project directory: the paths of its catalog, settings, artifacts and inputs.
 
 use std::os::unix::fs::MetadataExt as _;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::parent_folder::{parent_folder, sync_folder};
 
@@ -129,6 +129,21 @@ impl Project {
     /// Returns the path of an input. `stored` is relative to the project or absolute.
     pub fn input_path(&self, stored: &str) -> PathBuf {
         self.dir.join(stored)
+    }
+
+    /// Looks for a moved input below `folder`: first at its whole stored path, then without its first folder, and so on
+    /// down to its file name. Returns the first existing path in the form in which it is stored.
+    ///
+    /// # Errors
+    /// Returns an error if the working directory is unknown, or the path is not UTF-8.
+    pub fn find_input(&self, stored: &str, folder: &Path) -> Result<Option<String>, StoreError> {
+        let parts = Path::new(stored).components();
+        let parts = parts.filter(|part| matches!(part, Component::Normal(_)));
+        let parts: Vec<_> = parts.collect();
+        let mut paths =
+            (0..parts.len()).map(|first| folder.join(PathBuf::from_iter(&parts[first..])));
+        let found = paths.find(|path| path.exists());
+        found.map(|path| self.stored_path(&path)).transpose()
     }
 
     /// Returns the form in which a path is stored. A path below the project is stored relative to the project, so that

@@ -106,7 +106,8 @@ impl ReplacementFolder {
     /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be synced or renamed. An earlier folder is then kept.
+    /// Returns an error if the folder cannot be synced or renamed. An earlier folder is then kept, except if only the new
+    /// name's durability is unknown. `ReplaceError::Displaced` names the earlier folder if it has no longer its path.
     pub fn finish(self) -> Result<Leftover, ReplaceError> {
         let Self {
             target,

@@ -60,6 +60,81 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     assert!(exported(&blank, "restored") == expected, "another export");
 }
 
+/// The meshes and prints lie in another folder than before, some below other folders of the same names.
+#[test]
+fn restore_finds_inputs_in_another_directory() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let expected = exported(&project, "expected");
+    let file = dir.path().join("b.sqlite");
+    at(&project, &["backup", file.to_str().expect("UTF-8")]).expect(0);
+    let moved = dir.path().join("bản quét");
+    std::fs::rename(project.dir().join("data"), &moved).expect("moved");
+    let text = |path: &Path| path.to_str().expect("UTF-8").to_owned();
+    let restore = |name: &str, inputs: &Path| {
+        let (file, inputs) = (text(&file), text(inputs));
+        let args = ["restore", &file, name, "--inputs", &inputs, "--json"];
+        mocban(dir.path(), &args)
+    };
+    let refused = restore("new", &dir.path().join("nowhere")).expect(2);
+    assert!(
+        refused.err.contains("there is no directory"),
+        "{}",
+        refused.err
+    );
+    assert!(!dir.path().join("new").exists());
+
+    let other = dir.path().join("other");
+    std::fs::create_dir(&other).expect("a folder");
+    let told = restore("without", &other).expect(0);
+    let paths = told.json()["inputs_missing"].as_u64();
+    assert!(paths > Some(1), "{paths:?}");
+    assert!(
+        told.err.contains("neither at the old place nor in"),
+        "{}",
+        told.err
+    );
+
+    let told = restore("new", &moved).expect(0);
+    assert_eq!(told.json()["inputs_missing"], 0);
+    let restored = Project::open(&dir.path().join("new")).expect("a project");
+    at(&restored, &["check", "--repair"]).expect(0);
+    at(&restored, &["run"]).expect(0);
+    at(&restored, &["check"]).expect(0);
+    assert!(
+        exported(&restored, "restored") == expected,
+        "another export"
+    );
+}
+
+/// A repair would remove results that no run can compute again.
+#[test]
+fn check_keeps_the_results_of_pairs_whose_inputs_are_missing() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let moved = dir.path().join("away");
+    let data = project.dir().join("data");
+    std::fs::rename(&data, &moved).expect("moved");
+    let sound = at(&project, &["check"]).expect(0);
+    assert!(
+        sound.out.contains("but inputs are missing"),
+        "{}",
+        sound.out
+    );
+
+    std::fs::remove_dir_all(project.artifacts_dir()).expect("removed");
+    let before = at(&project, &["status", "--json"]).expect(0).out;
+    let kept = at(&project, &["check", "--repair"]).expect(12);
+    let reason = "not queued again, because a mesh or print is missing";
+    assert!(kept.out.contains(reason), "{}", kept.out);
+    assert_eq!(at(&project, &["status", "--json"]).expect(0).out, before);
+
+    std::fs::rename(&moved, &data).expect("moved back");
+    at(&project, &["check", "--repair"]).expect(0);
+    at(&project, &["run"]).expect(0);
+    at(&project, &["check"]).expect(0);
+}
+
 /// Restores a backup to a directory.
 fn restore(file: &Path, dir: &Path) {
     let [file, dir] = [file, dir].map(|path| path.to_str().expect("UTF-8"));
@@ -187,6 +262,14 @@ fn exported_verdicts_can_be_imported_into_another_project() {
     at(&other, &["run"]).expect(0);
     let taken = at(&other, &["verdict", "import", file, "--json"]).expect(0);
     assert_eq!(taken.json()["recorded"], 4);
+    // Neither project records a verdict twice.
+    for project in [&other, &project] {
+        let again = at(project, &["verdict", "import", file, "--json"]).expect(0);
+        assert_eq!(
+            (&again.json()["recorded"], &again.json()["known"]),
+            (&0.into(), &4.into())
+        );
+    }
     let of = |project| {
         let log = at(project, &["verdict", "log", "--json"]).expect(0).out;
         let lines = log.lines().map(serde_json::from_str::<serde_json::Value>);

@@ -3,6 +3,7 @@
 pub(crate) mod checksums;
 pub(crate) mod ground_truth;
 pub(crate) mod import;
+pub(crate) mod input_paths;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
 pub(crate) mod pair_results;

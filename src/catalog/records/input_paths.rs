@@ -1,0 +1,64 @@
+//! Replaces the paths of meshes and prints, for a project that is restored at another place.
+
+use serde_json::{Value, json};
+use sqlx::SqliteConnection;
+
+use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::{Catalog, Result};
+
+/// Number of pairs that are read at a time.
+const PAGE: i64 = 2_000;
+
+const SELECT: &str =
+    "SELECT id, mesh_path, print_path FROM pair WHERE id > ?1 ORDER BY id LIMIT ?2";
+
+/// Clears the `stat` of the files, so that the next run reads them again.
+const UPDATE: &str = "
+UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = '', print_path = item.value ->> 2, print_stat = ''
+FROM json_each(?1) AS item WHERE pair.id = item.value ->> 0";
+
+impl Catalog {
+    /// Replaces the paths of meshes and prints in one transaction. `find` receives a stored path and returns the new
+    /// one, or `None` to keep the stored path. Returns the paths that were kept.
+    ///
+    /// # Errors
+    /// Returns an error, and replaces no path, if a row differs from its checksum or a database operation fails.
+    pub async fn replace_input_paths(
+        &self,
+        find: impl FnMut(&str) -> Option<String> + Send + 'static,
+    ) -> Result<Vec<String>> {
+        // Otherwise a damaged row would get a valid checksum.
+        self.verify_checksums().await?;
+        self.in_transaction(move |conn| Box::pin(replace(conn, find)))
+            .await
+    }
+}
+
+async fn replace(
+    conn: &mut SqliteConnection,
+    mut find: impl FnMut(&str) -> Option<String> + Send,
+) -> Result<Vec<String>> {
+    let mut kept = Vec::new();
+    let mut after = 0_i64;
+    loop {
+        let query = sqlx::query_as(SELECT).bind(after).bind(PAGE);
+        let rows: Vec<(i64, String, String)> = query.fetch_all(&mut *conn).await?;
+        let Some((last, ..)) = rows.last() else {
+            return Ok(kept);
+        };
+        after = *last;
+        let ids: Vec<i64> = rows.iter().map(|(id, ..)| *id).collect();
+        let mut new_path = |stored: String| {
+            find(&stored).unwrap_or_else(|| {
+                kept.push(stored.clone());
+                stored
+            })
+        };
+        let items = rows
+            .into_iter()
+            .map(|(id, mesh, print)| json!([id, new_path(mesh), new_path(print)]));
+        let items = items.collect::<Value>().to_string();
+        sqlx::query(UPDATE).bind(items).execute(&mut *conn).await?;
+        checksums::store(conn, ChecksummedTable::Pair, &ids).await?;
+    }
+}
