@@ -206,7 +206,7 @@ pub(super) fn now() -> UnixMillis {
 }
 
 /// Indents the lines after the first, so that a line break in the name of a file cannot imitate another message. Cuts
-/// very long lines, for example with the name of a file that cannot exist.
+/// lines that are longer than `MAX_LINE_CHARS`.
 fn indented(text: &str) -> String {
     let shown = |line: &str| match line.char_indices().nth(MAX_LINE_CHARS) {
         Some((end, _)) => format!("{}...", &line[..end]),
@@ -233,8 +233,8 @@ fn program_name(called: Option<&OsString>) -> String {
     }
 }
 
-/// Quotes a word for a POSIX shell where it needs quotes. A word with hidden characters is quoted as `$'..'` with an
-/// escape for each of their bytes, because the terminal does not show these characters.
+/// Quotes a word for a POSIX shell if it needs quotes. A word with characters that a terminal does not show is quoted
+/// as `$'..'`, and each byte of such a character is escaped.
 pub(super) fn shell_quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {

@@ -210,7 +210,7 @@ fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> anyhow::Re
     }
 }
 
-/// Returns whether a directory has the note of a demo. A `README.txt` alone may be anybody's.
+/// Returns whether a directory has the note of a demo. Compares the text, because any project may have a `README.txt`.
 fn has_note(data: &Path) -> anyhow::Result<bool> {
     let note = files::small(&data.join(NOTE))?;
     Ok(note.is_some_and(|text| text == NOTE_TEXT.as_bytes()))

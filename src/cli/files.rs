@@ -46,7 +46,8 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Writes a file whose parts may be missing. An incomplete one does not replace an earlier file, which may be complete.
+/// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
+/// complete.
 pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");

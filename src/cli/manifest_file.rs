@@ -8,7 +8,7 @@ use super::files;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
-/// Valid pairs to import. Of a manifest file, only the text is kept. Its rows are parsed again one by one.
+/// Valid pairs to import. For a manifest file, only its text is kept; the rows are parsed again when they are needed.
 #[derive(Debug)]
 pub(super) struct Listing {
     source: ListingSource,

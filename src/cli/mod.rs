@@ -62,7 +62,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
                 .iter()
                 .any(|arg| arg.to_string_lossy().contains(is_hidden))
             {
-                // The error may quote an argument, for example the name of a file, with codes for the terminal.
+                // The error may quote an argument with terminal codes, so print it through the sanitizing screen.
                 Screen::new().line(error.render().to_string().trim_end());
             } else {
                 // Printing fails only if the stream is closed. Then nobody could read an error either.

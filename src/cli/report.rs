@@ -99,7 +99,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     })
 }
 
-/// Renders the report as a page with images. Returns whether no image of a result is missing; warns about each.
+/// Renders the report as a page with images. Warns about each missing image. Returns `true` if no image is missing.
 async fn pictured(
     report: &Report,
     pictures: GallerySelection,
@@ -178,8 +178,8 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
     Ok(report)
 }
 
-/// Warns about the unmet requirements of `--require-complete` and `--fail-under`. Returns the exit code; for an
-/// incomplete report, `Incomplete`.
+/// Warns about the unmet requirements of `--require-complete` and `--fail-under`. Returns the exit code. If both are
+/// unmet, returns `Incomplete`.
 fn check_requirements(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
     let missing = args.require_complete.then(|| quality_gate::missing(report));
     let below = args

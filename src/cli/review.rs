@@ -127,7 +127,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// Returns the last line. The browser keeps each answer until the server acknowledges it, and sends it again.
+/// Returns the command's last message. The browser keeps unacknowledged answers and sends them again.
 const fn closing_line(is_complete: bool) -> &'static str {
     if is_complete {
         "the page is closed; every answer is stored"

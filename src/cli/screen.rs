@@ -1,8 +1,8 @@
 //! Writes messages, log and progress bar to stderr, and colours text.
 //!
-//! Text is sanitized where it is printed, in [`terminal_text`], because a sanitizer at each value would be forgotten at
-//! the next one. The program's own colour codes contain a number that is random in each process, so a value cannot
-//! imitate them. They become real codes only when they are printed.
+//! Text is sanitized in [`terminal_text`] when it is printed. If each value were sanitized separately, one could be
+//! forgotten. The program's own colour codes contain a number that is random in each process, so a value cannot imitate
+//! them. They become real codes only when they are printed.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::Write as _;
@@ -13,7 +13,7 @@ use indicatif::{MultiProgress, ProgressBar};
 
 use crate::domain::{one_line, visible, visible_json};
 
-/// Beginning of the program's own terminal codes, with the number of this process.
+/// Beginning of the program's own terminal codes. It contains a random number.
 static OWN_CODE: LazyLock<String> =
     LazyLock::new(|| format!("\u{1b}[{};", RandomState::new().hash_one("own code")));
 
@@ -47,7 +47,7 @@ impl Screen {
         Self(MultiProgress::new())
     }
 
-    /// Writes a line, above the bar if there is one. Hidden characters of values become visible.
+    /// Writes a line, above the bar if there is one. Escapes hidden characters, as [`terminal_text`] does.
     pub(super) fn line(&self, text: &str) {
         self.write(&terminal_text(text));
     }

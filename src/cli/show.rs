@@ -81,7 +81,7 @@ fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
     }
 }
 
-/// Returns the pair's record with the paths of its files, its manual alignments and what the next run would do.
+/// Returns the pair's record as JSON. Adds the artifact paths, manual alignments and what the next run would do.
 fn as_json(
     detail: &PairDetail,
     manual: &[ManualResult],
@@ -131,7 +131,7 @@ fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustm
     })
 }
 
-/// Returns the result to compare manual alignments with: that of the ensemble, or otherwise of the first metric.
+/// Returns the automatic result that manual alignments are compared with: the ensemble's, or else the first metric's.
 fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
     let ensemble = results.metric(ThresholdMetric::Ensemble);
     ensemble

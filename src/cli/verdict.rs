@@ -257,8 +257,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
     ]
 }
 
-/// Formats how long the result was shown, and the rotation in degrees that the relief still needs by the reviewer's
-/// reading.
+/// Formats how long the result was shown, and by how many degrees the reviewer would still rotate the relief.
 fn view_text(look: &ReviewContext) -> String {
     let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));

@@ -1,7 +1,7 @@
 //! Settings: reads, merges and validates them. Unknown keys are errors. Each value has an origin.
 //!
-//! A layer overrides all layers after it in this list: flags, environment variables, the project's file, the preset
-//! that this file names, and the embedded `config/default.toml`, which contains every setting.
+//! A layer overrides all layers after it in this list: flags, environment variables, `--config` or the project's file,
+//! the preset that this file names, and the embedded `config/default.toml`, which contains every setting.
 
 mod document;
 mod error;

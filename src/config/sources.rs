@@ -16,7 +16,7 @@ pub enum Preset {
     /// The best known method; contains every setting.
     #[default]
     Default,
-    /// The paper's method; contains only the settings that differ from the default.
+    /// The paper's method. Contains only the settings that differ from the default.
     Paper,
 }
 

@@ -51,7 +51,7 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
     rows.finish()
 }
 
-/// Each column in order: its standard name, if it is a known column, and its name as written.
+/// The columns in order. Each has its standard name, if the column is known, and its name as written.
 struct CsvHeader(Vec<(Option<&'static str>, String)>);
 
 impl CsvHeader {

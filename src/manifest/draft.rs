@@ -119,7 +119,7 @@ fn complete(
     })
 }
 
-/// Records cells that are too long. The catalog keeps all of them, and pages and reports show them.
+/// Records cells that are too long. Lengths are limited because the catalog stores every cell and reports show them.
 fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
     let cells = draft.cells.iter().map(|(name, cell)| (*name, cell.len()));
     let meta = draft.meta.iter().map(|(name, value)| {

@@ -90,8 +90,8 @@ impl Stem {
     }
 }
 
-/// Returns the files with one of the extensions, by stem, and all other files. Skips hidden files. Adds a problem for
-/// each file with the same stem as an earlier file.
+/// Splits the files into a map of those with one of the extensions, keyed by stem, and a list of the others. Skips
+/// hidden files. Adds a problem for each file with the same stem as an earlier file.
 fn by_stem(
     listing: &[PathBuf],
     extensions: &[&str],

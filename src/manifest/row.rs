@@ -49,7 +49,7 @@ pub(super) fn known_column(name: &str) -> Option<&'static str> {
     columns.find(|known| known.eq_ignore_ascii_case(name))
 }
 
-/// Number of hash bytes stored for each id. Two of ten million ids collide with a probability below 10^-24.
+/// Number of hash bytes stored for each id. Among ten million ids, the probability of any collision is below 10^-24.
 const HASH_BYTES: usize = 16;
 
 /// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows.

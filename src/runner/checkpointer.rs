@@ -25,7 +25,7 @@ pub(super) struct Checkpointer {
     task: JoinHandle<Result<StoredStages, RunError>>,
 }
 
-/// Result of a checkpointer: the number of stored stages, and the lease if it continues.
+/// Result of a checkpointer: the number of stored stages, and the lease if this process still holds it.
 pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
@@ -38,7 +38,7 @@ impl StoredStages {
     /// Returns the lease if this process still holds it and no stage was left unstored.
     ///
     /// # Errors
-    /// Returns `self` if the lease is lost, ended with the pair's last stage, or a stage was left unstored.
+    /// Returns `self` if the lease is lost, if it ended with the pair's last stage, or if a stage was left unstored.
     pub(super) fn into_lease(self) -> Result<Lease, Self> {
         match self.lease {
             CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),
@@ -171,7 +171,7 @@ async fn write_stage(
     if !write_files(context, pair, stage.stage, files).await? {
         return Ok(None);
     }
-    // Take the times here, because writing may be slow and the lease must be valid afterwards.
+    // Take the times after the slow write, because the lease must still be valid at this point.
     Ok(Some(StageCheckpoint {
         at: context.clock.now(),
         next_deadline: context.deadline(),

@@ -43,7 +43,7 @@ struct MemoryGroup {
 /// Names of a control group's files.
 #[derive(Debug, PartialEq, Eq)]
 struct GroupFiles {
-    /// Files that contain a limit in bytes, or another text for no limit. The smallest limit applies.
+    /// Files that contain a limit in bytes. A file without a number means no limit. The smallest limit applies.
     limits: &'static [&'static str],
     usage: &'static str,
     /// Field of `memory.stat` with the bytes of cached file contents. The kernel frees these first if memory is short.

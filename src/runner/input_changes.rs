@@ -12,8 +12,8 @@ use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
 
-/// Stores the new versions of changed input files in the catalog. Files that no stage has read are skipped. Files that
-/// cannot be read within the limits count as unchanged.
+/// Stores the new versions of changed input files in the catalog. Skips files that no stage has read. A file counts as
+/// unchanged if reading it fails or is ended by `limits`.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
@@ -43,8 +43,8 @@ pub(super) async fn store_changes(
     Ok(())
 }
 
-/// Stores the current input files of pairs that were quarantined because their workers died. The workers may not have
-/// reported the files that they read. Later runs compare the files with these versions to notice a replacement.
+/// Stores the current versions of the input files of pairs that were quarantined because their workers died. Stores
+/// only versions that no stage has reported. Later runs compare the files with the stored versions.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
@@ -67,7 +67,7 @@ pub(super) async fn store_of_poisoned(
     Ok(catalog.record_poisoned_inputs(inputs).await?)
 }
 
-/// Returns the current state of two files. A file that cannot be read within the limits is `None`.
+/// Returns the current versions of two files. Returns `None` for a file if reading it fails or is ended by `limits`.
 pub(super) async fn current_of_both(
     paths: [PathBuf; 2],
     limits: &ReadLimits,
@@ -131,7 +131,7 @@ impl ReadItem for CurrentInput {
     }
 }
 
-/// Returns the current state of the input files that no stage has reported.
+/// Returns the current versions of the input files that no stage has reported.
 fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
     let current = |known: Option<&InputVersion>, stored: &str| match known {
         Some(_) => None,
@@ -152,8 +152,8 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
     (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// Returns the current version of a file if it may differ from the known version. A missing file counts as changed only
-/// if the manifest has named a new path since the file was read. Otherwise results computed from the file stay valid.
+/// Returns the current version of a file if it may differ from the known version. A missing file counts as changed if
+/// an import has changed its path since the last read. If the path is the same, earlier results stay valid.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);
@@ -168,7 +168,7 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
     }
 }
 
-/// Returns the current state of a file. Returns `None` if it cannot be read.
+/// Returns the current version of a file, or `None` if the file cannot be read.
 fn current(path: &Path) -> Option<InputVersion> {
     hash_input(path).ok().map(Into::into)
 }

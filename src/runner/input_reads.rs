@@ -1,5 +1,4 @@
-//! Reads of input files on threads of their own, so that a disk or a network that hangs stops neither a run nor its
-//! signals.
+//! Reads input files on separate threads. If a disk or network hangs, the run can still continue and handle signals.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,7 +18,7 @@ const MAX_HANGING: usize = 64;
 /// A file that takes longer than this is named to the user.
 const SLOW: Duration = Duration::from_secs(10);
 
-/// What ends waiting for a read. The thread of an abandoned read stays until the read returns.
+/// Conditions that end waiting for a read. The thread of an abandoned read stays until the read returns.
 #[derive(Debug, Clone)]
 pub(super) struct ReadLimits {
     /// Longest time for one item.
@@ -105,8 +104,8 @@ struct Readers<T: ReadItem> {
 }
 
 impl<T: ReadItem> Readers<T> {
-    /// Starts a thread that reads items until the queue is empty. Items that no thread reads end with a timeout, for
-    /// example if no thread could start.
+    /// Starts a thread that reads items until the queue is empty. If no thread can start, `PendingReads` gives the
+    /// items up.
     fn start_thread(&self) {
         let (queue, sender) = (Arc::clone(&self.queue), self.sender.clone());
         let work = move || {

@@ -11,8 +11,8 @@ use crate::{mesh, raster};
 pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
-    /// Limit on the memory, in bytes, of all pairs computed at the same time. A mesh counts by its file size, a print
-    /// by the image size in its header. A pair that exceeds the limit runs alone. `None` means no limit.
+    /// Memory limit in bytes for all pairs computed at the same time. A pair's memory is estimated from its mesh's file
+    /// size and its print's pixel count. A pair that exceeds the limit runs alone. `None` means no limit.
     pub memory: Option<u64>,
     /// Join a run in progress in another process.
     pub join: bool,

@@ -46,7 +46,7 @@ impl FileInUse {
 pub(super) struct PairContext {
     /// The pair as imported.
     pub(super) attributes: PairAttributes,
-    /// The manifest attributes that results depend on, as JSON. The catalog compares this text.
+    /// The manifest attributes that results depend on, as JSON. The catalog stores this text with each result.
     pub(super) attributes_json: String,
     /// Results of earlier stages.
     pub(super) stored: BTreeMap<Stage, StoredStage>,
@@ -89,7 +89,7 @@ impl PairContext {
         }
     }
 
-    /// Returns the input files as read. Returns no files if an earlier stage has reported the same versions.
+    /// Returns the versions of the input files that were read, or no versions if the last report had the same ones.
     pub(super) fn unreported_inputs(&mut self) -> InputVersions {
         if self.reported == self.inputs {
             return InputVersions::default();

@@ -23,8 +23,8 @@ const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;
 
-/// Identifies a task that occupies a slot. A pair may occupy two of them: after its lease was lost, the process may
-/// lease it again while the earlier task still computes.
+/// Identifies a task that occupies a slot. A pair may occupy two slots: after its lease was lost, the process may lease
+/// the pair again while the earlier task still computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct SlotId(u64);
 
@@ -100,7 +100,7 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Records an event of a running pair. A slot counts as soon free when its pair starts the last stage.
+    /// Records an event of a running pair. If the pair starts its last stage, its slot counts as free soon.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
             && *stage == self.context.until
@@ -205,8 +205,8 @@ impl Prefetch {
         exclusive: bool,
     ) -> Result<(), RunError> {
         let context = &self.context;
-        // If there are more pairs than free slots, some pairs first wait for another pair's last stage. The deadline is
-        // later by the longest time of a stage.
+        // If more pairs are claimed than slots are free, some pairs first wait for another pair's last stage. Their
+        // deadline is therefore one stage timeout later.
         let wait = if count > self.free_slots() {
             context.stage_timeout.as_millis() as i64
         } else {
@@ -231,8 +231,8 @@ impl Prefetch {
         Ok(())
     }
 
-    /// Adds the memory estimates, which read the headers of print images. A pair whose files do not answer counts as
-    /// if they were empty.
+    /// Adds memory estimates, for which the headers of print images are read. If reading a pair's files takes too long,
+    /// the files count as empty.
     async fn estimate(&self, leased: impl Iterator<Item = (Lease, PairWork)>) -> Vec<LeasedPair> {
         let leased: Vec<_> = leased.collect();
         let estimates = if self.memory.is_limited() {
@@ -242,7 +242,7 @@ impl Prefetch {
                 from: lease.cursor(),
                 limits: self.image_limits,
             });
-            // The scheduler waits for this, so the next heartbeat must not be missed.
+            // The scheduler waits for these reads, so they must not delay the next heartbeat.
             let limits = ReadLimits {
                 timeout: self.context.timing.heartbeat_every / 5,
                 stop: self.context.stop.clone(),
@@ -352,7 +352,7 @@ mod tests {
 
     use super::{DurationEstimate, Load, MAX_AHEAD_PER_SLOT};
 
-    /// Returns how many pairs a slot claims ahead after pairs that took these times in milliseconds.
+    /// Returns how many pairs are claimed ahead per slot, given the durations of earlier pairs in milliseconds.
     fn pairs_ahead(durations: &[u64]) -> usize {
         let mut estimate = DurationEstimate::default();
         for ms in durations {

@@ -200,8 +200,8 @@ impl RunStart<'_> {
     }
 }
 
-/// Returns the limits of reads before the first stage starts. The first signal ends these reads, because no stage is in
-/// progress.
+/// Returns the limits for reads that take place before the first stage. Any stop request ends these reads, because no
+/// stage is in progress.
 fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
     ReadLimits {
         timeout: options.stage_timeout,

@@ -77,7 +77,7 @@ impl RunContext {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }
 
-    /// Returns the current time minus one lease length. Leases are valid if the last heartbeat is not older.
+    /// Returns the time one lease length ago. A worker's leases are valid if its last heartbeat is not older than this.
     pub(super) fn alive_since(&self) -> UnixMillis {
         self.clock.now() - self.timing.lease_ms()
     }

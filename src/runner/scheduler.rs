@@ -161,8 +161,8 @@ impl Scheduler {
     }
 
     /// Turns the catalog's commit delay off if a slot is free and a pair is being stored, or if more than half of
-    /// `max_storing` pairs are being stored. Otherwise commits may be delayed. With a free slot, the end of the run or
-    /// a pair that must run alone may wait for the commit.
+    /// `max_storing` pairs are being stored. Otherwise commits may be delayed. While a slot is free, the run's end or a
+    /// pair that must run alone may be waiting for the commit.
     async fn flush_where_needed(&mut self) -> Result<(), RunError> {
         let is_slot_free = self.prefetch.free_slots() > 0 && !self.storing.is_empty();
         let is_needed = is_slot_free || self.storing.len() > self.max_storing / 2;
@@ -249,8 +249,8 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Stores a heartbeat. If the leases expired while the process was suspended, registers it as a new worker. If no
-    /// heartbeat could be stored for the length of a lease, ends the run.
+    /// Stores a heartbeat. If the leases have expired, registers this process as a new worker. Ends the run if the
+    /// outcome is `Unwritable`.
     async fn heartbeat(&mut self) -> Result<(), RunError> {
         match self.session.heartbeat(&self.context).await {
             HeartbeatOutcome::Alive => {}

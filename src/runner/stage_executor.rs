@@ -117,7 +117,7 @@ impl PipelineExecutor {
         let normalized = self.inputs.normalized(pair)?;
         let registered =
             pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
-                // If nothing matches, the print may show another character. Otherwise the mesh is the likelier cause.
+                // Name the print if the characters do not match. For other errors, the mesh is the likelier cause.
                 let path = match error {
                     RegisterError::NoMatch { .. } => &pair.attributes.print_path,
                     _ => &pair.attributes.mesh_path,

@@ -90,7 +90,8 @@ pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid
     })
 }
 
-/// Decodes an image from [`encode_print_masks`]. Every run uses the decoded masks, so that a resumed run has the same.
+/// Decodes an image from [`encode_print_masks`]. A first run decodes its own masks too, so that a resumed run gives the
+/// same results.
 pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     PrintMasks {
         ink: grey.map(|grey| *grey == INK),
@@ -131,8 +132,8 @@ pub fn metric_results(
     metrics.iter().map(with_hash).collect()
 }
 
-/// Returns the numbers that a reviewer judges: all except the confidence. A new calibration of the confidence keeps the
-/// verdicts valid.
+/// Returns the numbers that a reviewer judges: all except the confidence. Verdicts therefore stay valid if the
+/// confidence is calibrated anew.
 fn without_confidence(outcome: &MetricOutcome) -> Value {
     let mut numbers = json!(outcome);
     if let Value::Object(fields) = &mut numbers {

@@ -389,7 +389,7 @@ async fn a_disk_error_ends_the_run_and_fails_no_pair() {
     assert_eq!(fixture.run(&options(1)).await.done, 1);
 }
 
-/// If a pair backs off at a stage after the last stage of the run, the run ends without waiting for it.
+/// A run does not wait for a pair whose next stage comes after the run's last stage.
 #[tokio::test]
 async fn a_run_up_to_a_stage_does_not_wait_for_the_retry_of_a_later_one() {
     let fixture = RunFixture::new(&["breaks_1", "a"]).await;

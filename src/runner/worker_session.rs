@@ -26,7 +26,7 @@ pub(super) enum HeartbeatOutcome {
     Alive,
     /// The heartbeat came after the leases had expired. Another worker may have leased the pairs since.
     Expired,
-    /// No heartbeat could be stored for as long as a lease lasts, or none can be stored any more.
+    /// No heartbeat was stored during one lease length, or the catalog's write-ahead log is lost.
     Unwritable(CatalogError),
 }
 
@@ -85,8 +85,8 @@ impl WorkerSession {
         Ok(())
     }
 
-    /// Recovers the leases of dead workers, and leases that other workers hold long past the deadline. Returns how many
-    /// pairs are ready again.
+    /// Recovers the leases of dead workers, and leases of other workers that are long past their deadline. Returns how
+    /// many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let holders = catalog.lease_holders().await?;
@@ -103,7 +103,7 @@ impl WorkerSession {
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }
-        // The scheduler waits for this, so the next heartbeat must not be missed.
+        // The scheduler waits for these reads, so they must not delay the next heartbeat.
         let limits = ReadLimits {
             timeout: context.timing.heartbeat_every,
             stop: context.stop.clone(),

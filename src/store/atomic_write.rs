@@ -11,8 +11,8 @@ use super::staging::StagingFolder;
 const NEW: &str = "new";
 
 /// Writes a file atomically: an existing file is replaced only after the new content is on the disk. If two processes
-/// write the same file, the file of the last one stays, whole. If `path` is not a regular file, such as a pipe or a
-/// terminal, writes to it directly.
+/// write the same file, the complete file of the last process stays. If `path` is not a regular file, such as a pipe or
+/// a terminal, writes to it directly.
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
@@ -53,8 +53,8 @@ fn metadata(path: &Path) -> std::io::Result<Option<Metadata>> {
 /// gets the permissions of the old one.
 ///
 /// # Errors
-/// Returns an error if syncing, renaming or setting the permissions fails. Only the error about the name's durability
-/// comes after the renaming; its message says that the file is complete.
+/// Returns an error if syncing, renaming or setting the permissions fails. If syncing the folder fails, the file is
+/// already renamed, and the message says that it is complete.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Some(earlier) = metadata(path)? {

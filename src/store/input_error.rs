@@ -88,7 +88,7 @@ impl InputError {
     }
 }
 
-/// Replaces the error of a process with too many open files by one that says what to do.
+/// Replaces an error about too many open files with an error that names a remedy.
 pub(super) fn with_advice(error: io::Error) -> io::Error {
     let is_about = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
     if is_about(Errno::MFILE) {

@@ -77,7 +77,7 @@ impl Project {
         })
     }
 
-    /// Returns whether the directory still has its path. If it was renamed or removed, nothing may be created there.
+    /// Returns whether the directory is still at its path. If not, nothing may be created at that path.
     ///
     /// # Errors
     /// Returns an error if the disk fails.

@@ -17,8 +17,7 @@ use super::parent_folder::parent_folder;
 const SUFFIX: &str = ".mocban-partial";
 /// The locked file in a staging folder.
 const LOCK: &str = "lock";
-/// Maximum number of bytes of an output's name that a hidden name contains. File systems allow 255 bytes for a whole
-/// name.
+/// Longest part of an output's name, in bytes, that a hidden name contains. File systems allow 255 bytes per name.
 const MAX_STEM: usize = 180;
 /// Number of attempts to create a folder with a new name.
 const ATTEMPTS: u32 = 1_000;
@@ -52,7 +51,7 @@ impl StagingFolder {
             let ending = format!("{}-{number}{SUFFIX}", std::process::id());
             let dir = hidden_sibling(target, &ending);
             match fs::create_dir(&dir) {
-                // Another process namespace has the same pid, or a process with this pid died.
+                // An earlier process or one in another container has used this pid and number.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
                 created => created?,
             }

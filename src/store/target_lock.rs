@@ -8,7 +8,7 @@ use super::staging::hidden_sibling;
 /// The right to replace an output. It ends when the value is dropped or the process dies.
 #[derive(Debug)]
 pub struct TargetLock {
-    /// `None` on a file system without locks. Outputs are then still replaced as a whole, and the last one stays.
+    /// `None` on a file system without locks. Outputs are still replaced as a whole; the last writer wins.
     lock: Option<LockFile>,
 }
 

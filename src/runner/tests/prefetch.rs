@@ -182,7 +182,7 @@ async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
     assert_eq!(summary.done, 5);
 }
 
-/// A pair claimed ahead may wait as long as one stage may take. Its own time limit starts after that.
+/// A pair claimed ahead has one more stage timeout until its deadline, because it first waits for a slot.
 #[tokio::test]
 async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     let fixture = RunFixture::new(&["lasts_1", "next"]).await;
