@@ -178,7 +178,7 @@ impl Watch {
         })
     }
 
-    /// Stops the measurement. All compute threads must have ended. `compute_time` is the mean computing time of a slot.
+    /// Stops the measurement. All compute threads must have ended. `compute_time` is their mean computing time.
     fn stop(self, compute_time: Duration) -> anyhow::Result<RunTimes> {
         let (wall, cores) = (self.start.elapsed(), process::cpu_time());
         let threads = process::thread_cpu_times()?.into_iter();

@@ -31,7 +31,7 @@ impl Catalog {
     /// Opens an existing catalog for reading and writing.
     ///
     /// # Errors
-    /// Returns an error if the file is missing, no catalog or on a network file system, or if the database fails.
+    /// Returns an error if the file is missing, is not a catalog, is on a network file system, or the database fails.
     pub async fn open(path: &Path) -> Result<Self> {
         Self::with_writer(path, false, CommitDelay::new()).await
     }

@@ -40,8 +40,8 @@ impl NewCatalog {
         &self.catalog
     }
 
-    /// Closes the catalog and gives it its path durably. Returns `false`, and drops the new catalog, if another process
-    /// created one there meanwhile.
+    /// Closes the catalog and durably renames its file to the final path. Returns `false`, and drops the new catalog,
+    /// if another process created a catalog there first.
     ///
     /// # Errors
     /// Returns an error if the disk returns one.

@@ -25,8 +25,8 @@ impl Mesh {
     }
 }
 
-/// Finite positions in the mesh's own frame and unit. The precision of the file is kept, because memory traffic
-/// dominates the run time.
+/// Finite positions in the mesh's own frame and unit. 32-bit floats stay 32-bit, because memory traffic dominates the
+/// run time.
 #[derive(Debug, Clone)]
 pub enum Vertices {
     /// From files of 32-bit floats, as scanners write.

@@ -46,7 +46,7 @@ impl PixelBox {
     }
 }
 
-/// Largest number of pixels that can be counted in an 8-bit sum, which has more SIMD lanes.
+/// Largest count that fits in a `u8`. SIMD adds more `u8` than wider integers at once.
 const CHUNK_PIXELS: usize = 255;
 
 /// Counts the set pixels of up to [`CHUNK_PIXELS`].

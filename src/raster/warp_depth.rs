@@ -11,7 +11,7 @@ const BLOCK_PX: usize = 4;
 /// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel with data in less than about half
 /// of its square gets level 0 (no data). If the map has no inverse, all pixels get level 0.
 ///
-/// `to_from` maps depth-map pixels to output pixels. The levels keep their scale.
+/// `to_from` maps depth-map pixels to output pixels. A level means the same height in the result as in `depth`.
 pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usize) -> Grid<u16> {
     let Some(from_to) = to_from.inverse() else {
         return Grid::new(width, height, 0);

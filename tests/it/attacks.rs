@@ -256,7 +256,7 @@ fn a_run_whose_log_is_deleted_replaced_or_cut_stops_and_claims_nothing_false() {
     }
 }
 
-/// A copy of files that change meanwhile may be damaged. Then every command that reads them says so.
+/// A copy made during a run may be damaged. In that case `check --repair` fails, and `run` reports the damage.
 #[test]
 fn a_copy_of_a_running_project_can_be_continued_or_is_refused_as_damaged() {
     let mut target = Target::new(6);

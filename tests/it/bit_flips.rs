@@ -1,4 +1,4 @@
-//! Single flipped bits of the catalog. A check finds each one, or no output changes. `MOCBAN_TRIALS` sets the number.
+//! Single flipped bits of the catalog: a check finds each, or no output changes. `MOCBAN_TRIALS` sets how many.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ fn outputs(project: &Project) -> Result<Outputs, Vec<i32>> {
     })
 }
 
-/// Runs a repaired project. Returns whether it is sound then, and its export the expected one.
+/// Runs and checks a repaired project. Returns whether both succeed and the export equals the expected one.
 fn is_healed(project: &Project, expected: &Outputs) -> bool {
     let run = at(project, &["run"]);
     let check = at(project, &["check"]);

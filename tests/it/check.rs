@@ -239,7 +239,7 @@ fn rows_and_counters_that_disagree_are_found_and_repaired() {
 fn indexes_that_disagree_with_their_tables_are_rebuilt() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
-    // All jobs become ready while the index of ready jobs covers other rows. Afterwards the index lacks these jobs.
+    // While all jobs become ready, the index of ready jobs has another condition. Afterwards it lacks these jobs.
     let redefine = |from: &str, to: &str| {
         format!(
             "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'status = {from}', 'status = {to}')

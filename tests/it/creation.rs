@@ -27,7 +27,7 @@ fn import(root: &Path, name: &str) -> Command {
     command
 }
 
-/// Returns a command that is refused when the project is created already: the folder of meshes is no UTF-8.
+/// Returns an import that fails after it began to create the project: the mesh folder is not UTF-8.
 fn failing_import(root: &Path) -> Command {
     let meshes = root.join(OsStr::from_bytes(b"m\xff"));
     for (dir, file) in [(&meshes, "z.stl"), (&root.join("prints"), "z.png")] {

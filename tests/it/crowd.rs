@@ -21,7 +21,7 @@ use crate::test_size::size_from_env;
 
 /// Number of good pairs among the hostile ones.
 const GOOD: u64 = 2;
-/// Memory limit of a run in MiB, and limit of its peak memory. The headers of some files ask for far more.
+/// Memory limit of a run in MiB. Peak memory must stay below it, although some headers declare far more data.
 const MEMORY_MIB: u64 = 256;
 /// Time limit of a stage in seconds.
 const STAGE_LIMIT_S: u64 = 60;

@@ -184,7 +184,7 @@ const RESTORE: FaultScenario = FaultScenario {
         let expected = ["catalog.sqlite", "mocban.toml"];
         let left = names(&root.join("q"));
         if done {
-            // The next command for the same output removes other files, but a restore is refused here.
+            // Hidden temporary files may remain. Another restore would be refused, so it cannot remove them.
             assert!(
                 left.iter()
                     .all(|name| name.starts_with('.') || expected.contains(&&**name))

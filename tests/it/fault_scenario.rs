@@ -55,7 +55,7 @@ impl FaultScenario {
         Some(result.code)
     }
 
-    /// Injects each fault at `points` of the system calls that it applies to, evenly spaced.
+    /// Injects each fault at up to `points` of the calls that the fault applies to. These calls are evenly spaced.
     #[expect(clippy::print_stderr, reason = "figures of the long test")]
     pub(crate) fn check_all(&self, faults: &[(Fault, End)], points: usize) {
         let comparison = Comparison::new("1");
@@ -85,7 +85,7 @@ fn assert_outcome(result: &Call, end: End, root: &Path, at: &str) {
         return;
     }
     if result.code == 3 {
-        // The output is written. A warning for each pair whose files cannot be read says what is missing.
+        // The output was written, but lacks data that could not be read. A warning names the file and the reason.
         let is_warned = |line: &str| line.starts_with("warning: ") && has_reason(line, root);
         assert!(result.err.lines().any(is_warned), "{at}");
         return;

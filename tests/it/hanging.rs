@@ -105,7 +105,7 @@ fn a_second_signal_does_not_wait_for_a_read_that_hangs() {
     assert_eq!((pair.results.status, pair.attempt), (JobStatus::Ready, 0));
 }
 
-/// After the stage limit, the file is hashed again, so that a later run notices whether it was replaced.
+/// When the read exceeds the stage time limit, the run hashes the file, so that a later run notices a replaced file.
 #[test]
 fn a_second_signal_does_not_wait_for_the_hash_after_a_read_that_hung() {
     let disk = HangingDisk::new("1");

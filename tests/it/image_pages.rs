@@ -18,7 +18,7 @@ const LIMITS: ImageLimits = ImageLimits::SUGGESTED;
 const REDUCED: u32 = 1;
 const MASK: u32 = 4;
 
-/// Returns an image with dark pixels in its first row, in which no orientation equals another.
+/// Returns an image with a dark block at the upper left, so that its eight orientations differ.
 fn stored(width: u32, height: u32) -> image::GrayImage {
     image::GrayImage::from_fn(width, height, |x, y| {
         let is_dark = y < 8 && x < width / 2;

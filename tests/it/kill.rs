@@ -16,8 +16,8 @@ use crate::uninterrupted::{Expected, files};
 /// Deaths during a claim, before the random kills.
 const DEATHS_WHILE_CLAIMING: u32 = 12;
 
-/// Kills runs while they claim a job and no pair is leased. From these deaths the catalog concludes that no pair is the
-/// cause. Without them, a pair that is the only leased pair at the first three random kills is correctly quarantined.
+/// Kills runs while no pair is leased. These deaths raise the number of crashes that quarantines a pair. Without them,
+/// the random kills could quarantine a pair that is the only leased pair three times.
 fn die_while_claiming(project: &Project) {
     for _ in 0..DEATHS_WHILE_CLAIMING {
         let died = run(project, &[])

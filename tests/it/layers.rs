@@ -358,7 +358,7 @@ fn files_do_not_import_each_other_in_cycles() {
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }
 
-/// Limits on the list of files in `src/lib.rs` that follow one pair: number of files, and of lines without unit tests.
+/// Largest number of files in the walkthrough of one pair in `src/lib.rs`, and of their lines without unit tests.
 const MAX_WALK_FILES: usize = 18;
 const MAX_WALK_LINES: usize = 4500;
 

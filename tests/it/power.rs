@@ -200,7 +200,7 @@ impl Comparison {
         Recorded::of(project.dir(), &root.join("notes"), start, &mut command)
     }
 
-    /// Writes the project from a disk, checks it, completes its run, and compares the results.
+    /// Copies a simulated disk to a project directory, checks the project, completes its run and compares the results.
     fn assert_recovers(&self, disk: &Disk, name: &str) {
         let parent = self.dir.path().join(name);
         let path = parent.join("p");
@@ -216,7 +216,7 @@ impl Comparison {
         std::fs::remove_dir_all(parent).expect("removed");
     }
 
-    /// Does that for many disks, on all cores.
+    /// Calls `assert_recovers` for each disk, on all cores.
     fn assert_all_recover(&self, disks: &[(String, Disk)]) {
         let next = AtomicUsize::new(0);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -241,7 +241,7 @@ fn all(recorded: &Recorded) -> Vec<(String, Disk)> {
     named(Names::Late).chain(named(Names::Early)).collect()
 }
 
-/// Returns about `wanted` of the disks, evenly spaced. The step is odd because changes of names and of bytes alternate.
+/// Returns about `wanted` evenly spaced disks. Changes of names and bytes alternate, so an odd step picks both.
 fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
     let step = disks.len().div_ceil(wanted) | 1;
     disks.into_iter().step_by(step).collect()

@@ -103,7 +103,7 @@ impl Fixture {
     /// Asserts that the results equal those of an uninterrupted run and no stage was stored twice.
     fn assert_uninterrupted_results(&self) {
         let found = results(&self.project);
-        // Results are in the order of the pairs, and a small dataset consists of the first pairs of a large one.
+        // Results are sorted by pair, and a small dataset consists of the first pairs of a large one.
         assert_eq!(found, UNINTERRUPTED[..found.len()]);
         assert!(attempts(&self.project).iter().all(|count| *count == 1));
     }

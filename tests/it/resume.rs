@@ -13,9 +13,9 @@ use crate::cli::{binary, call, mocban};
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
 
-/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. The
-/// second value, if given, is a stage that a run completes first, so that the next stage is claimed and stored by
-/// itself. Failpoints at file writes come early, because existing files are not written again.
+/// Every failpoint from the claim to the commit, ordered so that work on six pairs reaches each one. If a stage is
+/// given, it is completed first, so that the next stage is claimed and stored by itself. Failpoints at file writes come
+/// early, because existing files are not written again.
 const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:claiming", None),
     ("fit:claimed", None),
@@ -206,7 +206,7 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
 fn stages_are_computed_while_files_of_earlier_stages_are_written() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let broken = project(dir.path(), "broken", "1");
-    // The file of the depth map is never finished. `register` is reached only if no stage waits for this file.
+    // The file of the depth map is never finished, so `register` is reached only if no stage waits for that file.
     let died = run(&broken, &["-j", "1"])
         .env("MOCBAN_HOLD_AT", "depth:written")
         .env("MOCBAN_HOLD_FILE", dir.path().join("held"))

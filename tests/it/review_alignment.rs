@@ -1,4 +1,4 @@
-//! Manual alignments are stored, exported and scored like results. A duplicate item hides them until it is answered.
+//! Manual alignments are stored, exported and scored like results. Items with a duplicate hide them until answered.
 
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;

@@ -110,7 +110,7 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
                 move || log.review(&site, queue, &mut rng, &acknowledged)
             });
             for () in answered.iter().take(answers) {}
-            // The kill comes at a random time after that answer, so there is no event to wait for.
+            // The kill comes at a random time after the last awaited answer, so there is no event to wait for.
             let (_sender, never) = mpsc::channel::<()>();
             let _ = never.recv_timeout(moment);
             page.kill();

@@ -32,7 +32,7 @@ fn half_open_and_slow_connections_do_not_delay_other_requests() {
         stream.write_all(sent.as_bytes()).expect("sent");
         open.push(stream);
         if i % 80 == 79 {
-            // The open connections send one more byte each. The server has closed some of them.
+            // Sends one more byte on each connection. Fails on those that the server has closed.
             for stream in &mut open {
                 let _ = stream.write_all(b"a");
             }

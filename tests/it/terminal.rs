@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::resume::{project, run};
 
-/// Codes that clear the screen and set the title, C1 codes, controls of writing direction, and characters without
-/// width. The text also forges a line.
+/// Text with codes that clear the screen and set the title, C1 codes, controls of writing direction and zero-width
+/// characters. Its second line imitates program output.
 const HOSTILE: &str =
     "a\u{1b}[2J\u{1b}]0;title\u{7}\u{9b}31m\u{202e}b\u{2066}\u{200b}c\u{8}\u{7f}\nnext: rm";
 /// Han-Nôm and Vietnamese text, which is shown unchanged.

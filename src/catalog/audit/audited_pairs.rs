@@ -107,7 +107,7 @@ fn pair(row: &SqliteRow) -> Result<AuditedPair> {
     })
 }
 
-/// Returns what `read` makes of the rows of a query, by pair. Leaves out rows with invalid values.
+/// Reads the rows of a query with `read` and groups the values by pair. Leaves out rows with invalid values.
 async fn by_pair<K: Ord, V>(
     conn: &mut SqliteConnection,
     query: &'static str,

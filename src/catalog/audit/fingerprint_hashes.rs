@@ -17,7 +17,7 @@ pub struct FaultyFingerprint {
     pub stage: Option<Stage>,
 }
 
-/// Selects the fingerprints of the jobs and the ones before them, in the order of the stages.
+/// Selects the fingerprints of jobs, and all fingerprints upstream of these, sorted by stage.
 const USED: &str = "
 WITH RECURSIVE used (id) AS (
     SELECT DISTINCT fingerprint FROM job WHERE fingerprint IS NOT NULL
@@ -53,7 +53,7 @@ impl Catalog {
         Ok(faulty)
     }
 
-    /// Makes each faulty fingerprint differ from that of any settings, so that the next run computes its results again.
+    /// Gives each faulty fingerprint a hash that no settings have, so that the next run computes the results again.
     ///
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is changed.

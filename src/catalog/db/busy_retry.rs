@@ -1,4 +1,4 @@
-//! Retries operations while another process has the catalog locked, for longer than SQLite's busy timeout.
+//! Retries operations while another process has the catalog locked. Waits longer than SQLite's busy timeout.
 
 use std::path::Path;
 use std::time::Duration;

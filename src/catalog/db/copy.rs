@@ -14,7 +14,7 @@ use crate::catalog::{Catalog, CatalogError, Result};
 /// copied, only the original is read.
 const READ_FAILED: [&str; 2] = ["266", "522"];
 
-/// A longer absolute path, in bytes, is taken to be the reason why SQLite cannot open a file.
+/// If SQLite cannot open a file whose absolute path is longer than this, in bytes, the error blames the length.
 const MAX_PATH: usize = 500;
 
 const HAS_SETTINGS: &str =
@@ -149,7 +149,7 @@ async fn verify(file: &Path) -> Result<()> {
     }
 }
 
-/// Attributes an error of copying to the copy, unless a read failed: the original is only read.
+/// Attributes an error to the copy, or to the original if a read failed or the original may be damaged.
 fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
     let code = (error.as_database_error()).and_then(sqlx::error::DatabaseError::code);
     if code.is_some_and(|code| READ_FAILED.contains(&&*code)) {
@@ -177,7 +177,7 @@ fn disk_error(file: &Path, error: sqlx::Error) -> CatalogError {
             return CatalogError::Damaged(file.to_owned());
         }
         Some(CatalogErrorKind::Disk) => "the disk refused",
-        // The file is new. SQLite says this if the disk does not report the file's length.
+        // SQLite also says this if the disk does not report the length of a new file.
         _ if error.to_string().contains("output file already exists") => "the disk refused",
         _ => return error.into(),
     };

@@ -21,8 +21,7 @@ pub enum CatalogErrorKind {
     Disk,
     /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
-    /// A statement failed. A check takes this for damage, because its statements never change: the schema or a stored
-    /// JSON text is damaged.
+    /// A statement failed. Statements are fixed, so a check concludes that the schema or a stored JSON text is damaged.
     Statement,
 }
 

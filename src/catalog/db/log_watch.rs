@@ -18,7 +18,7 @@ use crate::domain::UnixMillis;
 const LOG_HEADER: u64 = 32;
 /// Length of the header of a frame in bytes. A frame holds one page.
 const FRAME_HEADER: u64 = 24;
-/// Numbers of pages of the log, and of these in the catalog's main file: (busy, log, checkpointed).
+/// Result of a checkpoint: 1 if it was blocked, pages in the log, and pages copied to the catalog's main file.
 type LogState = (i64, i64, i64);
 
 /// The log of the open write connection.
@@ -33,7 +33,7 @@ pub(crate) struct LogWatch {
     loss: Option<LogLoss>,
 }
 
-/// Where a file is, and its device and inode. These are `None` if the file was not there.
+/// Path of a file, with its device and inode, or `None` if these could not be read.
 #[derive(Debug)]
 struct FileId {
     path: PathBuf,
@@ -143,7 +143,7 @@ impl LogWatch {
         }
     }
 
-    /// Copies the log to the catalog's main file, unless the log is lost. Tries again later if a reader prevents it.
+    /// Copies the log to the main file, unless the log is lost. If a reader prevents it, a later call copies the rest.
     pub(crate) async fn checkpoint(&mut self, conn: &mut SqliteConnection, pragma: &'static str) {
         if self.check(conn).await.is_err() {
             return;

@@ -237,7 +237,7 @@ fn is_read_only(error: &CatalogError) -> bool {
 /// Replaces the error if the file is not a database or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // `kind` opens and closes the file. This drops no locks, because no connection has such a file open.
+        // `kind` opens and closes the file. This could drop locks only if a connection had the file open, and none has.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),

@@ -30,7 +30,7 @@ struct HiddenSidecars(PathBuf);
 impl Drop for HiddenSidecars {
     fn drop(&mut self) {
         for ending in ["-wal", "-shm", "-journal"] {
-            // SQLite has usually removed it. A file that stays is removed by the next creation.
+            // SQLite has usually removed the file already. If it remains, the next creator removes it.
             let _ = std::fs::remove_file(sidecar(&self.0, ending));
         }
     }

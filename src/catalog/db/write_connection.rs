@@ -64,7 +64,7 @@ impl WriteConnection {
     pub(crate) async fn close(mut self) {
         self.checkpoint_log("PRAGMA wal_checkpoint(TRUNCATE)").await;
         if self.log.is_lost() {
-            // Closing would copy pages of the damaged log to the catalog. The end of the process does not.
+            // Closing would copy pages of the damaged log to the catalog. Exiting without closing does not.
             std::mem::forget(self.conn);
         } else if let Err(error) = self.conn.close().await {
             tracing::warn!(%error, "the catalog did not close cleanly");

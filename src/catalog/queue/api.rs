@@ -48,7 +48,7 @@ impl Catalog {
 
     /// Stores finished stages in one transaction and advances the job. The stages must be in the order they were
     /// computed, and their artifacts must be on disk already. The commit may be delayed so that later requests can
-    /// share it. [`Catalog::waiting`] prevents the delay.
+    /// share it. Call [`Catalog::waiting`] to turn the delay off.
     ///
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is stored, and the lease remains until it

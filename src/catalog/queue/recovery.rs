@@ -68,7 +68,7 @@ RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint"
 /// Marks workers as dead, unless they ended properly.
 const DIED: &str =
     "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT value FROM json_each(?1))";
-/// Marks all workers except one as dead. Skips workers that are too old for [`DEATHS`], which alone reads the mark.
+/// Marks recent workers except one as dead. Only [`DEATHS`] reads the mark, and it ignores older workers.
 const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
@@ -152,8 +152,8 @@ impl Catalog {
         .await
     }
 
-    /// Stores the current versions of those input files of quarantined pairs that no stage has read. A later run
-    /// compares the stored hashes to detect replaced files.
+    /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
+    /// the stored hashes to detect replaced files.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -4,7 +4,7 @@
 //! of all earlier stages. Therefore one comparison of fingerprints decides for many jobs.
 //!
 //! Jobs with the `dirty` mark or in quarantine are inspected one by one. The results of a dirty job may disagree with
-//! each other or with the inputs. The failure of a quarantined job has settings and inputs of its own.
+//! each other or with the inputs. A quarantined job's failure stores the settings and inputs of the failed stage.
 
 use std::collections::BTreeMap;
 
@@ -173,8 +173,8 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Groups all jobs by counter key. The groups are sorted by cursor and status. Each group consists of the state of its
-/// jobs without the dirty mark, and the number of all its jobs.
+/// Groups all jobs by counter key, sorted by cursor and status. Returns the number of jobs of each group, and the state
+/// of those that are neither dirty nor quarantined.
 ///
 /// A requeued job moves to an earlier group. Therefore a pass over the groups handles each job only once.
 pub(crate) async fn groups(

@@ -30,7 +30,7 @@ pub struct ManualAlignment {
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the relief's and the print's masks at the manual pose, on the canvas of the scores.
+    /// Intersection over union of the masks of relief and print under this alignment, on the canvas used for scores.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,

@@ -207,8 +207,8 @@ impl PlyHeader {
     }
 }
 
-/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. If a CR
-/// alone ends the first line, it ends every line. Later lines do not tell, because a binary body may begin after a CR.
+/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. If a CR alone
+/// ends the first line, CR ends every line. Later lines are not examined, as binary data may follow a CR.
 fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     let old_mac = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
     let end = if old_mac { b'\r' } else { b'\n' };

@@ -354,7 +354,7 @@ mod tests {
                     out.extend(&(face.len() as u32).to_le_bytes()[..count_bytes]);
                     out.extend(face.iter().flat_map(|index| index.to_le_bytes()));
                 }
-                // Only the corners of the last face may be cut off: they have the same size in both layouts.
+                // Cuts at most the indices of the last face, whose size is the same in both layouts.
                 let missing = cut.min(faces.last().map_or(0, |face| 4 * face.len()));
                 out.truncate(out.len() - missing);
                 read(&out).map_err(|error| error.to_string())

@@ -65,7 +65,7 @@ fn truncated(have: u64, count: u32) -> MeshError {
     }
 }
 
-/// Reads a binary STL. Ignores normals, attributes, and less than one triangle of bytes at the end.
+/// Reads a binary STL. Ignores normals, attributes, and trailing bytes that are too few for a triangle.
 pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
         format: FORMAT,

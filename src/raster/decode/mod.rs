@@ -83,7 +83,7 @@ fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
     }
 }
 
-/// Checks the size at its fixed offset in a PNG, because the decoder first reads all chunks before the pixels.
+/// Checks the size at its fixed offset in a PNG, because the decoder first reads all chunks that precede the pixels.
 fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
         let field = bytes.get(at..).and_then(|rest| rest.first_chunk());
