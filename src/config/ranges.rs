@@ -31,7 +31,6 @@ const RANGES: &[(&str, RangeInclusive<f64>)] = &[
     ("register.scale_band", 1.0..=2.0),
     ("register.threshold_min", 0.0..=1.0),
     ("register.threshold_max", 0.0..=1.0),
-    ("register.ink_spread", 1.0..=3.0),
     ("normalize.density_greys", 0.0..=255.0),
     ("normalize.structure_greys", 0.0..=255.0),
     ("register.working_px", 32.0..=1024.0),

@@ -205,7 +205,6 @@ pub(super) fn settings() -> Settings {
             anisotropic_scale: false,
             threshold_min: 0.01,
             threshold_max: 0.6,
-            ink_spread: 1.3,
             min_confidence: 0.3,
             window: SsimWindow::Gaussian,
             coarse_angles: 60,

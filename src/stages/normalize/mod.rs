@@ -7,6 +7,7 @@ mod height_histogram;
 mod normalized;
 mod params;
 mod relief;
+mod steepness;
 
 pub(super) use normalized::box_wrap;
 pub use normalized::{Normalized, PrintMasks};
@@ -17,7 +18,7 @@ use super::print::Print;
 use crate::raster::DepthMap;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 11;
+pub const REVISION: u32 = 12;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///

@@ -1,6 +1,7 @@
 //! Measures the heights of tops and ground in a depth map, and computes soft strokes from depths.
 
 use super::height_histogram::HeightHistogram;
+use super::steepness::SteepnessProfile;
 use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
@@ -45,7 +46,7 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
         ..classes
     };
     Some(ReliefHeights {
-        tops_end: HeightHistogram::of(&heights, &tops).tops_end(),
+        tops_end: SteepnessProfile::of(depth, bounds, &tops).tops_end(),
         ..tops
     })
 }
@@ -82,21 +83,23 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
 
 /// Samples the heights inside a box. `margin` is the part left out at each side, as a share of the side's length.
 fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
-    let inner = |low: usize, high: usize| {
-        let cut = ((high - low) as f64 * margin) as usize;
-        // The samples are symmetric about the middle, so a map rotated by 180 degrees gives the same heights.
-        let rest = 2 * (high - low - 2 * cut) % STRIDE;
-        (low + cut + rest..=high - cut).step_by(STRIDE)
-    };
     let mut heights = Vec::new();
-    for y in inner(bounds.y0, bounds.y1) {
+    for y in sampled(bounds.y0, bounds.y1, margin) {
         let row = depth.levels.row(y);
-        let known = inner(bounds.x0, bounds.x1)
+        let known = sampled(bounds.x0, bounds.x1, margin)
             .map(|x| row[x])
             .filter(|level| *level > 0);
         heights.extend(known.map(|level| depth.scale.height(level) as f32));
     }
     heights
+}
+
+/// Returns the rows or columns that are sampled from `low` to `high`. `margin` is the part left out at each side. The
+/// samples are symmetric about the middle, so a map rotated by 180 degrees gives the same samples.
+pub(super) fn sampled(low: usize, high: usize, margin: f64) -> impl Iterator<Item = usize> {
+    let cut = ((high - low) as f64 * margin) as usize;
+    let rest = 2 * (high - low - 2 * cut) % STRIDE;
+    (low + cut + rest..=high - cut).step_by(STRIDE)
 }
 
 #[cfg(test)]

@@ -1,79 +1,42 @@
 //! Chooses each metric's depth threshold in the aligned frame.
 //!
-//! Candidates are equally spaced depths below the tops. Their masks are compared with the print's ink on the pixels
-//! where both print and depth map have data. See [`ThresholdMetric`] for the formulas.
+//! Candidates are depths below the tops. Their masks are compared with the print's ink on the pixels where both print
+//! and depth map have data. The ink is first corrected by its spread, which is measured at the edges of the `relief`
+//! mask. See [`ThresholdMetric`] for the formulas.
 
+use super::half_canvas::HalfCanvas;
 use super::params::{RegisterError, RegisterParams};
-use crate::domain::{Affine2, ReliefHeights, ThresholdChoice, ThresholdMetric};
-use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
-use crate::stages::normalize::PrintMasks;
+use crate::domain::{ReliefHeights, ThresholdChoice, ThresholdMetric};
+use crate::raster::{DepthMap, Mask};
 use crate::stages::score::{SsimReference, SsimWindow};
 
 /// Number of candidates between the smallest and the largest depth.
 const CANDIDATES: u32 = 40;
 /// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// `ensemble` prefers masks whose area differs from that of the `relief` mask by at most this factor.
-const CLOSE_AREA: f64 = 1.12;
-/// Smallest plausible area of the tops: the ink's area divided by this. Smaller areas are raised to it.
-const MOST_SPREAD: f64 = 2.2;
-/// Largest plausible area of the tops: the ink's area times this. Larger areas are lowered to it.
-const LEAST_INKED: f64 = 1.15;
+/// `density` ignores strokes that are farther than this from the corrected ink, in pixels of the half canvas: their ink
+/// is missing.
+const MISSING_PX: f64 = 3.0;
+/// Distance from the corrected edge at which ink or paper counts fully for `ensemble`, in pixels of the half canvas.
+const FULL_PX: f64 = 1.0;
+/// Weight of the distance from the depth of `relief` in the score of `ensemble`.
+const PRIOR: f64 = 0.05;
 
-/// Print and depth map on a canvas of half the size, on which masks are compared in a quarter of the time.
-pub(super) struct HalfCanvas {
-    /// Levels of the depth map; 0 where print or depth map holds no data.
-    levels: Grid<u16>,
-    /// Ink where both hold data.
-    ink: Mask,
-}
-
-impl HalfCanvas {
-    /// Warps print and depth map to the canvas, and clears the pixels where print or depth map has no data.
-    pub(super) fn new(
-        depth: &DepthMap,
-        print: &PrintMasks,
-        canvas_from_print: &Affine2,
-        print_from_depth: &Affine2,
-        canvas_px: u32,
-    ) -> Self {
-        let side = canvas_px as usize / 2;
-        let half_from_print = Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_print);
-        let half_from_depth = half_from_print.after(print_from_depth);
-        let mut levels = warp_depth(depth, &half_from_depth, side, side);
-        let paper = warp_mask(&print.known, &half_from_print, side, side);
-        let mut ink = warp_mask(&print.ink, &half_from_print, side, side);
-        let both = levels.data_mut().iter_mut().zip(ink.data_mut());
-        for ((level, ink), paper) in both.zip(paper.data()) {
-            *level *= u16::from(*paper);
-            *ink &= *level > 0;
-        }
-        Self { levels, ink }
-    }
-
-    /// Returns the stroke mask of a level above 0.
-    fn mask(&self, level: u16) -> Mask {
-        self.levels.map(|l| *l >= level)
-    }
-
-    /// Returns the number of stroke pixels of a level above 0.
-    fn area(&self, level: u16) -> f64 {
-        self.levels.count_at_least(level) as f64
-    }
-}
-
-/// A candidate threshold.
+/// A candidate threshold, and how its mask fits the corrected ink.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
+    /// Depth below the tops, as a share of the relief.
+    share: f64,
     level: u16,
     /// Number of stroke pixels on the canvas.
     area: f64,
+    /// Number of stroke pixels of which the ink is not missing.
+    area_inked: f64,
+    /// Agreement with the corrected ink: 1 if the mask covers all ink and no paper.
+    agreement: f64,
 }
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
-///
-/// `nl_ssim` includes the spread of the print's ink, and `relief` ignores the print. `ensemble` therefore takes the
-/// best structure score among the thresholds whose mask has about the area of the `relief` mask.
 ///
 /// # Errors
 /// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.
@@ -83,24 +46,28 @@ pub(super) fn choose(
     canvas: &HalfCanvas,
     params: &RegisterParams,
 ) -> Result<Vec<ThresholdChoice>, RegisterError> {
-    let ink = canvas.ink.count() as f64;
-    let candidates = candidates(depth, relief, canvas, params);
-    if candidates.is_empty() || ink == 0.0 {
+    let levels = candidate_levels(depth, relief, params);
+    let by_relief = relief.level_at(&depth.scale, relief.tops_end);
+    let spread = canvas.ink_spread(by_relief);
+    let candidates = candidates(canvas, &levels, spread);
+    if candidates.is_empty() || canvas.ink.count() == 0 {
         return Err(RegisterError::NoStrokes);
     }
-    let mut structure = Structure::new(canvas, &candidates, params.window);
-    let best = structure.best_of_all().unwrap_or(0);
-    let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
-    let density = nearest(&candidates, gap);
-    let edge = relief.level_at(&depth.scale, relief.tops_end);
-    // If the tops' area is implausible for this area of ink, `tops_end` is taken to be wrong, and the area is clamped.
-    let own_area = canvas
-        .area(edge)
-        .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
-    let close = |c: &Candidate| (c.area / own_area.max(1.0)).ln().abs() <= CLOSE_AREA.ln();
-    let both = structure
-        .best((0..candidates.len()).filter(|k| close(&candidates[*k])))
-        .unwrap_or_else(|| nearest(&candidates, |c| f64::from(c.level.abs_diff(edge))));
+    let corrected = canvas.edge.corrected(spread);
+    // Ink thinner than its spread would vanish.
+    let corrected = if corrected.count() == 0 {
+        &canvas.ink
+    } else {
+        &corrected
+    };
+    let mut structure = Structure::new(canvas, corrected, &candidates, params.window);
+    let best = structure.best_of_all();
+    let ink = carved_ink(canvas, corrected, levels.last().map_or(1, |(_, level)| *level));
+    let gap = |c: &Candidate| (c.area_inked / ink.max(1.0) - 1.0).abs();
+    let density = lowest(&candidates, gap);
+    let far = |c: &Candidate| (c.share / relief.tops_end.max(f64::MIN_POSITIVE)).ln();
+    let combined = |c: &Candidate| c.agreement - PRIOR * far(c).powi(2);
+    let ensemble = lowest(&candidates, |c| -combined(c));
     let choice = |metric, k: usize, score| ThresholdChoice {
         metric,
         level: candidates[k].level,
@@ -114,42 +81,84 @@ pub(super) fn choose(
             density,
             -gap(&candidates[density]),
         ),
-        choice(ThresholdMetric::Ensemble, both, structure.at(both)),
+        choice(
+            ThresholdMetric::Ensemble,
+            ensemble,
+            combined(&candidates[ensemble]),
+        ),
         ThresholdChoice {
             metric: ThresholdMetric::Relief,
-            level: edge,
+            level: by_relief,
             score: 0.0,
             at_bound: false,
         },
     ])
 }
 
-/// Returns the index of the candidate with the smallest distance.
-fn nearest(candidates: &[Candidate], far: impl Fn(&Candidate) -> f64) -> usize {
+/// Returns the index of the first candidate with the lowest value.
+fn lowest(candidates: &[Candidate], value: impl Fn(&Candidate) -> f64) -> usize {
     (0..candidates.len())
-        .min_by(|a, b| far(&candidates[*a]).total_cmp(&far(&candidates[*b])))
+        .min_by(|a, b| value(&candidates[*a]).total_cmp(&value(&candidates[*b])))
         .unwrap_or(0)
 }
 
-/// Returns the candidates that leave strokes, the shallowest first.
-fn candidates(
+/// Returns the depths that are tried and their levels, the shallowest first. The square roots of the shares are evenly
+/// spaced, because the best depths of most blocks are small.
+fn candidate_levels(
     depth: &DepthMap,
     relief: &ReliefHeights,
-    canvas: &HalfCanvas,
     params: &RegisterParams,
-) -> Vec<Candidate> {
-    let span = params.threshold_max - params.threshold_min;
-    let share = |k: u32| params.threshold_min + span * f64::from(k) / f64::from(CANDIDATES - 1);
-    let mut levels: Vec<u16> = (0..CANDIDATES)
-        .map(|k| relief.level_at(&depth.scale, share(k)))
+) -> Vec<(f64, u16)> {
+    let [from, to] = [params.threshold_min, params.threshold_max].map(f64::sqrt);
+    let share = |k: u32| (from + (to - from) * f64::from(k) / f64::from(CANDIDATES - 1)).powi(2);
+    let mut levels: Vec<(f64, u16)> = (0..CANDIDATES)
+        .map(|k| (share(k), relief.level_at(&depth.scale, share(k))))
         .collect();
-    levels.dedup();
-    let candidate = |level| Candidate {
-        level,
-        area: canvas.area(level),
+    levels.dedup_by_key(|(_, level)| *level);
+    levels
+}
+
+/// Returns the number of pixels of corrected ink that the deepest candidate covers. The strokes of other ink are lost on
+/// the block.
+fn carved_ink(canvas: &HalfCanvas, corrected: &Mask, deepest: u16) -> f64 {
+    let both = corrected.data().iter().zip(canvas.levels.data());
+    both.filter(|(ink, level)| **ink && **level >= deepest)
+        .count() as f64
+}
+
+/// Measures the candidates that leave strokes. `levels` holds depths and levels, the shallowest first.
+fn candidates(canvas: &HalfCanvas, levels: &[(f64, u16)], spread: f64) -> Vec<Candidate> {
+    // What each candidate adds to the mask of the candidate before.
+    let mut added = vec![[0.0; 3]; levels.len() + 1];
+    let mut all_ink = 0.0;
+    for (level, distance) in canvas.levels.data().iter().zip(canvas.edge.distances()) {
+        if *level == 0 {
+            continue;
+        }
+        let inside = f64::from(*distance) - spread;
+        let weight = (inside / FULL_PX).clamp(-1.0, 1.0);
+        all_ink += weight.max(0.0);
+        let first = levels.partition_point(|(_, candidate)| candidate > level);
+        let [area, area_inked, agreement] = &mut added[first];
+        *area += 1.0;
+        *area_inked += f64::from(u8::from(inside > -MISSING_PX));
+        *agreement += weight;
+    }
+    let mut sum = [0.0; 3];
+    let candidate = |((share, level), added): (&(f64, u16), &[f64; 3])| {
+        for (sum, added) in sum.iter_mut().zip(added) {
+            *sum += added;
+        }
+        Candidate {
+            share: *share,
+            level: *level,
+            area: sum[0],
+            area_inked: sum[1],
+            agreement: sum[2] / f64::max(all_ink, 1.0),
+        }
     };
-    let tried = levels.into_iter().map(candidate);
-    tried.filter(|c| c.area > 0.0).collect()
+    let measured = levels.iter().zip(&added).map(candidate);
+    measured.filter(|c| c.area > 0.0).collect()
 }
 
 /// Structure scores of candidates, computed on demand and cached.
@@ -161,11 +170,17 @@ struct Structure<'a> {
 }
 
 impl<'a> Structure<'a> {
-    fn new(canvas: &'a HalfCanvas, candidates: &'a [Candidate], window: SsimWindow) -> Self {
+    fn new(
+        canvas: &'a HalfCanvas,
+        corrected: &Mask,
+        candidates: &'a [Candidate],
+        window: SsimWindow,
+    ) -> Self {
+        let ink = corrected.zip_map(&canvas.levels, |ink, level| ink && level > 0);
         Self {
             canvas,
             candidates,
-            means: SsimReference::new(&canvas.ink, window),
+            means: SsimReference::new(&ink, window),
             known: vec![None; candidates.len()],
         }
     }
@@ -179,17 +194,17 @@ impl<'a> Structure<'a> {
 
     /// Returns the best candidate. The score changes slowly with depth, so the search tries every fourth candidate
     /// first and then the neighbours of the best one.
-    fn best_of_all(&mut self) -> Option<usize> {
+    fn best_of_all(&mut self) -> usize {
         let count = self.candidates.len();
-        let coarse = self.best((0..count).step_by(COARSE))?;
+        let coarse = self.best((0..count).step_by(COARSE));
         self.best(coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count))
     }
 
     /// Returns the first candidate with the highest score.
-    fn best(&mut self, among: impl Iterator<Item = usize>) -> Option<usize> {
+    fn best(&mut self, among: impl Iterator<Item = usize>) -> usize {
         let scored = among.map(|k| (k, self.at(k)));
         let best = scored.reduce(|best, other| if other.1 > best.1 { other } else { best });
-        best.map(|(k, _)| k)
+        best.map_or(0, |(k, _)| k)
     }
 }
 
@@ -197,77 +212,121 @@ impl<'a> Structure<'a> {
 mod tests {
     //! The choices follow the formulas of [`ThresholdMetric`].
 
-    use super::{CLOSE_AREA, Candidate, HalfCanvas, LEAST_INKED, MOST_SPREAD, candidates, choose};
-    use crate::domain::{ReliefHeights, ThresholdChoice, ThresholdMetric};
+    use super::{FULL_PX, MISSING_PX, PRIOR, candidate_levels, choose};
+    use crate::domain::{ReliefHeights, ThresholdMetric};
     use crate::raster::{DepthMap, Grid, Mask};
     use crate::stages::register::RegisterParams;
+    use crate::stages::register::half_canvas::HalfCanvas;
     use crate::stages::score::SsimReference;
     use crate::stages::testing::settings;
 
     const SIDE: usize = 128;
+    const RELIEF: ReliefHeights = ReliefHeights {
+        top: 0.0,
+        ground: -1.0,
+        tops_end: 0.08,
+    };
 
-    /// Returns a relief of bars with sloping walls, and a canvas on which ink covers the tops and part of the walls.
-    fn bars() -> (DepthMap, HalfCanvas, ReliefHeights) {
-        let from_axis = |x: usize| (x % 32).abs_diff(16) as f64;
+    /// Returns a relief of bars with sloping walls. The tops have a half width of 4 px; those of the third bar are worn
+    /// by `worn`, as a share of the relief.
+    fn bars(worn: f64) -> DepthMap {
         let level = |x: usize, y: usize| {
-            let wall = ((from_axis(x) - 4.0) / 8.0).clamp(0.0, 1.0);
+            let from_axis = (x % 32).abs_diff(16) as f64;
+            let wall = ((from_axis - 4.0) / 8.0).clamp(0.0, 1.0);
+            let wall = if x / 32 == 2 { wall.max(worn) } else { wall };
             let rough = 600.0 * ((x * 7 + y * 13) % 11) as f64 / 11.0;
             (50_001.0 * (1.0 - wall) - rough).max(1.0) as u16
         };
-        let levels = Grid::from_fn(SIDE, SIDE, level);
-        let canvas = HalfCanvas {
-            levels: levels.clone(),
-            ink: Mask::from_fn(SIDE, SIDE, |x, _| from_axis(x) < 6.0),
-        };
-        let relief = ReliefHeights {
-            top: 0.0,
-            ground: -1.0,
-            tops_end: 0.08,
-        };
-        (DepthMap::of_levels(levels), canvas, relief)
+        DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
     }
 
-    fn best(candidates: &[Candidate], score: impl Fn(&Candidate) -> f64) -> Option<u16> {
-        // The first of equals: `max_by` returns the last.
-        let best = candidates
-            .iter()
-            .rev()
-            .max_by(|a, b| score(a).total_cmp(&score(b)));
-        best.map(|candidate| candidate.level)
+    /// Returns a canvas on which ink covers the bars up to `ink_px` from their axes, except in missing rows.
+    fn canvas(depth: &DepthMap, ink_px: f64, missing: std::ops::Range<usize>) -> HalfCanvas {
+        let ink = |x: usize, y: usize| {
+            ((x % 32).abs_diff(16) as f64) < ink_px && !missing.contains(&y)
+        };
+        HalfCanvas::of(depth.levels.clone(), Mask::from_fn(SIDE, SIDE, ink))
+    }
+
+    fn params() -> RegisterParams {
+        settings().register
+    }
+
+    /// Returns the depth that a metric chooses, as a share of the relief.
+    fn chosen(depth: &DepthMap, canvas: &HalfCanvas, metric: ThresholdMetric) -> f64 {
+        let all = choose(depth, &RELIEF, canvas, &params()).expect("strokes and ink");
+        let choice = all.iter().find(|choice| choice.metric == metric);
+        -depth.scale.height(choice.expect("every metric").level)
     }
 
     #[test]
     fn each_metric_chooses_by_its_formula() {
-        let params: RegisterParams = settings().register;
-        let (depth, canvas, relief) = bars();
-        let chosen = choose(&depth, &relief, &canvas, &params).expect("strokes and ink");
-        let level = |metric: ThresholdMetric| {
-            let of_metric = |choice: &&ThresholdChoice| choice.metric == metric;
-            chosen.iter().find(of_metric).expect("every metric").level
+        let (depth, params) = (bars(0.15), params());
+        let canvas = canvas(&depth, 6.0, 20..35);
+        let levels = candidate_levels(&depth, &RELIEF, &params);
+        let spread = canvas.ink_spread(RELIEF.level_at(&depth.scale, RELIEF.tops_end));
+        let corrected = canvas.edge.corrected(spread);
+        let reference = SsimReference::new(&corrected, params.window);
+        let structure = |level: u16| reference.nl_ssim(&canvas.mask(level));
+        let pixels = || canvas.levels.data().iter().zip(canvas.edge.distances());
+        let inside = |distance: &f32| f64::from(*distance) - spread;
+        let count = |is_counted: &dyn Fn(u16, f64) -> bool| {
+            pixels().filter(|(l, d)| is_counted(**l, inside(d))).count() as f64
         };
-        let all = candidates(&depth, &relief, &canvas, &params);
-        let reference = SsimReference::new(&canvas.ink, params.window);
-        let structure = |c: &Candidate| reference.nl_ssim(&canvas.mask(c.level));
-        let ink = canvas.ink.count() as f64;
-        let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
-        let by_relief = relief.level_at(&depth.scale, relief.tops_end);
-        let wanted = canvas
-            .area(by_relief)
-            .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
-        let close: Vec<Candidate> = all
-            .iter()
-            .copied()
-            .filter(|c| (c.area / wanted).ln().abs() <= CLOSE_AREA.ln())
-            .collect();
-        assert_eq!(Some(level(ThresholdMetric::NlSsim)), best(&all, structure));
-        assert_eq!(
-            Some(level(ThresholdMetric::Density)),
-            best(&all, |c| -gap(c))
-        );
-        assert_eq!(
-            Some(level(ThresholdMetric::Ensemble)),
-            best(&close, structure)
-        );
-        assert_eq!(level(ThresholdMetric::Relief), by_relief);
+        let deepest = levels[levels.len() - 1].1;
+        let ink = count(&|l, inside| l >= deepest && inside > 0.0);
+        let gap = |level: u16| (count(&|l, i| l >= level && i > -MISSING_PX) / ink - 1.0).abs();
+        let weight = |distance: &f32| (inside(distance) / FULL_PX).clamp(-1.0, 1.0);
+        let all_ink: f64 = pixels().map(|(_, d)| weight(d).max(0.0)).sum();
+        let combined = |(share, level): (f64, u16)| {
+            let covered = pixels().filter(|(l, _)| **l >= level);
+            let agreement: f64 = covered.map(|(_, d)| weight(d)).sum();
+            agreement / all_ink - PRIOR * (share / RELIEF.tops_end).ln().powi(2)
+        };
+        let best = |score: &dyn Fn((f64, u16)) -> f64| {
+            // The first of equals: `max_by` returns the last.
+            let order = |a: &&(f64, u16), b: &&(f64, u16)| score(**a).total_cmp(&score(**b));
+            levels.iter().rev().max_by(order).expect("levels").1
+        };
+        let all = choose(&depth, &RELIEF, &canvas, &params).expect("strokes and ink");
+        let wanted = [
+            best(&|(_, level)| structure(level)),
+            best(&|(_, level)| -gap(level)),
+            best(&combined),
+            RELIEF.level_at(&depth.scale, RELIEF.tops_end),
+        ];
+        assert_eq!(all.iter().map(|c| c.level).collect::<Vec<_>>(), wanted);
+    }
+
+    #[test]
+    fn dry_and_heavy_ink_give_about_the_same_thresholds() {
+        let depth = bars(0.0);
+        for metric in ThresholdMetric::ALL {
+            for ink_px in [3.0, 4.0, 6.0, 8.0] {
+                let share = chosen(&depth, &canvas(&depth, ink_px, 0..0), metric);
+                assert!((0.0..0.2).contains(&share), "{metric}: {share} for {ink_px} px");
+            }
+        }
+    }
+
+    #[test]
+    fn missing_ink_does_not_change_the_thresholds() {
+        let depth = bars(0.0);
+        for metric in ThresholdMetric::ALL {
+            let [whole, torn] =
+                [0..0, 20..70].map(|rows| chosen(&depth, &canvas(&depth, 5.0, rows), metric));
+            assert!((whole - torn).abs() < 0.06, "{metric}: {whole}, {torn}");
+        }
+    }
+
+    #[test]
+    fn print_brings_back_a_worn_bar_that_the_relief_loses() {
+        let depth = bars(0.14);
+        let canvas = canvas(&depth, 5.0, 0..0);
+        assert!(chosen(&depth, &canvas, ThresholdMetric::Relief) < 0.1);
+        for metric in ThresholdMetric::PAPER {
+            let share = chosen(&depth, &canvas, metric);
+            assert!((0.14..0.25).contains(&share), "{metric}: {share}");
+        }
     }
 }

@@ -6,6 +6,8 @@
 
 mod anisotropic_scale;
 mod confidence;
+mod half_canvas;
+mod ink_edge;
 mod metric_thresholds;
 mod params;
 mod pose_search;
@@ -21,10 +23,10 @@ pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 use super::normalize::{Normalized, relative_depths, stroke_growth};
 use crate::domain::PoseFeatures;
 use crate::raster::DepthMap;
-use metric_thresholds::HalfCanvas;
+use half_canvas::HalfCanvas;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 11;
+pub const REVISION: u32 = 12;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.

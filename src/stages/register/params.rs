@@ -22,9 +22,6 @@ pub struct RegisterParams {
     pub threshold_min: f64,
     /// Largest depth below the tops that is tried as a threshold, as a share of the relief's depth.
     pub threshold_max: f64,
-    /// Ratio of the ink's area to the area of the stroke tops that printed it, 1 or more. `density` aims at the print's
-    /// density divided by this ratio.
-    pub ink_spread: f64,
     /// Smallest confidence in the pose, 0..=1, with which a pair is accepted.
     pub min_confidence: f64,
     /// SSIM window, used for the scores and for choosing the thresholds of `nl_ssim` and `ensemble`.
