@@ -36,7 +36,7 @@ pub enum ThresholdMetric {
     Ensemble,
     /// The depth at which the stroke tops end and the walls begin, as a share of the relief, from the heights alone.
     /// There, the mean steepness of the relief reaches `g_w^0.78 g_t^0.22`, where `g_w` is the steepness of the walls
-    /// and `g_t` that of the flattest tops. The depth is at most 0.4. There is no score (0). Not part of the paper's
+    /// and `g_t` that of the flattest tops, at least `0.05 g_w`. The depth is at most 0.4. There is no score (0). Not part of the paper's
     /// method.
     Relief,
 }

@@ -22,6 +22,8 @@ const WALL_QUANTILE: f64 = 0.8;
 /// The tops end where the steepness is `walls^(1 - SHARE) * tops^SHARE`. Accuracy is about the same from 0.2 to 0.25 on
 /// generated reliefs of twelve kinds.
 const SHARE: f64 = 0.22;
+/// Smallest steepness of tops, as a share of that of the walls. Perfectly flat tops would end at any slope.
+const FLATTEST: f64 = 0.05;
 /// Range of depths at which tops can end.
 const RANGE: [f64; 2] = [0.02, 0.4];
 /// Depth that is used if a map has no slopes to measure. It keeps most strokes whole on blocks of all kinds.
@@ -81,7 +83,7 @@ impl SteepnessProfile {
         };
         let at = (last as f64 * WALL_QUANTILE).round() as usize;
         let wall = *walls.select_nth_unstable_by(at, f64::total_cmp).1;
-        let end = wall.powf(1.0 - SHARE) * tops.powf(SHARE);
+        let end = wall.powf(1.0 - SHARE) * tops.max(FLATTEST * wall).powf(SHARE);
         (bin_of(RANGE[0])..bin_of(RANGE[1]))
             .find(|bin| steepness(*bin).is_some_and(|steepness| steepness >= end))
             .map_or(RANGE[1], middle)
@@ -126,7 +128,7 @@ mod tests {
         for wall_px in [10.0, 16.0] {
             for worn in [0.05, 0.15, 0.25] {
                 let end = tops_end(worn, wall_px);
-                let wanted = 0.6 * worn..worn + 0.08;
+                let wanted = 0.4 * worn..worn + 0.08;
                 assert!(wanted.contains(&end), "{end} for {worn}, {wall_px}");
             }
         }

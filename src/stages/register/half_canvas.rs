@@ -84,14 +84,21 @@ mod tests {
 
     /// Returns a canvas of two bars with a half width of 8 px. Ink covers each bar up to `ink_px` from its axis, and
     /// ink or wood may be missing in parts of a bar.
-    fn canvas(ink_px: f64, is_inked: impl Fn(usize) -> bool, is_carved: impl Fn(usize) -> bool) -> HalfCanvas {
+    fn canvas(
+        ink_px: f64,
+        is_inked: impl Fn(usize) -> bool,
+        is_carved: impl Fn(usize) -> bool,
+    ) -> HalfCanvas {
         let from_axis = |x: usize| (x % 48) as f64 - 23.5;
         let level = |x: usize, y: usize| {
             let on_bar = from_axis(x).abs() < 8.0 && (x < 48 || is_carved(y));
             if on_bar { TOP } else { 1 }
         };
         let ink = |x: usize, y: usize| from_axis(x).abs() < ink_px && (x > 48 || is_inked(y));
-        HalfCanvas::of(Grid::from_fn(SIDE, SIDE, level), Mask::from_fn(SIDE, SIDE, ink))
+        HalfCanvas::of(
+            Grid::from_fn(SIDE, SIDE, level),
+            Mask::from_fn(SIDE, SIDE, ink),
+        )
     }
 
     #[test]

@@ -54,7 +54,9 @@ impl InkEdge {
             let (sum, count) = distances
                 .iter()
                 .filter(is_near)
-                .fold((0.0, 0_u32), |(sum, count), d| (sum + f64::from(*d), count + 1));
+                .fold((0.0, 0_u32), |(sum, count), d| {
+                    (sum + f64::from(*d), count + 1)
+                });
             if count > 0 {
                 mean = sum / f64::from(count);
             }
