@@ -7,4 +7,4 @@ mod polarity;
 
 pub(super) use ink::BinarizeError;
 pub(super) use ink::{InkMask, fixed, hypotheses};
-pub(super) use otsu::{split, split_inner};
+pub(super) use otsu::{Split, split, split_inner};

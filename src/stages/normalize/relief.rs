@@ -5,7 +5,7 @@ use super::steepness::SteepnessProfile;
 use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
-use crate::stages::binarize;
+use crate::stages::binarize::{self, Split};
 use crate::stages::pose::SoftMask;
 
 /// Pixel step at which heights are sampled.
@@ -15,6 +15,11 @@ const STRIDE: usize = 3;
 const MARGIN: f64 = 0.15;
 /// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
+
+/// Largest depth of a carving, as a share of the longest side of the map's data. Real characters: 0.1.
+const DEEPEST: f64 = 0.25;
+/// Largest share of the sampled heights that may lie below the ground, such as a table seen through holes of the scan.
+const MOST_BELOW: f64 = 0.3;
 
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
 const LOWERED_BY: f64 = 0.03;
@@ -27,7 +32,8 @@ const LOWERED_BY: f64 = 0.03;
 pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
     let heights = |margin| heights(depth, bounds, margin);
-    let split = |margin| binarize::split(&mut heights(margin)).filter(|s| s.high > s.low);
+    let side = bounds.longest_side() as f64 * depth.scale.mesh_unit_per_px;
+    let split = |margin| split_face(heights(margin), DEEPEST * side);
     let split = split(MARGIN).or_else(|| split(0.0))?;
     let classes = ReliefHeights {
         // Heights are measured from the fitted surface, which lies on the tops.
@@ -49,6 +55,24 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
         tops_end: SteepnessProfile::of(depth, bounds, &tops).tops_end(),
         ..tops
     })
+}
+
+/// Splits heights into tops and ground. If the classes are farther apart than `deepest`, and few heights are in the lower
+/// class, this class is what holes of the scan show below the ground. It is then left out, and the others are split.
+fn split_face(mut heights: Vec<f32>, deepest: f64) -> Option<Split> {
+    let first = binarize::split(&mut heights).filter(|split| split.high > split.low)?;
+    let mut split = first;
+    while split.high - split.low > deepest {
+        let count = heights.len();
+        heights.retain(|height| f64::from(*height) > split.threshold);
+        let is_few = (count - heights.len()) as f64 <= MOST_BELOW * count as f64;
+        let next = binarize::split(&mut heights).filter(|next| next.high > next.low);
+        match next {
+            Some(next) if is_few => split = next,
+            Some(_) | None => return Some(first),
+        }
+    }
+    Some(split)
 }
 
 /// Returns the growth of the strokes' area if the threshold `level` is lowered by [`LOWERED_BY`] of the relief, as the
@@ -104,7 +128,7 @@ pub(super) fn sampled(low: usize, high: usize, margin: f64) -> impl Iterator<Ite
 
 #[cfg(test)]
 mod tests {
-    use super::stroke_growth;
+    use super::{relief_heights, stroke_growth};
     use crate::domain::ReliefHeights;
     use crate::raster::{DepthMap, Grid};
 
@@ -116,6 +140,23 @@ mod tests {
         let top = |x: usize| 51_000.0 - tilt * (x as f64 - 40.0) / 40.0;
         let level = |x, y| if on_bar(x, y) { top(x) as u16 } else { 1000 };
         DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
+    }
+
+    #[test]
+    fn a_table_seen_through_holes_is_not_the_ground() {
+        // A bar 1 mm high, on a map of 80 pixels of 0.1 mm. Every tenth column shows a table 6 mm below the ground.
+        let at_height = |mm: f64| (60_000.0 + (mm - 1.0) * 8000.0) as u16;
+        let level = |x: usize, y: usize| match (x % 10, y) {
+            (0, _) => at_height(-6.0),
+            (_, 30..50) => at_height(1.0),
+            _ => at_height(0.0) + (x % 7) as u16,
+        };
+        let mut map = DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level));
+        map.scale.height_per_level = 1.0 / 8000.0;
+        map.scale.height_min = 1.0 - 60_000.0 / 8000.0;
+        map.scale.mesh_unit_per_px = 0.1;
+        let relief = relief_heights(&map).expect("a relief");
+        assert!((relief.depth() - 1.0).abs() < 0.1, "{relief:?}");
     }
 
     #[test]
