@@ -6,15 +6,15 @@ use super::enum_names;
 
 /// How the threshold between strokes and background of a depth map is selected (paper III-C).
 ///
-/// `P` is the ink mask of the print. `D(t)` is the depth mask: the heights at and above threshold `t`. The default
-/// method compares the masks after alignment, where both images have data. It tries 40 depths `d` below the stroke tops,
-/// from `register.threshold_min` to `register.threshold_max` (shares of the carving's depth). Their square roots are
-/// evenly spaced. The paper's method compares the masks before alignment, over fixed ranges of grey levels. It scales
+/// `P` is the ink mask of the print. `D(t)` is the depth mask: the pixels at or above the height `t`. The default
+/// method compares the masks after alignment, where both images have data. It tries 40 depths `d` below the stroke
+/// tops, from `register.threshold_min` to `register.threshold_max` (shares of the carving's depth). Their square roots
+/// are evenly spaced. The paper's method compares the masks before alignment, over fixed ranges of grey levels. It scales
 /// each mask by its bounding box and centres it on its centroid.
 ///
 /// The default method first corrects the ink's spread. The spread `r` is the robust mean distance of the edge of
 /// [`Self::Relief`]'s mask from the edge of `P`: positive if the ink spreads over the wood, negative if dry ink leaves
-/// its rim bare. `P'` is `P` with its edge moved inward by `r`, and `s` is the signed distance from the edge of `P'`, in
+/// its rim bare. `P'` is `P` with its edge moved inward by `r`. `s` is the signed distance from the edge of `P'`, in
 /// pixels of a canvas of half the size (positive on ink).
 ///
 /// The paper's three metrics depend on the print. [`Self::Relief`] depends on the scanned relief alone.
@@ -36,8 +36,8 @@ pub enum ThresholdMetric {
     Ensemble,
     /// The depth at which the stroke tops end and the walls begin, as a share of the relief, from the heights alone.
     /// There, the mean steepness of the relief reaches `g_w^0.78 g_t^0.22`, where `g_w` is the steepness of the walls
-    /// and `g_t` that of the flattest tops, at least `0.05 g_w`. The depth is at most 0.4. There is no score (0). Not part of the paper's
-    /// method.
+    /// and `g_t` that of the flattest tops, at least `0.05 g_w`. The depth is at most 0.4. There is no score (0). Not
+    /// part of the paper's method.
     Relief,
 }
 

@@ -57,8 +57,9 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     })
 }
 
-/// Splits heights into tops and ground. If the classes are farther apart than `deepest`, and few heights are in the lower
-/// class, this class is what holes of the scan show below the ground. It is then left out, and the others are split.
+/// Splits heights into tops and ground. If the classes are farther apart than `deepest`, and few heights are in the
+/// lower class, the lower class is what holes of the scan show below the ground. It is then left out, and the other
+/// heights are split.
 fn split_face(mut heights: Vec<f32>, deepest: f64) -> Option<Split> {
     let first = binarize::split(&mut heights).filter(|split| split.high > split.low)?;
     let mut split = first;

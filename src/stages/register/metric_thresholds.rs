@@ -197,10 +197,11 @@ impl<'a> Structure<'a> {
     }
 
     /// Returns the best candidate. The score changes slowly with depth, so the search tries every fourth candidate
-    /// first and then the neighbours of the best one.
+    /// first and then the neighbours of the best one. If several are equal, it searches at the deepest: there, the
+    /// tops of worn strokes begin to appear.
     fn best_of_all(&mut self) -> usize {
         let count = self.candidates.len();
-        let coarse = self.best((0..count).step_by(COARSE));
+        let coarse = self.best((0..count).step_by(COARSE).rev());
         self.best(coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count))
     }
 
