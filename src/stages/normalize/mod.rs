@@ -7,6 +7,7 @@ mod height_histogram;
 mod normalized;
 mod params;
 mod relief;
+mod sampling;
 mod steepness;
 
 pub(super) use normalized::box_wrap;

@@ -1,6 +1,7 @@
 //! Measures the heights of tops and ground in a depth map, and computes soft strokes from depths.
 
 use super::height_histogram::HeightHistogram;
+use super::sampling::sampled;
 use super::steepness::SteepnessProfile;
 use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
@@ -8,8 +9,6 @@ use crate::simd::dispatch;
 use crate::stages::binarize::{self, Split};
 use crate::stages::pose::SoftMask;
 
-/// Pixel step at which heights are sampled.
-const STRIDE: usize = 3;
 /// Share of the map's width and height left out at each border when tops and ground are separated. Side walls and a
 /// protruding foot of the block may lie there, and are neither.
 const MARGIN: f64 = 0.15;
@@ -117,14 +116,6 @@ fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
         heights.extend(known.map(|level| depth.scale.height(level) as f32));
     }
     heights
-}
-
-/// Returns the rows or columns that are sampled from `low` to `high`. `margin` is the part left out at each side. The
-/// samples are symmetric about the middle, so a map rotated by 180 degrees gives the same samples.
-pub(super) fn sampled(low: usize, high: usize, margin: f64) -> impl Iterator<Item = usize> {
-    let cut = ((high - low) as f64 * margin) as usize;
-    let rest = 2 * (high - low - 2 * cut) % STRIDE;
-    (low + cut + rest..=high - cut).step_by(STRIDE)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! between 0.05 and 0.3 of the relief. Only ratios of slopes are used, so depth and resolution do not matter.
 
 use super::height_histogram::{BINS, bin_of, bin_with, middle, smoothed};
-use super::relief::sampled;
+use super::sampling::sampled;
 use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 

@@ -197,12 +197,14 @@ impl<'a> Structure<'a> {
     }
 
     /// Returns the best candidate. The score changes slowly with depth, so the search tries every fourth candidate
-    /// first and then the neighbours of the best one. If several are equal, it searches at the deepest: there, the
-    /// tops of worn strokes begin to appear.
+    /// first and then the neighbours of the best one. If several are equally good, the search continues near the
+    /// first and the last of them: the last may be just above the tops of worn strokes.
     fn best_of_all(&mut self) -> usize {
         let count = self.candidates.len();
-        let coarse = self.best((0..count).step_by(COARSE).rev());
-        self.best(coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count))
+        let first = self.best((0..count).step_by(COARSE));
+        let last = self.best((0..count).step_by(COARSE).rev());
+        let near = |k: usize| k.saturating_sub(COARSE - 1)..(k + COARSE).min(count);
+        self.best(near(first).chain(near(last)))
     }
 
     /// Returns the first candidate with the highest score.
