@@ -250,7 +250,7 @@ const BACKUP: FaultScenario = FaultScenario {
         call(&mut backup(root)).expect(0);
         assert_eq!(names(root), ["b.sqlite", "earlier", "p"]);
         assert!(!is_earlier());
-        mocban(root, &["restore", "b.sqlite", "q"]).expect(0);
+        mocban(root, &["restore", "b.sqlite", "q", "--inputs", "p"]).expect(0);
         mocban(root, &["-C", "q", "check", "--repair"]).expect(0);
         let settings = ["p", "q"].map(|project| bytes(&root.join(project).join("mocban.toml")));
         assert!(settings[0] == settings[1]);

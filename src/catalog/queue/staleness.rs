@@ -174,7 +174,7 @@ pub(crate) async fn inspect_marked(
 }
 
 /// Groups all jobs by counter key, sorted by cursor and status. Returns the number of jobs of each group, and the state
-/// of those that are neither dirty nor quarantined.
+/// of its jobs without the dirty and quarantined ones.
 ///
 /// A requeued job moves to an earlier group. Therefore a pass over the groups handles each job only once.
 pub(crate) async fn groups(
