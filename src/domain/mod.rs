@@ -33,7 +33,8 @@ pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Bow, DepthOutcome, DepthScale, FitOutcome, InkHypothesis, MetricOutcome, NormalizeOutcome,
-    PoseFeatures, RegisterOutcome, ReliefHeights, Scores, SideEvidence, ThresholdChoice,
+    PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores, SideEvidence,
+    ThresholdChoice,
 };
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};

@@ -42,6 +42,24 @@ pub struct SideEvidence {
     pub confidence: f64,
 }
 
+/// A box around the part of a scan that shows the character. Tables, spikes and neighbours lie outside.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ScanRegion {
+    /// Maps mesh coordinates to the frame of the box, in mesh units.
+    pub box_from_mesh: Rigid3,
+    /// Lowest and highest x, y and z in the box.
+    pub bounds: [[f64; 3]; 2],
+}
+
+impl ScanRegion {
+    /// Returns whether a point of the mesh lies in the box.
+    pub fn contains(&self, point: [f64; 3]) -> bool {
+        let [low, high] = self.bounds;
+        let at = self.box_from_mesh.apply(point);
+        (0..3).all(|k| (low[k]..=high[k]).contains(&at[k]))
+    }
+}
+
 /// Numeric result of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitOutcome {
@@ -59,6 +77,9 @@ pub struct FitOutcome {
     pub relief: f64,
     /// Evidence for the chosen side.
     pub side: SideEvidence,
+    /// The part of the scan that shows the character. `None` for the whole scan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub region: Option<ScanRegion>,
     /// Number of vertices in the file, duplicates included.
     pub vertices: u64,
     /// Number of triangles in the file; 0 for a point set.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scan;
-use super::zbuffer::{NO_HIT, Viewport};
+use super::zbuffer::{IndexedSurface, NO_HIT, Viewport};
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
 use crate::simd::{max_f32, min_f32};
@@ -69,6 +69,8 @@ impl DepthError {
 
 /// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
 ///
+/// If the fit found a region, the rest of the scan is not rendered.
+///
 /// A pixel gets level 0 ("no data") if the ray through its centre misses the mesh. Other levels, 1..=65535, are linear
 /// in the height of the highest hit, see [`DepthScale`]. `unit` is the unit of the mesh, if known.
 ///
@@ -80,7 +82,16 @@ pub fn depth(
     unit: Option<LengthUnit>,
     params: &DepthParams,
 ) -> Result<DepthMap, DepthError> {
-    let indexed = scan.indexed();
+    let part;
+    let indexed = if let Some(region) = &fit.region {
+        part = scan.mesh_in(region);
+        if part.vertices.is_empty() {
+            return Err(DepthError::NothingSeen);
+        }
+        &IndexedSurface::new(&part)
+    } else {
+        scan.indexed()
+    };
     let bounds = indexed.bounds(&fit.plane_from_mesh);
     let view = Viewport::around(bounds, longest_px(bounds, unit, params)?, true);
     let plane_from_px = view
@@ -168,7 +179,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantize};
-    use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
+    use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence};
     use crate::mesh::Mesh;
     use crate::raster::Grid;
     use crate::stages::Scan;
@@ -214,6 +225,7 @@ mod tests {
                 flatness: 1.0,
                 confidence: 1.0,
             },
+            region: None,
             vertices: 0,
             triangles: 0,
         }
@@ -266,6 +278,30 @@ mod tests {
                 assert!(map.height(x, y).is_none_or(|h| h.abs() < 1e-5));
             }
         }
+    }
+
+    #[test]
+    fn faces_outside_the_region_are_not_rendered() {
+        let fit = FitOutcome {
+            region: Some(ScanRegion {
+                box_from_mesh: flat_fit(None).plane_from_mesh,
+                bounds: [[1.9, -1.0, -1.0], [6.1, 7.0, 0.61]],
+            }),
+            ..flat_fit(None)
+        };
+        let map = depth(&ramp(), &fit, None, &params()).expect("a part is seen");
+        let seen: Vec<f64> = (0..map.levels.width())
+            .filter_map(|x| map.height(x, map.levels.height() / 2))
+            .collect();
+        let (low, high) = seen
+            .iter()
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), h| {
+                (low.min(*h), high.max(*h))
+            });
+        assert!(
+            (low - 0.2).abs() < 0.02 && (high - 0.6).abs() < 0.02,
+            "{low} {high}"
+        );
     }
 
     #[test]

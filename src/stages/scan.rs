@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use super::zbuffer::IndexedSurface;
+use crate::domain::ScanRegion;
 use crate::mesh::Mesh;
 
 /// A mesh as read, and its surface, which is indexed on first use.
@@ -18,6 +19,11 @@ impl Scan {
         &self.mesh
     }
 
+    /// Returns the faces, or the points, that lie in a region with all their corners.
+    pub(super) fn mesh_in(&self, region: &ScanRegion) -> Mesh {
+        part_of(&self.mesh, |corner| region.contains(corner))
+    }
+
     /// Returns the surface, ready to be rendered along any direction.
     pub(super) fn indexed(&self) -> &IndexedSurface {
         self.indexed.get_or_init(|| IndexedSurface::new(&self.mesh))
@@ -30,5 +36,45 @@ impl From<Mesh> for Scan {
             mesh,
             indexed: OnceLock::new(),
         }
+    }
+}
+
+/// Returns the faces whose corners are all kept, with these corners. Of a mesh without faces, returns the points that
+/// are kept.
+pub(super) fn part_of(mesh: &Mesh, keeps: impl Fn([f64; 3]) -> bool) -> Mesh {
+    let kept: Vec<bool> = mesh.vertices.iter().map(keeps).collect();
+    let faces = mesh.triangles.iter().copied();
+    let faces: Vec<[u32; 3]> = faces
+        .filter(|face| face.iter().all(|corner| kept[*corner as usize]))
+        .collect();
+    if mesh.triangles.is_empty() {
+        let points = mesh.vertices.iter().zip(kept);
+        let points = points.filter_map(|(point, kept)| kept.then_some(point));
+        return Mesh {
+            vertices: points.collect::<Vec<_>>().into(),
+            triangles: Vec::new().into(),
+        };
+    }
+    of_faces(mesh, &faces)
+}
+
+/// Returns the mesh of some faces, without the vertices that no face uses.
+pub(super) fn of_faces(mesh: &Mesh, faces: &[[u32; 3]]) -> Mesh {
+    let mut places = vec![u32::MAX; mesh.vertices.len()];
+    let mut vertices = Vec::new();
+    let mut renumbered = Vec::with_capacity(faces.len());
+    for face in faces {
+        renumbered.push(face.map(|corner| {
+            let place = &mut places[corner as usize];
+            if *place == u32::MAX {
+                *place = vertices.len() as u32;
+                vertices.push(mesh.vertices.at(corner as usize));
+            }
+            *place
+        }));
+    }
+    Mesh {
+        vertices: vertices.into(),
+        triangles: renumbered.into(),
     }
 }

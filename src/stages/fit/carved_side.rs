@@ -7,12 +7,10 @@
 //! - Manifest: it may give the direction of the scan.
 //! - Print: the relief of the carved side resembles the print. This weighs most, as only the print shows the character.
 
-use super::surface::{HeightSamples, Surface, quantile};
-use crate::domain::{Bow, Rigid3, SideEvidence};
-use crate::stages::pose::{
-    BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
-};
-use crate::stages::print::Print;
+use super::print_agreement::InkPyramids;
+use super::side_surface::FittedSide;
+use super::surface::quantile;
+use crate::domain::SideEvidence;
 use crate::stages::zbuffer::IndexedSurface;
 
 /// If the relief of one side is below this share of the opposite relief, that side is the back of the block.
@@ -30,85 +28,61 @@ const MANIFEST: f64 = 0.4;
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;
-/// Lower bound of the agreement.
-const LEAST_AGREEMENT: f64 = 0.02;
-/// Limits of the pose search that compares a side with the print. The search is coarser than in registration.
-const LIMITS: SearchRange = SearchRange {
-    max_scale: 1.6,
-    beam_width: mirrored(5),
-};
-const PASSES: [RefinementPass; 2] = [
-    RefinementPass {
-        size_px: 36,
-        sigma_px: 0.8,
-        max_steps: 6,
-        beam_width: mirrored(2),
-    },
-    RefinementPass {
-        size_px: JUDGED_PX,
-        sigma_px: 1.0,
-        max_steps: 5,
-        beam_width: mirrored(1),
-    },
-];
-
-/// Returns a beam of mirrored poses only, because a block seen from outside shows mirror writing.
-const fn mirrored(count: usize) -> BeamWidth {
-    BeamWidth {
-        upright: 0,
-        mirrored: count,
-    }
-}
-
-/// Working size at which the agreement is measured.
-const JUDGED_PX: usize = 56;
-/// Pixels with a lower nearness to the surface are assumed not to print. Without this limit, the slopes around thin
-/// strokes would count as strokes. Only the pose search uses the slopes.
-const PRINTS: f32 = 0.7;
-/// Working size of the print and the tops.
-const BASE_PX: usize = 72;
-
-/// Surface and measurements of one side.
-#[derive(Debug)]
-pub(super) struct FittedSide {
-    pub(super) plane_from_mesh: Rigid3,
-    pub(super) bow: Option<Bow>,
-    pub(super) bow_height: f64,
-    pub(super) relief: f64,
-    pub(super) extent: f64,
-    pub(super) surface: Surface,
-    pub(super) samples: HeightSamples,
-}
-
 /// Further evidence for the side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SideInputs<'a> {
     pub(super) indexed: &'a IndexedSurface,
-    pub(super) print: Option<&'a Print>,
+    pub(super) inks: Option<&'a InkPyramids>,
     pub(super) scanned_face_down: Option<bool>,
 }
 
+/// Log-odds of a side, and the agreements of both sides with the print, as far as they were measured.
+#[derive(Debug, Clone, Copy)]
+struct SideOdds {
+    odds: f64,
+    agreements: [Option<f64>; 2],
+}
+
+impl SideOdds {
+    /// Returns odds that were found without the print.
+    const fn of(odds: f64) -> Self {
+        Self {
+            odds,
+            agreements: [None; 2],
+        }
+    }
+}
+
+/// The chosen side.
+#[derive(Debug)]
+pub(super) struct CarvedSide {
+    pub(super) side: FittedSide,
+    pub(super) evidence: SideEvidence,
+    /// Agreement of this side with the print, from 0 to 1. `None` if it was not measured.
+    pub(super) agreement: Option<f64>,
+}
+
 /// Chooses the carved side. Returns the side with the evidence for it, or `None` if neither side shows a surface.
-pub(super) fn choose(
-    sides: [Option<FittedSide>; 2],
-    inputs: SideInputs<'_>,
-) -> Option<(FittedSide, SideEvidence)> {
+pub(super) fn choose(sides: [Option<FittedSide>; 2], inputs: SideInputs<'_>) -> Option<CarvedSide> {
     let winding = |side: &FittedSide| inputs.indexed.upward_facing_share(&side.plane_from_mesh);
-    let (side, confidence, winding) = match sides {
+    let (side, confidence, winding, agreement) = match sides {
         [Some(first), Some(second)] => {
             let winding = winding(&first);
-            let odds = log_odds(&first, &second, winding, inputs);
+            let SideOdds {
+                odds,
+                agreements: [of_first, of_second],
+            } = log_odds(&first, &second, winding, inputs);
             let confidence = (odds.abs() / 2.0).tanh();
             // Faces that point outward on one side point inward on the other.
             if odds >= 0.0 {
-                (first, confidence, winding)
+                (first, confidence, winding, of_first)
             } else {
-                (second, confidence, winding.map(|out| 1.0 - out))
+                (second, confidence, winding.map(|out| 1.0 - out), of_second)
             }
         }
         [Some(only), None] | [None, Some(only)] => {
             let winding = winding(&only);
-            (only, 1.0, winding)
+            (only, 1.0, winding, None)
         }
         [None, None] => return None,
     };
@@ -117,7 +91,11 @@ pub(super) fn choose(
         flatness: side.surface.tops,
         confidence,
     };
-    Some((side, evidence))
+    Some(CarvedSide {
+        side,
+        evidence,
+        agreement,
+    })
 }
 
 /// Returns the log-odds that the first side is the carved one.
@@ -126,12 +104,12 @@ fn log_odds(
     second: &FittedSide,
     winding: Option<f64>,
     inputs: SideInputs<'_>,
-) -> f64 {
+) -> SideOdds {
     if first.relief < BACK * second.relief {
-        return -10.0;
+        return SideOdds::of(-10.0);
     }
     if second.relief < BACK * first.relief {
-        return 10.0;
+        return SideOdds::of(10.0);
     }
     let winding = winding.map_or(0.0, |out| 2.0 * out - 1.0);
     let sharpness = (layer_width(second) / layer_width(first)).ln();
@@ -141,56 +119,23 @@ fn log_odds(
         .map_or(0.0, |down| if down { -up } else { up });
     let mesh_only =
         WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest;
-    let agreement = inputs.print.map_or(0.0, |print| {
-        if mesh_only >= 0.0 {
-            agreement(first, second, print)
-        } else {
-            -agreement(second, first, print)
-        }
-    });
-    mesh_only + AGREEMENT * agreement
-}
-
-/// Returns `ln(a / b)` for the agreement a of the likelier side with the print and the agreement b of the other side.
-/// If a is at least `CERTAIN`, b is not measured. Returns 0 if the print shows no ink.
-fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
-    let Ok(hypotheses) = print.hypotheses() else {
-        return 0.0;
+    let Some(inks) = inputs.inks else {
+        return SideOdds::of(mesh_only);
     };
-    let inks: Vec<ImagePyramid> = hypotheses
-        .iter()
-        .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
-        .collect();
-    let score = |side: &FittedSide| {
-        // Seen from outside, so in mirror writing.
-        let tops = side.samples.soft_tops(&side.surface, side.relief);
-        let scores = inks.iter().map(|ink| best_score(ink, &tops));
-        scores.fold(LEAST_AGREEMENT, f64::max)
-    };
-    let first = score(likelier);
-    let second = if first >= CERTAIN {
-        UNMEASURED
+    let (likelier, other) = if mesh_only >= 0.0 {
+        (first, second)
     } else {
-        score(other)
+        (second, first)
     };
-    (first / second).ln()
-}
-
-/// Returns the best agreement of a side with the ink: the correlation times the share of the stroke tops that printed.
-fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
-    let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
-        return 0.0;
+    let a = inks.agreement(likelier);
+    let measured = (a < CERTAIN).then(|| inks.agreement(other));
+    let advantage = AGREEMENT * (a / measured.unwrap_or(UNMEASURED)).ln();
+    let (odds, agreements) = if mesh_only >= 0.0 {
+        (mesh_only + advantage, [Some(a), measured])
+    } else {
+        (mesh_only - advantage, [measured, Some(a)])
     };
-    let found = search_coarse_to_fine(ink, &wood, LIMITS, &PASSES);
-    let print = ink.level(JUDGED_PX, 1.0);
-    let tops = wood
-        .level_builder(JUDGED_PX, 1.0)
-        .mapped_level(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
-    let judge = Refiner::new(&print, &tops);
-    let scores = found
-        .iter()
-        .map(|pose| judge.evaluate(pose).score * judge.overlap(pose).moving_covered);
-    scores.fold(0.0, f64::max)
+    SideOdds { odds, agreements }
 }
 
 /// Returns the interquartile range of the heights near the stroke tops, as a share of the relief. Heights far below the

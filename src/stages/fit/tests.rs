@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{FitError, fit};
-use crate::domain::{FailureClass, FitOutcome};
+use crate::domain::{FailureClass, FitOutcome, ScanRegion};
 use crate::mesh::Mesh;
 use crate::stages::paper_method;
 use crate::stages::testing::{SyntheticSheet, print, settings, some_turn};
@@ -79,6 +79,110 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
         let error = normal_error_deg(&world, &found);
         assert!(error < 3.0, "{error} degrees in pose {k}");
     }
+}
+
+/// Adds a square grid of faces to a mesh. `at` maps places from -1 to 1 to points of the sheet in millimetres.
+fn add_patch(mesh: &mut Mesh, world: &SyntheticSheet, at: impl Fn(f64, f64) -> [f64; 3]) {
+    const SIDE: u32 = 40;
+    let first = mesh.vertices.len() as u32;
+    let place = |k: u32| f64::from(2 * k) / f64::from(SIDE - 1) - 1.0;
+    for k in 0..SIDE * SIDE {
+        let [x, y, z] = at(place(k % SIDE), place(k / SIDE));
+        mesh.vertices.push(world.place(x, y, z));
+        if k % SIDE > 0 && k / SIDE > 0 {
+            let corner = first + k;
+            mesh.triangles
+                .push([corner - SIDE - 1, corner - SIDE, corner]);
+            mesh.triangles.push([corner - SIDE - 1, corner, corner - 1]);
+        }
+    }
+}
+
+/// Checks that the carved side of a mesh is found, and returns its region.
+fn assert_region_found(world: &SyntheticSheet, mesh: Mesh) -> ScanRegion {
+    let print = print(14.0, 2.0).0;
+    let found = fit(&mesh.into(), Some(&print), None, &settings().fit).expect("a plane");
+    let error = normal_error_deg(world, &found);
+    assert!(error < 1.0, "{error} degrees");
+    let region = found.region.expect("a region");
+    assert!(region.contains(world.place(0.0, 0.0, -0.5)));
+    assert!(!region.contains(world.place(0.0, 0.0, 5.0)));
+    assert!(!region.contains(world.place(0.0, 0.0, -15.0)));
+    region
+}
+
+#[test]
+fn carved_side_of_a_block_deeper_than_wide_is_found() {
+    let world = SyntheticSheet {
+        turn: some_turn(2),
+        ..SyntheticSheet::default()
+    };
+    let mut mesh = world.mesh();
+    let (half, deep) = (6.0, 11.0);
+    for side in [-half, half] {
+        add_patch(&mut mesh, &world, |u, v| {
+            [side, half * u, deep * (v - 1.0) - 1.2]
+        });
+        add_patch(&mut mesh, &world, |u, v| {
+            [half * u, side, deep * (v - 1.0) - 1.2]
+        });
+    }
+    add_patch(&mut mesh, &world, |u, v| {
+        [half * u, half * v, -2.0 * deep - 1.2]
+    });
+    assert_region_found(&world, mesh);
+}
+
+#[test]
+fn block_on_a_table_is_found() {
+    let world = SyntheticSheet {
+        turn: some_turn(3),
+        ..SyntheticSheet::default()
+    };
+    let mut mesh = world.mesh();
+    add_patch(&mut mesh, &world, |u, v| {
+        [24.0 * u + 5.0, 20.0 * v - 3.0, -6.0]
+    });
+    assert_region_found(&world, mesh);
+}
+
+#[test]
+fn debris_around_a_block_is_left_out() {
+    let world = SyntheticSheet {
+        turn: some_turn(1),
+        ..SyntheticSheet::default()
+    };
+    let mut mesh = world.mesh();
+    for (x, z) in [(-9.0, 14.0), (4.0, 17.0), (10.0, -16.0), (-3.0, -20.0)] {
+        add_patch(&mut mesh, &world, |u, v| {
+            [x + 0.6 * u, 0.6 * v, z + 0.3 * u * v]
+        });
+    }
+    assert_region_found(&world, mesh);
+}
+
+#[test]
+fn middle_character_of_a_grid_is_found() {
+    let world = SyntheticSheet {
+        turn: some_turn(5),
+        ..SyntheticSheet::default()
+    };
+    let (one, middle) = (world.mesh(), Vector3::from(world.place(0.0, 0.0, 0.0)));
+    let mut mesh = Mesh::default();
+    for place in 0..9 {
+        let [x, y] = [place % 3 - 1, place / 3 - 1].map(|step| 12.0 * f64::from(step));
+        let shift = Vector3::from(world.place(x, y, 0.0)) - middle;
+        let first = mesh.vertices.len() as u32;
+        for vertex in one.vertices.iter() {
+            mesh.vertices.push((Vector3::from(vertex) + shift).into());
+        }
+        for face in &one.triangles {
+            mesh.triangles.push(face.map(|corner| first + corner));
+        }
+    }
+    let region = assert_region_found(&world, mesh);
+    assert!(!region.contains(world.place(12.0, 0.0, -0.5)));
+    assert!(!region.contains(world.place(0.0, -12.0, -0.5)));
 }
 
 /// A fit of points without faces.

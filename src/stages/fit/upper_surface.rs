@@ -1,28 +1,20 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
-//! carved side is then fitted again at a finer one.
+//! carved side is then fitted again at a finer one. If this side does not resemble the print, all other sides and parts
+//! of the scan are tried.
 
-use nalgebra::Vector3;
-
-use super::carved_side::{self, FittedSide, SideInputs};
+use super::carved_side::{self, SideInputs};
 use super::params::{FitError, FitParams};
-use super::pca::{Axes, frame, frame_along};
-use super::surface::{HeightSamples, Surface};
-use crate::domain::{Bow, FitOutcome, Rigid3};
-use crate::raster::Grid;
-use crate::stages::binarize;
+use super::pca::{Axes, frame};
+use super::print_agreement::InkPyramids;
+use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
+use super::wider_search;
+use crate::domain::{FitOutcome, ScanRegion, SideEvidence};
+use crate::mesh::Mesh;
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
-use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
-/// Maximum number of rotations of one rendering.
-const MAX_ROTATIONS: usize = 3;
-/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved.
-const MAX_TOPS: f64 = 0.85;
-/// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
-/// then rests on walls or specks, not on strokes.
-const MIN_TOPS: f64 = 0.05;
-/// When the depth of the carving is measured, one height in this many is ignored at either end.
-const TRIMMED_ONE_IN: usize = 100;
+/// If the agreement of the carved side with the print is lower, the wider search begins.
+const CONVINCING: f64 = 0.5;
 
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
 ///
@@ -47,24 +39,58 @@ pub fn fit(
     let axes = Axes::of_surface(mesh, indexed);
     axes.require_surface(mesh)?;
     let start = frame(axes.normal(), axes.centre);
+    let inks = print.and_then(InkPyramids::new);
     let inputs = SideInputs {
         indexed,
-        print,
+        inks: inks.as_ref(),
         scanned_face_down,
     };
-    let no_surface = || FitError::NoSurface(mesh.vertices.len());
     let sides = coarse_sides(indexed, &start, params.curved_blocks);
-    let (coarse, side) = carved_side::choose(sides, inputs).ok_or_else(no_surface)?;
-    let fine = fit_view(indexed, &coarse.plane_from_mesh, params.curved_blocks, FINE)
-        .ok_or_else(no_surface)?;
-    if fine.relief < params.min_relief * fine.extent {
+    let usual = carved_side::choose(sides, inputs).map(|mut chosen| {
+        let measured = || inks.as_ref().map(|inks| inks.agreement(&chosen.side));
+        chosen.agreement = chosen.agreement.or_else(measured);
+        chosen
+    });
+    let is_carved = |side: &FittedSide| side.relief >= params.min_relief * side.extent;
+    let fine = usual.as_ref().and_then(|usual| {
+        let plane = &usual.side.plane_from_mesh;
+        fit_view(indexed, plane, params.curved_blocks, FINE)
+    });
+    let carved = usual
+        .as_ref()
+        .filter(|_| fine.as_ref().is_some_and(is_carved));
+    let agreement = carved.map_or(0.0, |carved| carved.agreement.unwrap_or(1.0));
+    if let Some(inks) = inks.as_ref().filter(|_| agreement < CONVINCING)
+        && let Some(found) = wider_search::search(mesh, indexed, inks, agreement, params)
+    {
+        return Ok(outcome(
+            &found.side,
+            found.evidence,
+            Some(found.region),
+            mesh,
+        ));
+    }
+    let (Some(usual), Some(fine)) = (usual, fine) else {
+        return Err(FitError::NoSurface(mesh.vertices.len()));
+    };
+    if !is_carved(&fine) {
         return Err(FitError::NoRelief {
             relief: fine.relief,
             extent: fine.extent,
             min_relief: params.min_relief,
         });
     }
-    Ok(FitOutcome {
+    Ok(outcome(&fine, usual.evidence, None, mesh))
+}
+
+/// Returns the result of the stage for a surface.
+fn outcome(
+    fine: &FittedSide,
+    side: SideEvidence,
+    region: Option<ScanRegion>,
+    mesh: &Mesh,
+) -> FitOutcome {
+    FitOutcome {
         plane_from_mesh: fine.plane_from_mesh,
         bow: fine.bow,
         bow_height: fine.bow_height,
@@ -72,204 +98,8 @@ pub fn fit(
         rms: fine.surface.rms,
         relief: fine.relief,
         side,
+        region,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
-    })
-}
-
-/// Resolution and limits of one search for the upper surface.
-#[derive(Debug, Clone, Copy)]
-struct FitEffort {
-    /// Longest side of a rendering, in pixels.
-    px: usize,
-    /// The view is not rotated further once the stroke tops slope less than this.
-    slope: f64,
-    /// Largest angle, in radians, by which rendered heights are rotated. Beyond this angle, walls hide too much of the
-    /// surface, and the mesh is rendered again.
-    max_rotation: f64,
-    max_renderings: usize,
-}
-
-/// For the renderings that decide the side.
-const COARSE: FitEffort = FitEffort {
-    px: 96,
-    slope: 0.05,
-    max_rotation: 0.15,
-    max_renderings: 4,
-};
-/// For the renderings of the carved side that the surface is fitted to.
-const FINE: FitEffort = FitEffort {
-    px: 144,
-    slope: 0.01,
-    max_rotation: 0.05,
-    max_renderings: 3,
-};
-
-/// Fits a coarse surface to both sides of a frame's plane.
-fn coarse_sides(indexed: &IndexedSurface, front: &Rigid3, bow: bool) -> [Option<FittedSide>; 2] {
-    let view = Viewport::around(indexed.bounds(front), COARSE.px, false);
-    let [seen, seen_from_back] = indexed.render_both_sides(front, &view);
-    [(seen, *front), (seen_from_back, opposite_side(front))]
-        .map(|(heights, frame)| fit_heights(indexed, &frame, &heights, view, bow, COARSE))
-}
-
-/// Returns the frame of the other side: x stays, y and z are reversed.
-fn opposite_side(frame: &Rigid3) -> Rigid3 {
-    let [x, y, z, last] = frame.0;
-    Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
-}
-
-/// Renders the mesh along a frame's z and fits the tops.
-fn fit_view(
-    indexed: &IndexedSurface,
-    frame: &Rigid3,
-    bow: bool,
-    effort: FitEffort,
-) -> Option<FittedSide> {
-    let view = Viewport::around(indexed.bounds(frame), effort.px, false);
-    fit_heights(
-        indexed,
-        frame,
-        &indexed.render(frame, &view),
-        view,
-        bow,
-        effort,
-    )
-}
-
-/// Fits the stroke tops of a rendering. Rotates the view and fits again until the view is perpendicular to the tops, or
-/// until a limit of `effort` is reached.
-fn fit_heights(
-    indexed: &IndexedSurface,
-    frame: &Rigid3,
-    heights: &Grid<f32>,
-    view: Viewport,
-    bow: bool,
-    effort: FitEffort,
-) -> Option<FittedSide> {
-    let samples = HeightSamples::new(heights, &view)?;
-    let seen = FittedView::of(*frame, samples, view, bow).leveled(bow, effort);
-    if seen.slope() < effort.slope || effort.max_renderings <= 1 {
-        return Some(seen.into_side());
     }
-    let fewer = FitEffort {
-        max_renderings: effort.max_renderings - 1,
-        ..effort
-    };
-    fit_view(indexed, &seen.plane_from_mesh(), bow, fewer)
-}
-
-/// A rendering with the surface fitted to it.
-struct FittedView {
-    frame: Rigid3,
-    view: Viewport,
-    samples: HeightSamples,
-    surface: Surface,
-    /// The tops' plane in the frame, `z = a + b x + c y`.
-    plane: [f64; 3],
-}
-
-impl FittedView {
-    fn of(frame: Rigid3, samples: HeightSamples, view: Viewport, bow: bool) -> Self {
-        let surface = samples.fit(bow);
-        Self {
-            frame,
-            view,
-            plane: samples.plane_of_tops(&surface),
-            samples,
-            surface,
-        }
-    }
-
-    /// Rotates the heights until the view is perpendicular to the stroke tops, or until a limit is reached.
-    fn leveled(mut self, bow: bool, effort: FitEffort) -> Self {
-        let seen_from = self.frame.inverse();
-        for _ in 0..MAX_ROTATIONS {
-            let frame = self.plane_from_mesh();
-            let lean = frame.after(&seen_from).0[2][2].clamp(-1.0, 1.0).acos();
-            if self.slope() < effort.slope || lean > effort.max_rotation {
-                break;
-            }
-            let other_from_this = frame.after(&self.frame.inverse());
-            let samples = self.samples.turned(&other_from_this);
-            self = Self::of(frame, samples, self.view, bow);
-        }
-        self
-    }
-
-    /// Returns the slope of the tops' plane in the view.
-    fn slope(&self) -> f64 {
-        self.plane[1].hypot(self.plane[2])
-    }
-
-    /// Returns the frame whose plane is the tops' plane.
-    fn plane_from_mesh(&self) -> Rigid3 {
-        frame_on_plane(&self.frame, self.plane)
-    }
-
-    /// Returns the surface of this side with its measurements.
-    fn into_side(self) -> FittedSide {
-        let plane_from_mesh = self.plane_from_mesh();
-        let Self {
-            view,
-            samples,
-            surface,
-            plane,
-            ..
-        } = self;
-        let mut over_plane = samples.in_plane_units(surface.coefficients);
-        for (coefficient, flat) in over_plane.iter_mut().zip(plane) {
-            *coefficient -= flat;
-        }
-        let is_bent = over_plane[3..].iter().any(|c| *c != 0.0);
-        let bow = is_bent.then_some(Bow(over_plane));
-        let relief = if (MIN_TOPS..=MAX_TOPS).contains(&surface.tops) {
-            relief(&samples.inner_residuals(&surface))
-        } else {
-            0.0
-        };
-        FittedSide {
-            plane_from_mesh,
-            bow,
-            bow_height: bow.map_or(0.0, |bow| bow_height(&bow, &view)),
-            relief,
-            extent: view.unit_per_px * view.width.max(view.height) as f64,
-            surface,
-            samples,
-        }
-    }
-}
-
-/// Returns a frame in which the plane `z = a + b x + c y` of the old frame is `z = 0`. The new x axis is as close as
-/// possible to the old one. To first order in the slope, a bow therefore has the same coefficients in both frames.
-fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
-    let mesh_from_plane = plane_from_mesh.inverse();
-    let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
-    let origin = at([0.0, 0.0, a]);
-    let normal = at([-b, -c, 1.0]) - at([0.0; 3]);
-    let along = at([1.0, 0.0, 0.0]) - at([0.0; 3]);
-    frame_along(normal, along, origin)
-}
-
-/// Returns the height difference between the highest and the lowest point of the bow in the view, in mesh units.
-fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
-    let Some(back) = view.px_from_plane.inverse() else {
-        return 0.0;
-    };
-    let along = |side: usize, step: i32| (side - 1) as f64 * f64::from(step) / 8.0;
-    let heights = (0..81).map(|k| {
-        let [x, y] = back.apply([along(view.width, k % 9), along(view.height, k / 9)]);
-        bow.height(x, y)
-    });
-    let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
-        [low.min(z), high.max(z)]
-    });
-    high - low
-}
-
-/// Returns the depth of the carving: the median of the tops minus the median of the ground, without extreme heights.
-fn relief(residuals: &[f64]) -> f64 {
-    let mut residuals: Vec<f32> = residuals.iter().map(|r| *r as f32).collect();
-    binarize::split_inner(&mut residuals, TRIMMED_ONE_IN)
-        .map_or(0.0, |split| split.high - split.low)
 }

@@ -58,6 +58,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
             flatness,
             confidence: flatness,
         },
+        region: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
     })

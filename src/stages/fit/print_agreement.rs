@@ -1,0 +1,87 @@
+//! Measures how well the relief of one side of a block resembles the print.
+
+use super::side_surface::FittedSide;
+use crate::stages::pose::{
+    BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
+};
+use crate::stages::print::Print;
+
+/// Lower bound of the agreement.
+const LEAST_AGREEMENT: f64 = 0.02;
+/// Limits of the pose search that compares a side with the print. The search is coarser than in registration.
+const LIMITS: SearchRange = SearchRange {
+    max_scale: 1.6,
+    beam_width: mirrored(5),
+};
+const PASSES: [RefinementPass; 2] = [
+    RefinementPass {
+        size_px: 36,
+        sigma_px: 0.8,
+        max_steps: 6,
+        beam_width: mirrored(2),
+    },
+    RefinementPass {
+        size_px: JUDGED_PX,
+        sigma_px: 1.0,
+        max_steps: 5,
+        beam_width: mirrored(1),
+    },
+];
+
+/// Returns a beam of mirrored poses only, because a block seen from outside shows mirror writing.
+const fn mirrored(count: usize) -> BeamWidth {
+    BeamWidth {
+        upright: 0,
+        mirrored: count,
+    }
+}
+
+/// Working size at which the agreement is measured.
+const JUDGED_PX: usize = 56;
+/// Pixels with a lower nearness to the surface are assumed not to print. Without this limit, the slopes around thin
+/// strokes would count as strokes. Only the pose search uses the slopes.
+const PRINTS: f32 = 0.7;
+/// Working size of the print and the tops.
+const BASE_PX: usize = 72;
+
+/// Possible interpretations of a print as ink, ready to be compared with many sides.
+#[derive(Debug)]
+pub(super) struct InkPyramids(Vec<ImagePyramid>);
+
+impl InkPyramids {
+    /// Reads the ink of a print. Returns `None` if the print shows none.
+    pub(super) fn new(print: &Print) -> Option<Self> {
+        let inks: Vec<ImagePyramid> = print
+            .hypotheses()
+            .ok()?
+            .iter()
+            .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
+            .collect();
+        Some(Self(inks))
+    }
+
+    /// Returns the best agreement of a side with any interpretation of the print, from `LEAST_AGREEMENT` to 1.
+    pub(super) fn agreement(&self, side: &FittedSide) -> f64 {
+        // Seen from outside, so in mirror writing.
+        let tops = side.samples.soft_tops(&side.surface, side.relief);
+        let scores = self.0.iter().map(|ink| best_score(ink, &tops));
+        scores.fold(LEAST_AGREEMENT, f64::max)
+    }
+}
+
+/// Returns the best agreement of a side with the ink: the correlation times the share of the stroke tops that printed.
+fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
+    let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
+        return 0.0;
+    };
+    let found = search_coarse_to_fine(ink, &wood, LIMITS, &PASSES);
+    let print = ink.level(JUDGED_PX, 1.0);
+    let tops = wood
+        .level_builder(JUDGED_PX, 1.0)
+        .mapped_level(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
+    let judge = Refiner::new(&print, &tops);
+    let scores = found
+        .iter()
+        .map(|pose| judge.evaluate(pose).score * judge.overlap(pose).moving_covered);
+    scores.fold(0.0, f64::max)
+}

@@ -1,0 +1,223 @@
+//! Parts of a scan that may be the block: without debris, and without the table below it.
+
+use nalgebra::Vector3;
+
+use super::directions::{Facet, facets, large_planes};
+use super::pca::Axes;
+use crate::mesh::Mesh;
+use crate::stages::robust_bounds::is_in_box;
+use crate::stages::scan::{of_faces, part_of};
+use crate::stages::zbuffer::IndexedSurface;
+
+/// Cells along the longest side of a scan. Surfaces in neighbouring cells are connected.
+const CELLS: f64 = 64.0;
+/// Approximate limit of the number of points at which cells are marked.
+const MARKS: f64 = 2e7;
+/// Components with a smaller share of the area of the largest one are debris.
+const DEBRIS: f64 = 0.05;
+/// Least share of the area that a support must have.
+const LEAST_SUPPORT: f64 = 0.2;
+/// Share of the remaining area that may lie on the wrong side of a support.
+const WRONG_SIDE: f64 = 0.03;
+/// Number of layers into which a scan is cut to find the height of a support.
+const LAYERS: usize = 96;
+/// Faces within this many layers of a support belong to it.
+const THICKNESS: f64 = 1.6;
+/// A smaller share of the faces is no block.
+const LEAST_PART: f64 = 0.02;
+
+/// Returns the parts that may be the block, the largest first: the scan without debris, and what lies on each of its
+/// large planes.
+pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
+    let whole = without_debris(mesh, indexed);
+    let all = facets(&whole);
+    let mut parts = Vec::new();
+    for normal in large_planes(&all) {
+        if let Some((normal, height)) = support(&all, normal) {
+            let above = part_of(&whole, |corner| normal.dot(&Vector3::from(corner)) > height);
+            if above.triangles.len() as f64 > LEAST_PART * whole.triangles.len() as f64 {
+                let indexed = IndexedSurface::new(&above);
+                parts.push(without_debris(&above, &indexed));
+            }
+        }
+    }
+    parts.insert(0, whole);
+    parts
+}
+
+/// Returns the direction and the height of the plane with this normal on which the rest of the scan stands. Returns
+/// `None` if the largest plane with this normal is small, or if the rest lies on both sides of it.
+fn support(facets: &[Facet], normal: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+    let total: f64 = facets.iter().map(|facet| facet.area).sum();
+    let (layer, centre) = fullest_layer(facets, &normal)?;
+    let near = |facet: &&Facet| (normal.dot(&facet.middle) - centre).abs() < 2.0 * layer;
+    let slab = facets.iter().filter(near);
+    let fitted = Axes::of_points(slab.map(|facet| (facet.middle.into(), facet.area))).normal();
+    let normal = fitted * fitted.dot(&normal).signum();
+    let (layer, centre) = fullest_layer(facets, &normal)?;
+    let (mut on, mut above, mut below) = (0.0, 0.0, 0.0);
+    for facet in facets {
+        let over = (normal.dot(&facet.middle) - centre) / layer;
+        let place = if over.abs() <= THICKNESS {
+            &mut on
+        } else if over > 0.0 {
+            &mut above
+        } else {
+            &mut below
+        };
+        *place += facet.area;
+    }
+    let rest = above + below;
+    if on < LEAST_SUPPORT * total || above.min(below) > WRONG_SIDE * rest {
+        return None;
+    }
+    let up = if above >= below { normal } else { -normal };
+    Some((up, up.dot(&normal) * centre + THICKNESS * layer))
+}
+
+/// Returns the thickness of a layer and the height of the middle of the layer with the largest area.
+fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> {
+    let heights = || facets.iter().map(|facet| normal.dot(&facet.middle));
+    let low = heights().fold(f64::INFINITY, f64::min);
+    let high = heights().fold(f64::NEG_INFINITY, f64::max);
+    let layer = (high - low) / LAYERS as f64;
+    if layer.is_nan() || layer <= 0.0 {
+        return None;
+    }
+    let mut areas = [0.0; LAYERS];
+    for (height, facet) in heights().zip(facets) {
+        let place = ((height - low) / layer) as usize;
+        areas[place.min(LAYERS - 1)] += facet.area;
+    }
+    let pairs = areas.windows(2).map(|pair| pair[0] + pair[1]).enumerate();
+    let (fullest, _) = pairs.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((layer, low + (fullest + 1) as f64 * layer))
+}
+
+/// Returns a mesh without specks and without small components that touch nothing else.
+fn without_debris(mesh: &Mesh, indexed: &IndexedSurface) -> Mesh {
+    let inside = part_of(mesh, |corner| is_in_box(&indexed.bulk, &corner));
+    if inside.triangles.is_empty() {
+        return inside;
+    }
+    let cells = Cells::of(&inside);
+    let labels: Vec<usize> = inside
+        .triangles
+        .iter()
+        .map(|face| cells.label(&inside, face))
+        .collect();
+    let mut areas = vec![0.0; cells.components];
+    for (face, label) in inside.triangles.iter().zip(&labels) {
+        let [a, b, c] = corners(&inside, face);
+        areas[*label] += (b - a).cross(&(c - a)).norm();
+    }
+    let largest = areas.iter().copied().fold(0.0, f64::max);
+    let kept: Vec<[u32; 3]> = inside
+        .triangles
+        .iter()
+        .zip(&labels)
+        .filter(|(_, label)| areas[**label] >= DEBRIS * largest)
+        .map(|(face, _)| *face)
+        .collect();
+    of_faces(&inside, &kept)
+}
+
+fn corners(mesh: &Mesh, face: &[u32; 3]) -> [Vector3<f64>; 3] {
+    face.map(|corner| Vector3::from(mesh.vertices.at(corner as usize)))
+}
+
+/// A grid of cells, labelled by connected components.
+struct Cells {
+    low: Vector3<f64>,
+    cell: f64,
+    size: [usize; 3],
+    labels: Vec<u32>,
+    components: usize,
+}
+
+impl Cells {
+    /// Marks the cells of all faces and labels their components. Cells that share a corner are connected.
+    fn of(mesh: &Mesh) -> Self {
+        let mut low = Vector3::repeat(f64::INFINITY);
+        let mut high = Vector3::repeat(f64::NEG_INFINITY);
+        for vertex in mesh.vertices.iter().map(Vector3::from) {
+            low = low.inf(&vertex);
+            high = high.sup(&vertex);
+        }
+        let cell = ((high - low).max() / CELLS).max(f64::MIN_POSITIVE);
+        let size = [0, 1, 2].map(|k| ((high[k] - low[k]) / cell) as usize + 1);
+        let mut cells = Self {
+            low,
+            cell,
+            size,
+            labels: vec![u32::MAX; size.iter().product()],
+            components: 0,
+        };
+        let most_steps = (MARKS / (mesh.triangles.len() + 1) as f64).sqrt() as usize + 1;
+        let mut marked = vec![false; cells.labels.len()];
+        for face in &mesh.triangles {
+            let [a, b, c] = corners(mesh, face);
+            let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
+            let steps = ((longest / cell).ceil() as usize).min(most_steps);
+            for i in 0..=steps {
+                for j in 0..=steps - i {
+                    let [u, v] = [i, j].map(|step| step as f64 / steps.max(1) as f64);
+                    marked[cells.place(a + (b - a) * u + (c - a) * v)] = true;
+                }
+            }
+        }
+        cells.connect(&marked);
+        cells
+    }
+
+    fn place(&self, point: Vector3<f64>) -> usize {
+        let at = |k: usize| {
+            let step = ((point[k] - self.low[k]) / self.cell) as usize;
+            step.min(self.size[k] - 1)
+        };
+        (at(2) * self.size[1] + at(1)) * self.size[0] + at(0)
+    }
+
+    /// Labels the components of the marked cells.
+    fn connect(&mut self, marked: &[bool]) {
+        let mut queue = Vec::new();
+        for start in 0..marked.len() {
+            if !marked[start] || self.labels[start] != u32::MAX {
+                continue;
+            }
+            let label = self.components as u32;
+            self.components += 1;
+            self.labels[start] = label;
+            queue.push(start);
+            while let Some(place) = queue.pop() {
+                for next in self.around(place) {
+                    if marked[next] && self.labels[next] == u32::MAX {
+                        self.labels[next] = label;
+                        queue.push(next);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns a cell and all cells around it.
+    fn around(&self, place: usize) -> impl Iterator<Item = usize> + use<> {
+        let [width, height, depth] = self.size;
+        let at = [
+            place % width,
+            place / width % height,
+            place / width / height,
+        ];
+        let range = move |k: usize, side: usize| at[k].saturating_sub(1)..(at[k] + 2).min(side);
+        range(2, depth).flat_map(move |z| {
+            range(1, height)
+                .flat_map(move |y| range(0, width).map(move |x| (z * height + y) * width + x))
+        })
+    }
+
+    /// Returns the component of a face.
+    fn label(&self, mesh: &Mesh, face: &[u32; 3]) -> usize {
+        let [first, ..] = corners(mesh, face);
+        self.labels[self.place(first)] as usize
+    }
+}

@@ -1,0 +1,244 @@
+//! Searches all sides and parts of a scan for the carved side, if the usual side does not resemble the print.
+//!
+//! The usual side is perpendicular to the least principal axis of the whole scan. This side is wrong for a block that is
+//! deeper than wide, for a block on a scanned table, for a scan with debris around it, and for a grid of characters of
+//! which the print shows one.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::Vector3;
+
+use super::directions::{candidates, facets};
+use super::params::FitParams;
+use super::pca::{Axes, frame, frame_along};
+use super::print_agreement::InkPyramids;
+use super::scan_parts::parts;
+use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
+use crate::domain::{Rigid3, ScanRegion, SideEvidence};
+use crate::mesh::Mesh;
+use crate::stages::scan::part_of;
+use crate::stages::zbuffer::IndexedSurface;
+
+/// Least agreement of a side with the print.
+const LEAST: f64 = 0.35;
+/// Factor by which the agreement of a side must exceed the agreement of the usual side.
+const BETTER: f64 = 1.12;
+/// Sides whose normals differ by a larger angle, in radians, are rivals.
+const RIVAL: f64 = 0.5;
+/// Weight of the logarithm of the ratio of two agreements, as in the choice between two sides.
+const AGREEMENT: f64 = 14.0;
+/// A region reaches this many times the relief below the surface. What lies lower is no ground of the carving.
+const DEEPEST: f64 = 4.0;
+/// A region reaches this many times the relief above the surface. Whatever lies higher floats or is a spike.
+const HIGHEST: f64 = 1.0;
+/// A carving is not deeper than this share of the extent of its side.
+const DEEPEST_CARVING: f64 = 0.2;
+/// Least share of the visible area that must lie deeper before it is cut off.
+const DEEP_AREA: f64 = 0.02;
+/// Shares of a grid of characters, around its middle, in which the middle character lies.
+const MIDDLE: [f64; 2] = [0.38, 0.5];
+/// Number of angles that are tried to find the edges of a grid, up to a right angle.
+const ANGLES: i32 = 30;
+
+/// A carved side that the wider search found.
+#[derive(Debug)]
+pub(super) struct FoundSide {
+    pub(super) side: FittedSide,
+    pub(super) evidence: SideEvidence,
+    pub(super) region: ScanRegion,
+}
+
+/// A side with its agreement with the print.
+struct JudgedSide {
+    plane_from_mesh: Rigid3,
+    agreement: f64,
+    region: ScanRegion,
+}
+
+/// Returns the side that resembles the print best. Returns `None` if no side is better than the usual one.
+pub(super) fn search(
+    mesh: &Mesh,
+    indexed: &IndexedSurface,
+    inks: &InkPyramids,
+    usual: f64,
+    params: &FitParams,
+) -> Option<FoundSide> {
+    let search = SideSearch { inks, params };
+    let blocks = parts(mesh, indexed);
+    let mut found = Vec::new();
+    for block in &blocks {
+        let indexed = IndexedSurface::new(block);
+        let axes = Axes::of_surface(block, &indexed);
+        for normal in candidates(&axes, &facets(block)) {
+            let start = frame(normal, axes.centre);
+            found.extend(search.candidate(block, &indexed, &start));
+        }
+    }
+    if let Some(whole) = blocks.first() {
+        for share in MIDDLE {
+            found.extend(search.middle_of_grid(whole, share));
+        }
+    }
+    let best = found
+        .iter()
+        .max_by(|a, b| a.agreement.total_cmp(&b.agreement))?;
+    if best.agreement < LEAST.max(usual * BETTER) {
+        return None;
+    }
+    let normal = |of: &Rigid3| Vector3::new(of.0[2][0], of.0[2][1], of.0[2][2]);
+    let here = normal(&best.plane_from_mesh);
+    let rivals = found
+        .iter()
+        .filter(|other| normal(&other.plane_from_mesh).angle(&here) > RIVAL);
+    let rival = rivals.map(|other| other.agreement).fold(0.1, f64::max);
+    let part = part_of(mesh, |corner| best.region.contains(corner));
+    let indexed = IndexedSurface::new(&part);
+    let side = fit_view(&indexed, &best.plane_from_mesh, params.curved_blocks, FINE)?;
+    if side.relief < params.min_relief * side.extent {
+        return None;
+    }
+    let odds = AGREEMENT * (best.agreement / rival).ln();
+    Some(FoundSide {
+        evidence: SideEvidence {
+            winding: indexed.upward_facing_share(&side.plane_from_mesh),
+            flatness: side.surface.tops,
+            confidence: (odds / 2.0).tanh(),
+        },
+        region: best.region,
+        side,
+    })
+}
+
+/// What all sides are compared with.
+#[derive(Clone, Copy)]
+struct SideSearch<'a> {
+    inks: &'a InkPyramids,
+    params: &'a FitParams,
+}
+
+impl SideSearch<'_> {
+    /// Fits a side of a part and measures how well it resembles the print. Returns `None` if the side is not carved.
+    fn candidate(
+        self,
+        mesh: &Mesh,
+        indexed: &IndexedSurface,
+        start: &Rigid3,
+    ) -> Option<JudgedSide> {
+        let curved = self.params.curved_blocks;
+        let seen = fit_view(indexed, start, curved, COARSE)?;
+        let Some(face) = without_depths(mesh, &seen) else {
+            return self.judged(mesh, indexed, &seen, start);
+        };
+        let indexed = IndexedSurface::new(&face);
+        let seen = fit_view(&indexed, &seen.plane_from_mesh, curved, COARSE)?;
+        self.judged(&face, &indexed, &seen, start)
+    }
+
+    /// Returns a fitted side with its agreement, or `None` if the side is not carved.
+    fn judged(
+        self,
+        mesh: &Mesh,
+        indexed: &IndexedSurface,
+        side: &FittedSide,
+        start: &Rigid3,
+    ) -> Option<JudgedSide> {
+        (side.relief >= self.params.min_relief * side.extent).then(|| JudgedSide {
+            plane_from_mesh: side.plane_from_mesh,
+            agreement: self.inks.agreement(side),
+            region: region(mesh, indexed, side, start),
+        })
+    }
+
+    /// Returns both sides of the middle of a flat scan, where the middle character of a grid lies. `share` is the share
+    /// of the width and the height.
+    fn middle_of_grid(self, mesh: &Mesh, share: f64) -> Vec<JudgedSide> {
+        let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
+        let plane = tightest_frame(mesh, &axes);
+        let [low, high] = bounds(mesh, &plane);
+        let inside = |at: f64, k: usize| {
+            let (middle, side) = (f64::midpoint(low[k], high[k]), high[k] - low[k]);
+            (at - middle).abs() < side * share / 2.0
+        };
+        let middle = part_of(mesh, |corner| {
+            let [x, y, _] = plane.apply(corner);
+            inside(x, 0) && inside(y, 1)
+        });
+        if middle.vertices.len() < 16 {
+            return Vec::new();
+        }
+        let indexed = IndexedSurface::new(&middle);
+        let [x, y, z, last] = plane.0;
+        let back = Rigid3([x, y.map(|v| -v), z.map(|v| -v), last]);
+        let sides = [plane, back].into_iter();
+        sides
+            .filter_map(|side| self.candidate(&middle, &indexed, &side))
+            .collect()
+    }
+}
+
+/// Returns the part near the fitted surface, if much of the visible area lies deeper than any carving: the foot of a
+/// block, or a table below it.
+fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
+    let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
+    let heights = side.samples.residuals(&side.surface);
+    let deep = heights.iter().filter(|height| **height < deepest).count();
+    if (deep as f64) < DEEP_AREA * heights.len() as f64 {
+        return None;
+    }
+    let near = part_of(mesh, |corner| {
+        side.plane_from_mesh.apply(corner)[2] > deepest
+    });
+    (near.vertices.len() >= 16).then_some(near)
+}
+
+/// Returns the frame perpendicular to the least axis in which the bounding box of the mesh is smallest.
+fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
+    let normal = axes.normal();
+    let level = frame(normal, axes.centre);
+    let [x, y] = [0, 1].map(|k| Vector3::new(level.0[k][0], level.0[k][1], level.0[k][2]));
+    let turned = (0..ANGLES).map(|step| {
+        let angle = FRAC_PI_2 * f64::from(step) / f64::from(ANGLES);
+        frame_along(normal, x * angle.cos() + y * angle.sin(), axes.centre)
+    });
+    let area = |frame: &Rigid3| {
+        let [low, high] = bounds(mesh, frame);
+        (high[0] - low[0]) * (high[1] - low[1])
+    };
+    let areas = turned.map(|frame| (area(&frame), frame));
+    let tightest = areas.min_by(|a, b| a.0.total_cmp(&b.0));
+    tightest.map_or(level, |(_, frame)| frame)
+}
+
+/// Returns the lowest and the highest coordinates of the vertices in a frame.
+fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for at in mesh.vertices.iter().map(|vertex| frame.apply(vertex)) {
+        for k in 0..3 {
+            bounds[0][k] = bounds[0][k].min(at[k]);
+            bounds[1][k] = bounds[1][k].max(at[k]);
+        }
+    }
+    bounds
+}
+
+/// Returns the box around a side of a part. The edges of the box are parallel to the axes of `along`.
+fn region(mesh: &Mesh, indexed: &IndexedSurface, side: &FittedSide, along: &Rigid3) -> ScanRegion {
+    let row = |of: &Rigid3, k: usize| Vector3::new(of.0[k][0], of.0[k][1], of.0[k][2]);
+    let origin = side.plane_from_mesh.inverse().apply([0.0; 3]);
+    let normal = row(&side.plane_from_mesh, 2);
+    let box_from_mesh = frame_along(normal, row(along, 0), Vector3::from(origin));
+    let [low, high] = indexed.bounds(&box_from_mesh);
+    // Corners of faces at the rim must not fall out by rounding.
+    let slack = 1e-4 * side.extent;
+    // A table that was cut off lies below the lowest corner.
+    let lowest = bounds(mesh, &box_from_mesh)[0][2] - slack;
+    let down = lowest.max(-DEEPEST * side.relief - side.bow_height);
+    let up = HIGHEST * side.relief + side.bow_height;
+    ScanRegion {
+        box_from_mesh,
+        bounds: [
+            [low[0] - slack, low[1] - slack, down],
+            [high[0] + slack, high[1] + slack, up],
+        ],
+    }
+}
