@@ -1,8 +1,8 @@
 //! Searches all sides and parts of a scan for the carved side, if the usual side does not resemble the print.
 //!
-//! The usual side is perpendicular to the least principal axis of the whole scan. This side is wrong for a block that is
-//! deeper than wide, for a block on a scanned table, for a scan with debris around it, and for a grid of characters of
-//! which the print shows one.
+//! The usual side is perpendicular to the least principal axis of the whole scan. This side is wrong for a block that
+//! is deeper than wide, for a block on a scanned table, for a scan with debris around it, and for a grid of characters
+//! of which the print shows one.
 
 use std::f64::consts::FRAC_PI_2;
 
