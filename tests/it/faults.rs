@@ -91,7 +91,9 @@ const OF_AN_IMPORT: &[(Fault, End)] = &[
 /// Faults of an export.
 const OF_AN_EXPORT: &[(Fault, End)] = &[
     (Fault::once("open", ".out*", ENOSPC), End::Fails),
-    (Fault::once("write", ".out*", ENOSPC), End::Fails),
+    (Fault::once("write", ".out.*/new/*", ENOSPC), End::Fails),
+    // The process id in a lock file is only for messages.
+    (Fault::once("write", ".out.*lock", ENOSPC), End::Succeeds),
     (Fault::once("write", "*", EIO).and_later(), End::Fails),
     (Fault::half(".out*"), End::Succeeds),
     (Fault::once("mkdir", ".out*", ENOSPC), End::Fails),
@@ -134,7 +136,8 @@ const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("open", PLACED, EIO), End::Succeeds),
     (Fault::once("unlink", PLACED, EIO), End::Succeeds),
     (Fault::once("open", "p/run.*", EIO), End::Fails),
-    (Fault::once("write", "*", ENOSPC).and_later(), End::Fails),
+    // The last writes copy the write-ahead log into the catalog. The next command does that again.
+    (Fault::once("write", "*", ENOSPC).and_later(), End::Either),
 ];
 
 /// Locks that are refused 300 times in a row. SQLite itself gives up after about a hundred attempts.
@@ -183,11 +186,17 @@ const IMPORT: FaultScenario = FaultScenario {
                 .expect("a folder")
                 .collect()
         };
+        let project = Project::at(&root.join("p"));
         if !done {
-            assert_eq!(files().len(), 1, "{:?}", files());
+            if project.catalog_path().exists() {
+                // Only the sync of the folder failed, after the catalog was renamed.
+                let summary = mocban(root, &["-C", "p", "check", "--json"]).expect(0);
+                assert_eq!(summary.json()["pairs"], 1);
+            } else {
+                assert_eq!(files().len(), 1, "{:?}", files());
+            }
             call(&mut import(root)).expect(0);
         }
-        let project = Project::at(&root.join("p"));
         call(&mut run(&project, &[])).expect(0);
         comparison.expected.assert_met_by(&project);
     },

@@ -104,7 +104,12 @@ impl UnplacedFile {
         };
         match file.persist_noclobber(&target) {
             Ok(()) => {
-                folder.sync_all().map_err(io_error)?;
+                folder.sync_all().map_err(|error| {
+                    let text = format!(
+                        "the catalog is complete, but the disk did not confirm its name: {error}"
+                    );
+                    io_error(io::Error::new(error.kind(), text))
+                })?;
                 Ok(true)
             }
             Err(refused) if refused.error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
