@@ -77,13 +77,16 @@ fn opposite_side(frame: &Rigid3) -> Rigid3 {
     Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
 }
 
-/// Renders the mesh along a frame's z and fits the tops.
+/// Renders the mesh along a frame's z and fits the tops. Returns `None` if the mesh is empty or shows no tops.
 pub(super) fn fit_view(
     indexed: &IndexedSurface,
     frame: &Rigid3,
     bow: bool,
     effort: FitEffort,
 ) -> Option<FittedSide> {
+    if indexed.is_empty() {
+        return None;
+    }
     let view = Viewport::around(indexed.bounds(frame), effort.px, false);
     fit_heights(
         indexed,

@@ -67,7 +67,7 @@ pub(super) fn search(
     let search = SideSearch { inks, params };
     let blocks = parts(mesh, indexed);
     let mut found = Vec::new();
-    for block in &blocks {
+    for block in blocks.iter().filter(|block| !block.vertices.is_empty()) {
         let indexed = IndexedSurface::new(block);
         let axes = Axes::of_surface(block, &indexed);
         for normal in candidates(&axes, &facets(block)) {

@@ -79,7 +79,12 @@ impl IndexedSurface {
         })
     }
 
-    /// Returns the bounds of the bulk in x and y of a plane frame, in mesh units.
+    /// Returns whether the surface has neither faces nor points.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.triangle_count == 0
+    }
+
+    /// Returns the bounds of the bulk in x and y of a plane frame, in mesh units. The surface must not be empty.
     pub(crate) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
         let [x, y, _] = self.frame_rows(plane_from_mesh);
         let [x, y] = [x, y].map(|row| self.bulk_range_along(&AffineForm(row.map(|v| v as f32))));
