@@ -50,7 +50,8 @@ pub enum RegisterError {
     EmptyMask(ThresholdMetric),
     /// The relief reads in mirror writing.
     #[error(
-        "the relief matches the print better in mirror writing ({times:.2} times as well); was the mesh mirrored?"
+        "the relief matches the print better in mirror writing ({} as well); was the mesh mirrored, or does the scan show another side of the block?",
+        ratio(*.times)
     )]
     Mirrored {
         /// Score of the mirrored relief divided by the score as read.
@@ -76,6 +77,18 @@ pub enum RegisterError {
         /// The setting.
         needs: f64,
     },
+}
+
+/// Largest ratio that is given as a number. A larger one means that the relief as read does not match at all.
+const LARGEST_RATIO: f64 = 100.0;
+
+/// Formats the ratio of two scores.
+fn ratio(times: f64) -> String {
+    if times < LARGEST_RATIO {
+        format!("{times:.1} times")
+    } else {
+        format!("more than {LARGEST_RATIO} times")
+    }
 }
 
 impl RegisterError {

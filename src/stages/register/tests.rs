@@ -54,6 +54,9 @@ fn a_mirrored_mesh_never_passes() {
         matches!(error, StageError::Register(RegisterError::Mirrored { .. })),
         "{error}"
     );
+    let text = |times| RegisterError::Mirrored { times }.to_string();
+    assert!(text(2.34).contains("(2.3 times as well)"));
+    assert!(text(34_847.79).contains("(more than 100 times as well)"));
 }
 
 #[test]
