@@ -1,8 +1,8 @@
 //! The `real` tier: the prints are photographs of characters, and the reliefs are carved from clean masks of them.
 //!
-//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). A cell's
-//! photograph has one more row than its clean mask, at the top. Over all twenty cells, mask and photograph match best
-//! with a shift of [0, 1] px (within half a pixel) and a scale of 1 (within 1 %). The ground truth of this tier is
+//! Photographs and masks come from a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`).
+//! Each photograph has one row more at the top than its mask. Over all twenty characters, mask and photograph match
+//! best with a shift of [0, 1] px (within half a pixel) and a scale of 1 (within 1 %). The ground truth of this tier is
 //! therefore accurate to about one pixel. In the other tiers it is exact.
 
 use image::{GrayImage, ImageError};

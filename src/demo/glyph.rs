@@ -8,8 +8,8 @@ use crate::raster::Grid;
 /// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. See `assets/LICENSE-mocban-demo-mincho.txt`.
 const FONT: &[u8] = include_bytes!("../../assets/mocban-demo-mincho.ttf");
 
-/// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so a
-/// character such as a single horizontal bar is too flat.
+/// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so
+/// flat characters, such as a single horizontal bar, are left out.
 const MIN_HEIGHT_BY_WIDTH: f32 = 0.5;
 
 /// The embedded font.

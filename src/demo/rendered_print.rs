@@ -36,7 +36,7 @@ impl PrintFrame {
         }
     }
 
-    /// Draws a frame that contains a polygon rotated by up to 4 degrees. The frame's longest side is 100-400 px.
+    /// Draws the size, scale and rotation (up to 4 degrees) of a print of the outline. Its longest side is 100-400 px.
     pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);

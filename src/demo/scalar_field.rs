@@ -75,7 +75,7 @@ pub(super) struct ScalarField {
 }
 
 impl ScalarField {
-    /// Computes a field. `value` is called with the position of a sample in mm, its column and its row.
+    /// Computes a field by calling `value` for each sample with its position in mm, its column and its row.
     pub(super) fn from_fn(
         frame: SampleFrame,
         mut value: impl FnMut([f64; 2], usize, usize) -> f64,

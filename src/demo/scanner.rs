@@ -86,7 +86,7 @@ impl SampledSurface {
     ) -> Self {
         let bounds = outline.bounds();
         let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // The polygon fills about 84 % of its bounding box. In a closed scan, half of the vertices belong to the base.
+        // The polygon fills about 84 % of its bounding box. A closed scan has a base, which uses half of the vertices.
         let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();
         let columns = (width / spacing) as usize + 9;

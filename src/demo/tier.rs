@@ -17,8 +17,8 @@ pub enum Tier {
     Upright,
     /// Any orientation, unit and position; slight bend.
     Pose,
-    /// Like `Pose`, but with a bend of 0.2-0.8 mm, lost strokes, cracks, uneven ink and stains. The mesh shows other
-    /// neighbouring characters than the print.
+    /// Like `Pose`, but with a bend of 0.2-0.8 mm, lost strokes, cracks, uneven ink and stains. Mesh and print show
+    /// different neighbouring characters.
     Hard,
     /// The prints are twenty photographs of characters. The reliefs are carved from clean masks and have any pose.
     Real,

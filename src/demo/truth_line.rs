@@ -17,7 +17,7 @@ pub(super) const STROKE_TOP: u8 = 255;
 /// cracks in strokes.
 pub(super) const IGNORED: u8 = 128;
 
-/// Width of the excluded band around neighbouring characters, in mm. Walls in the band are neither top nor background.
+/// Width in mm of the excluded band around neighbours. Their carved walls are neither stroke top nor background.
 const NEIGHBOUR_MARGIN_MM: f64 = 0.2;
 
 /// One line of `truth.jsonl`.
