@@ -54,8 +54,8 @@ struct SelectedResults {
     subjects: Vec<(f64, GallerySubject)>,
 }
 
-/// Draws the images of a project's report. An image that cannot be drawn is left out. If the depth map cannot be read,
-/// the gallery states the reason.
+/// Draws the images of a project's report. An image that cannot be drawn is left out. If the print or depth map of a
+/// result cannot be read, its gallery item states the reason.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read, or a worker task panics.

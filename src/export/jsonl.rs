@@ -113,8 +113,8 @@ pub fn json_lines<T: Serialize>(values: &[T]) -> String {
     values.iter().map(line).collect()
 }
 
-/// Writes the logs of verdicts, attention checks and manual alignments, oldest first, with undone entries. The logs of
-/// attention checks and manual alignments are left out if they are empty.
+/// Writes the logs of verdicts, attention checks and manual alignments, oldest first, including undone entries. Empty
+/// logs of attention checks and manual alignments are left out.
 async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
     write_log(root, VERDICTS, &catalog.verdict_log(None).await?)?;
     let checks = catalog.attention_check_answers().await?;

@@ -188,7 +188,7 @@ impl<'a> PairFiles<'a> {
 fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
     match path.parent().map_or(Ok(()), std::fs::create_dir_all) {
-        // If an existing folder cannot be inspected, the error is `AlreadyExists`. Writing shows the true reason.
+        // `AlreadyExists` means that the folder exists but cannot be inspected. The write below reports the cause.
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {
             return Err(at(&path)(error).into());
         }

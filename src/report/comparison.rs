@@ -10,7 +10,7 @@ use crate::domain::enum_names;
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
-/// The metrics that are compared with each other: each two of the paper's metrics, and `relief` with `ensemble`.
+/// The comparisons between metrics: every two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
     (Ensemble, Density),
@@ -79,7 +79,7 @@ impl ComparisonSums {
         }
     }
 
-    /// Returns the comparisons with at least one pair that counts for both metrics.
+    /// Returns the comparisons with at least one pair on which both metrics are known to be right or wrong.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
         let compared = self.0.into_iter().zip(COMPARED_METRICS);
         let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();

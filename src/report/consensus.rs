@@ -62,7 +62,7 @@ impl Consensus {
     }
 }
 
-/// Splits verdicts into adjudications and independent verdicts. An adjudicator was shown the conflicting verdicts.
+/// Splits verdicts into adjudications, made by reviewers who saw the conflicting verdicts, and independent verdicts.
 pub(crate) fn partition_verdicts(
     record: &MetricRecord,
 ) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 
-/// A result passes only if its angle error is at most this, in degrees (the paper's rule).
+/// A result passes only if its angle error is at most this number of degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
-/// A result passes only if its mean landmark error is at most this, in percent of the character's height.
+/// A result passes only if its mean landmark error is at most this percentage of the character's height.
 pub const MAX_TRE_PCT: f64 = 5.0;
-/// Smallest `mask_iou` with which a result passes, if there is a mask of true stroke tops.
+/// A result with a mask of true stroke tops passes only if its `mask_iou` is at least this value.
 pub const MIN_MASK_IOU: f64 = 0.7;
 
 /// One line of `truth.jsonl`.

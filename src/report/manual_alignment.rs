@@ -48,8 +48,8 @@ pub struct ManualCorrection {
 }
 
 impl ManualCorrection {
-    /// Returns the correction that turns `found` into `manual`, or `None` if either map is singular. Both maps are a
-    /// `print_from_depth`.
+    /// Returns the correction that turns `found` into `manual`, or `None` if either map is singular. Both map depth-map
+    /// pixels to print pixels.
     pub fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let depth_from_print = found.inverse()?;
         manual.inverse()?;

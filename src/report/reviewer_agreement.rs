@@ -17,7 +17,7 @@ use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
 
-/// Smallest number of results that both reviewers must have passed or failed for kappa and AC1 to be reported.
+/// Kappa and AC1 are shown only if both reviewers passed or failed at least this number of the same results.
 ///
 /// If two reviewers agree on all of 30 results, the 95 % interval of their agreement still extends down to 0.89.
 pub const MIN_RESULTS: u64 = 30;
@@ -55,7 +55,7 @@ pub struct ReviewerPair {
 /// The agreement of two reviewers. A number that cannot be computed is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VerdictAgreement {
-    /// Results that each of the two passed or failed. All other numbers except `unsure` are over these results.
+    /// Number of results that both reviewers passed or failed. All other fields except `unsure` refer to these results.
     pub n: u64,
     /// Results that both judged and at least one was unsure about.
     pub unsure: u64,

@@ -14,8 +14,7 @@ use crate::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
-/// Number of resampled quantities: the scores and the Acc of each metric, and the score differences of each two
-/// compared metrics.
+/// Number of resampled quantities: the scores and the Acc of each metric, and the score differences of each comparison.
 const WIDTH: usize = METRICS * SCORES + METRICS + COMPARED_METRICS.len() * SCORES;
 
 /// How the bootstrap was done.
@@ -44,7 +43,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc. `None` if pairs were resampled instead of blocks, or if all results passed or all failed.
+    /// Interval of Acc. `None` if pairs were resampled instead of blocks, or if all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 
@@ -157,7 +156,7 @@ const fn acc_index(metric: usize) -> usize {
     METRICS * SCORES + metric
 }
 
-/// Returns the index of the quantity "difference in a score between two metrics".
+/// Returns the index of the quantity that holds the difference in one score between two compared metrics.
 const fn difference_index(compared: usize, score: usize) -> usize {
     METRICS * SCORES + METRICS + compared * SCORES + score
 }

@@ -29,7 +29,7 @@ pub struct ThresholdDistribution {
 }
 
 impl ThresholdDistribution {
-    /// Returns the distribution of a metric's thresholds, given as relative heights, or `None` if there are none.
+    /// Returns the distribution of a metric's thresholds from their relative heights, or `None` if `heights` is empty.
     pub(super) fn of(metric: ThresholdMetric, heights: &mut [f64]) -> Option<Self> {
         let mut bins = vec![0; BINS];
         for height in heights.iter() {

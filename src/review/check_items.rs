@@ -13,15 +13,15 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
-/// Range of planted rotations in degrees. Each exceeds the 5 degrees of a pass, but is not obvious at first sight.
+/// Range of planted rotations in degrees: more than the 5 degrees allowed in a pass, but not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
-/// A fault mirrors the relief only if the `IoU` of its strokes with their mirror image is at most this value.
+/// A relief is mirrored as a fault only if the `IoU` of its strokes with their mirror image is at most this value.
 const MAX_SYMMETRY_IOU: f64 = 0.6;
 /// Target stroke area of a fault that loses strokes, as a multiple of the result's stroke area.
 const REDUCED_STROKES: f64 = 0.45;
 /// Target stroke area of a fault that includes background, as a multiple of the result's stroke area.
 const ENLARGED_STROKES: f64 = 1.9;
-/// A duplicate comes at least this number of results after its result, or half of it near the end of the queue.
+/// Minimum distance from a result to its duplicate, in results. Near the end of the queue, half of it is enough.
 const DUPLICATE_GAP: f64 = 10.0;
 /// Largest random distance that is added to `DUPLICATE_GAP`.
 const DUPLICATE_SPREAD: f64 = 30.0;
@@ -88,7 +88,8 @@ fn is_symmetric(strokes: &Mask) -> bool {
     strokes.overlap(&flipped).iou > MAX_SYMMETRY_IOU
 }
 
-/// Returns a threshold that loses many strokes or includes much background. Returns `None` if no threshold does.
+/// Returns a threshold that loses many strokes or includes much background. Returns `None` if the stroke area would
+/// change too little or too much.
 fn faulty_threshold(depth: &DepthMap, level: u16, loses_strokes: bool) -> Option<u16> {
     let mut levels = depth.valid_levels();
     levels.sort_unstable_by(|a, b| b.cmp(a));

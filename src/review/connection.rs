@@ -21,9 +21,9 @@ use tokio::time::Instant;
 pub(super) struct ConnectionLimits {
     /// Maximum number of open connections.
     pub(super) connections: usize,
-    /// Maximum wait for a complete request header. A connection without a request is closed after this time too.
+    /// Maximum time to receive a complete request header. It also applies if the client sends nothing.
     pub(super) header: Duration,
-    /// Maximum time from a response to the next request. Closes connections whose client does not read the response.
+    /// Maximum time from the creation of a response to the next request. A client that does not read is cut off.
     pub(super) response: Duration,
     /// Maximum time that the shutdown waits for a response.
     pub(super) shutdown: Duration,

@@ -83,8 +83,8 @@ impl OpenConnections {
         }
     }
 
-    /// Waits until there is room for one more connection. Closes the connection that has been idle longest. If all
-    /// connections serve requests, waits for one of them.
+    /// Waits until there is room for one more connection. If there is none, closes the connection that has been idle
+    /// longest, or waits until a connection becomes idle.
     async fn make_room(&mut self) {
         loop {
             while self.tasks.try_join_next().is_some() {}

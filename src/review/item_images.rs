@@ -189,7 +189,7 @@ impl<T> CacheSlots<T> {
         Arc::clone(self.slots.entry(id.to_owned()).or_default())
     }
 
-    /// Records the bytes of a new value. Evicts the oldest values until the rest fits.
+    /// Records the size of a new value. Evicts the oldest values until all values fit into `MAX_CACHED_BYTES`.
     fn add(&mut self, id: &str, bytes: usize) {
         self.stored.push_back((id.to_owned(), bytes));
         let mut sum: usize = self.stored.iter().map(|(_, bytes)| bytes).sum();

@@ -90,8 +90,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     let wanted = &options.metrics;
     let is_of_metric =
         |record: &&MetricRecord| wanted.is_empty() || wanted.contains(&record.outcome.metric);
-    // In adjudication, an undisputed result gets no verdict, even if it looks the same as a disputed one. Such results
-    // are not a random sample, so their verdicts would bias the measured accuracy.
+    // In adjudication, only disputed results get a verdict, even if an undisputed result looks the same. Verdicts on
+    // such undisputed results would bias the measured accuracy, because these results are not a random sample.
     let is_wanted = |record: &&MetricRecord| {
         options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };

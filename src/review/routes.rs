@@ -185,7 +185,7 @@ async fn image(
     Ok((kind, png).into_response())
 }
 
-/// Returns the pair, metrics and scores of an answered item. Attention checks look like results.
+/// Returns the pair, metrics and scores of an answered item, without revealing whether the item is an attention check.
 async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
     let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
@@ -197,7 +197,7 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
-        // The verdicts of other reviewers are hidden, because a planted fault has none and could be recognised by that.
+        // The verdicts of other reviewers are on genuine results, so they could reveal a planted fault.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({

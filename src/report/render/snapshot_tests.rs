@@ -16,7 +16,7 @@ fn unjudged() -> Report {
     report.finish()
 }
 
-/// Returns a report on a failed pair and three results, of which two have verdicts and one has ground truth.
+/// Returns a report on a failed pair and three results. Two results have verdicts, and one has ground truth.
 fn judged() -> Report {
     let mut report = ReportAccumulator::default();
     let none = TruthEvaluation::default();

@@ -5,7 +5,7 @@ pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 /// Returns the p-values adjusted by Holm's step-down method, each in 0..=1, in the given order.
 ///
-/// The i-th smallest of m values is multiplied by m - i + 1. The adjusted values keep the order of the p-values.
+/// The i-th smallest of m values is multiplied by m - i + 1. A larger p-value never gets a smaller adjusted value.
 /// Source: Holm 1979, <https://www.jstor.org/stable/4615733>.
 ///
 /// ```
@@ -29,7 +29,7 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
     adjusted
 }
 
-/// Returns [`holm`] over a family of tests, some of which have no p-value.
+/// Applies [`holm`] to a family of tests. Some tests may have no p-value.
 ///
 /// For example, `McNemar`'s test has no p-value without discordant pairs. Such a test gets `None`, but still counts in
 /// the size of the family.

@@ -44,9 +44,9 @@ impl AgreementTable {
 
     /// Returns Cohen's kappa, in -1..=1, or `None` if there are no items or the chance agreement is 1.
     ///
-    /// Kappa is `(a - c) / (1 - c)`, where a is the observed agreement and c is the agreement expected by chance. If
-    /// the raters fail shares f1 and f2 of the items, `c = f1 f2 + (1 - f1)(1 - f2)`. If failures are rare, kappa may
-    /// be near 0 even if the raters almost always agree. Source: Cohen 1960, doi:10.1177/001316446002000104.
+    /// Kappa is `(a - c) / (1 - c)`, where a is the observed agreement and c is the agreement expected by chance. If f1
+    /// and f2 are the shares of items failed by each rater, `c = f1 f2 + (1 - f1)(1 - f2)`. If failures are rare, kappa
+    /// may be near 0 even if the raters almost always agree. Source: Cohen 1960, doi:10.1177/001316446002000104.
     ///
     /// ```
     /// use mocban::report::stats::AgreementTable;
@@ -61,9 +61,9 @@ impl AgreementTable {
 
     /// Returns Gwet's AC1, in -1..=1, or `None` if there are no items.
     ///
-    /// AC1 is `(a - c) / (1 - c)`, where a is the observed agreement and c is the agreement expected by chance. If the
-    /// raters fail a mean share f of the items, `c = 2 f (1 - f)`. Rare failures do not lower AC1. Source: Gwet 2008,
-    /// doi:10.1348/000711006X126600.
+    /// AC1 is `(a - c) / (1 - c)`, where a is the observed agreement and c is the agreement expected by chance. If f is
+    /// the mean of the raters' shares of failed items, `c = 2 f (1 - f)`. Rare failures do not lower AC1. Source: Gwet
+    /// 2008, doi:10.1348/000711006X126600.
     ///
     /// ```
     /// use mocban::report::stats::AgreementTable;

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::bootstrap::{QuantitySums, bootstrap_p, percentile_interval_95, resampled_means};
 
-/// An interval is computed only if at least this number of units have the quantity. Otherwise it would be too narrow.
+/// Minimum number of units with a value of a quantity. With fewer units, the quantity's interval would be too narrow.
 pub const MIN_UNITS: usize = 10;
 /// Largest number of units in a sample. A larger sample is not resampled, because its sampling error is negligible.
 pub const MAX_UNITS: usize = 100_000;
@@ -122,15 +122,15 @@ impl ResampledMeans {
         self.total[quantity]
     }
 
-    /// Returns the 95 % percentile interval of a quantity's mean, or `None` if fewer than [`MIN_UNITS`] units have the
-    /// quantity.
+    /// Returns the 95 % percentile interval of a quantity's mean, or `None` if fewer than [`MIN_UNITS`] units have a
+    /// value of the quantity.
     pub fn ci95(&mut self, quantity: usize) -> Option<[f64; 2]> {
         let is_enough = self.units_with[quantity] >= MIN_UNITS;
         percentile_interval_95(&mut self.means[quantity]).filter(|_| is_enough)
     }
 
     /// Returns the two-sided p-value of the hypothesis that a quantity's mean is 0. Returns `None` if fewer than
-    /// [`MIN_UNITS`] units have the quantity.
+    /// [`MIN_UNITS`] units have a value of the quantity.
     pub fn p(&self, quantity: usize) -> Option<f64> {
         let is_enough = self.units_with[quantity] >= MIN_UNITS;
         bootstrap_p(&self.means[quantity]).filter(|_| is_enough)
