@@ -76,7 +76,7 @@ pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoP
     Ok(finish_pair(&scene, printed, vertices, &mut rng))
 }
 
-/// Returns a map from mm to mask pixels: zero maps to the ink's centre, and the ink's longest side is `size_mm` long.
+/// Returns a map from mm to mask pixels. The origin maps to the ink's centre, `size_mm` to the ink's longest side.
 fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
     let ink = Mask::from_fn(clean.width() as usize, clean.height() as usize, |x, y| {
         clean.get_pixel(x as u32, y as u32).0[0] < 128

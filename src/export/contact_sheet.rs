@@ -1,4 +1,4 @@
-//! The contact sheet of a project: one image with many pairs, the worst first.
+//! The contact sheet of a project: one image with many pairs, in a given order.
 
 use rayon::prelude::*;
 

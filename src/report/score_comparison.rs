@@ -111,7 +111,7 @@ impl ScoreComparison {
     }
 }
 
-/// Returns one sentence for each two compared metrics. Scores with the same conclusion are listed together, as in
+/// Returns one sentence for every two compared metrics. Scores with the same conclusion are listed together, as in
 /// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU); no significant difference (Dice).`
 pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
     let mut compared: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();

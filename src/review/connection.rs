@@ -115,7 +115,7 @@ impl Drop for RequestInProgress {
     }
 }
 
-/// Serves one connection until the client closes it, it is idle for too long, or the server needs room or stops.
+/// Serves one connection until the client closes it or leaves it idle for too long, or the server stops or needs room.
 pub(super) async fn serve_connection(
     stream: TcpStream,
     router: Router,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-/// Groups of actions: verdicts, display, navigation and dialogs, and manual alignment. The help has the same order.
+/// Groups of actions, in the order of the help: verdicts, display, navigation and dialogs, and manual alignment.
 pub(super) const ACTIONS: [(&str, &str); 4] = [
     (
         "verdicts",

@@ -1,7 +1,7 @@
 //! The review page: a local web server on which one reviewer judges results and aligns reliefs manually.
 //!
 //! [`bind`] binds the port and reads the queue. [`ReviewServer::serve`] serves until it is stopped. An answer is
-//! acknowledged only after it is on the disk. Attention checks are served like results, to keep them hidden.
+//! acknowledged only after it is on the disk. Attention checks are served like results, so they cannot be recognized.
 
 mod alignment_editor;
 mod answer;

@@ -38,8 +38,8 @@ impl PrintView {
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Creates a view. The centre of the first pixel is (0, 0), so the outer corners of print and view match at (-0.5,
-    /// -0.5).
+    /// Creates a view. Pixel centres have integer coordinates, so print and view both have their top left corner at
+    /// (-0.5, -0.5).
     fn new(scale: f64, width: usize, height: usize) -> Self {
         let shift = (scale - 1.0) / 2.0;
         Self {
@@ -69,7 +69,7 @@ impl PrintView {
         picture
     }
 
-    /// Draws the print, the edges of the true stroke tops, and on top the edges of the depth mask. `tops` is in the
+    /// Draws the print, then the edges of the true stroke tops, and last the edges of the depth mask. `tops` is in the
     /// print's frame.
     pub fn overlay_on_truth(
         &self,

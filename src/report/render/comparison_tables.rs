@@ -10,7 +10,7 @@ use crate::report::score_bootstrap::{BootstrapSettings, MeanIntervals};
 /// Reads one interval of a metric's means.
 type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 
-/// Returns the table of McNemar's tests, one for each two compared metrics, or `None` without comparisons.
+/// Returns the table of McNemar's tests, one for every two compared metrics, or `None` without comparisons.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let table = Table::of(&report.comparisons)

@@ -59,7 +59,7 @@ pub fn wilson_95(count: u64, n: u64) -> Option<[f64; 2]> {
     let share = count as f64 / n;
     let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z_975 / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    // If `count` is 0 or `n`, one bound is exactly 0 or 1. Rounding errors could shift that bound.
+    // If `count` is 0 or `n`, rounding errors could shift the bound that is exactly 0 or 1.
     let low = if share == 0.0 { 0.0 } else { middle - half };
     let high = if share == 1.0 { 1.0 } else { middle + half };
     Some([low, high])

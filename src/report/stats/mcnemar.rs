@@ -59,9 +59,10 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
 /// Returns the number of pairs for which McNemar's test has 80 % power at the two-sided 5 % level. Returns `None` if
 /// `a_only` and `b_only` are equal.
 ///
-/// The true rates are assumed to be `a_only / n` and `b_only / n`. With psi = `(a_only + b_only) / n` and delta =
-/// `|a_only - b_only| / n`, the number is `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. This holds for the
-/// asymptotic test; the exact test needs slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
+/// The true shares of the two kinds of discordant pairs are assumed to be `a_only / n` and `b_only / n`. With psi =
+/// `(a_only + b_only) / n` and delta = `|a_only - b_only| / n`, the number is
+/// `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. This holds for the asymptotic test; the exact test needs
+/// slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
 ///
 /// ```
 /// use mocban::report::stats::mcnemar_sample_size;

@@ -48,7 +48,7 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     });
     let rows: Vec<PlotRow> = found.collect();
     let lowest = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
-    // The axis begins at a multiple of 0.1 that is at most 0.9. Values near 1 then remain distinguishable.
+    // The axis begins at the multiple of 0.1 below the lowest value, at most 0.9, so that values near 1 stay apart.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
     let (by, interval) = (basis.name(), report.interval.title());
     let caption = format!("Acc by {by} with its {interval} interval");
