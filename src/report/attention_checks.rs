@@ -19,7 +19,7 @@ pub struct AttentionCheckRates {
 }
 
 impl AttentionCheckRates {
-    /// Returns the rates over the answers of one or several reviewers. Answers to duplicates are left out.
+    /// Returns the rates of detected faults among the answers of one or several reviewers. Ignores answers to duplicates.
     pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut rates = Self::default();
         for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {
@@ -39,7 +39,7 @@ impl AttentionCheckRates {
     }
 }
 
-/// Returns the rates over the answers of all reviewers of a project.
+/// Returns the rates of detected faults among the answers of all reviewers of a project.
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read.

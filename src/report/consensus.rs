@@ -10,13 +10,13 @@ pub enum Consensus {
     Unjudged,
     /// Only an earlier result was judged.
     Stale,
-    /// All reviewers with a decision passed the result, or a conflict was adjudicated as a pass.
+    /// At least one reviewer passed the result and none failed it, or a conflict was adjudicated as a pass.
     Passed,
-    /// All reviewers with a decision failed the result, or a conflict was adjudicated as a fail.
+    /// At least one reviewer failed the result and none passed it, or a conflict was adjudicated as a fail.
     Failed,
     /// All reviewers were unsure.
     Unsure,
-    /// Some reviewers passed the result and some failed it. The result counts as unsure until somebody adjudicates.
+    /// Some reviewers passed the result and some failed it. The result counts as unsure until it is adjudicated.
     Conflict,
 }
 

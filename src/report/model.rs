@@ -86,11 +86,11 @@ pub struct MetricRow {
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub judged: u64,
-    /// Results that every reviewer with a decision passed, and conflicts adjudicated as a pass.
+    /// Results with at least one pass and no fail, and conflicts adjudicated as a pass.
     pub passed: u64,
-    /// Results that every reviewer with a decision failed, and conflicts adjudicated as a fail.
+    /// Results with at least one fail and no pass, and conflicts adjudicated as a fail.
     pub failed: u64,
-    /// Results on which all reviewers were unsure, and conflicts that nobody has adjudicated.
+    /// Results on which all reviewers were unsure, and conflicts that no adjudication has settled.
     pub unsure: u64,
     /// The unsure results on which reviewers disagree.
     pub conflicts: u64,

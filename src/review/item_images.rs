@@ -90,7 +90,7 @@ impl AlignmentInputs {
         })
     }
 
-    /// Computes the overlap of the masks under `print_from_depth`, with the method used to score results.
+    /// Computes the overlap of the stroke and ink masks as results are scored, with the relief placed by `print_from_depth`.
     pub(super) fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
         let map = self.canvas_from_print.after(print_from_depth);
         let (width, height) = (self.canvas_mask.width(), self.canvas_mask.height());

@@ -38,8 +38,7 @@ impl PrintView {
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Creates a view. Pixel centres have integer coordinates, so print and view both have their top left corner at
-    /// (-0.5, -0.5).
+    /// Creates a view. Pixel centres are integers, so print and view share the top left corner (-0.5, -0.5).
     fn new(scale: f64, width: usize, height: usize) -> Self {
         let shift = (scale - 1.0) / 2.0;
         Self {
