@@ -19,7 +19,7 @@ pub struct AttentionCheckRates {
 }
 
 impl AttentionCheckRates {
-    /// Returns the rates of detected faults among the answers of one or several reviewers. Ignores answers to duplicates.
+    /// Returns the rates of detected faults among the answers of one or more reviewers. Ignores answers to duplicates.
     pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut rates = Self::default();
         for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {

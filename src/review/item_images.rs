@@ -90,7 +90,7 @@ impl AlignmentInputs {
         })
     }
 
-    /// Computes the overlap of the stroke and ink masks as results are scored, with the relief placed by `print_from_depth`.
+    /// Computes the overlap of stroke and ink mask as results are scored, with the relief placed by `print_from_depth`.
     pub(super) fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
         let map = self.canvas_from_print.after(print_from_depth);
         let (width, height) = (self.canvas_mask.width(), self.canvas_mask.height());

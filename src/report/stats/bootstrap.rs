@@ -14,7 +14,7 @@ pub const BOOTSTRAP_SEED: u64 = 1;
 const MAX_RESAMPLES: usize = 10_000;
 /// Fewest resamples, however many units there are.
 const MIN_RESAMPLES: usize = 1000;
-/// Limit on the units drawn in all resamples together. It leads to fewer resamples, but at least `MIN_RESAMPLES`.
+/// Large samples get fewer resamples to draw at most this number of units in total, but at least `MIN_RESAMPLES`.
 const MAX_DRAWS: usize = 50_000_000;
 /// Resamples that one thread adds up in one pass over the units.
 const STREAMS_PER_PASS: usize = 8;
