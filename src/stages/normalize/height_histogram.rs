@@ -1,4 +1,4 @@
-//! Histogram of the heights below the tops, and the bins of depth that it shares with the profile of steepness.
+//! Histogram of the heights below the tops. The profile of steepness uses the same bins of depth.
 
 use crate::domain::ReliefHeights;
 

@@ -23,8 +23,8 @@ pub const REVISION: u32 = 12;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///
-/// `depth` must read like the print. Masks are in the pixels of the print image. Heights are in mesh units over the
-/// fitted surface.
+/// The depth map must not be a mirror image of the print. Masks are in the pixels of the print image. Heights are in
+/// mesh units over the fitted surface.
 ///
 /// # Errors
 /// Returns an error if the print shows no ink, or if the depth map has fewer than two distinct heights.

@@ -10,14 +10,14 @@ use crate::stages::binarize::{self, Split};
 use crate::stages::pose::SoftMask;
 
 /// Share of the map's width and height left out at each border when tops and ground are separated. Side walls and a
-/// protruding foot of the block may lie there, and are neither.
+/// protruding foot of the block may lie there. They are neither tops nor ground.
 const MARGIN: f64 = 0.15;
 /// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
 
-/// Largest depth of a carving, as a share of the longest side of the map's data. Real characters: 0.1.
+/// Largest depth of a carving, as a share of the longest side of the map's data. Real characters reach about 0.1.
 const DEEPEST: f64 = 0.25;
-/// Largest share of the sampled heights that may lie below the ground, such as a table seen through holes of the scan.
+/// Largest share of the sampled heights that may lie below the ground, such as heights of a table seen through holes.
 const MOST_BELOW: f64 = 0.3;
 
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
@@ -57,8 +57,8 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
 }
 
 /// Splits heights into tops and ground. If the classes are farther apart than `deepest`, and few heights are in the
-/// lower class, the lower class is what holes of the scan show below the ground. It is then left out, and the other
-/// heights are split.
+/// lower class, the lower class lies below the ground and is seen through holes of the scan. In that case it is left
+/// out, and the other heights are split again.
 fn split_face(mut heights: Vec<f32>, deepest: f64) -> Option<Split> {
     let first = binarize::split(&mut heights).filter(|split| split.high > split.low)?;
     let mut split = first;

@@ -1,28 +1,30 @@
 //! Mean steepness of the relief at each depth below the tops, and the depth at which the tops end.
 //!
-//! Stroke tops are nearly flat and walls are steep. Going down from the tops, the steepness rises from that of the tops
-//! to that of the walls. The tops end shortly before it reaches that of the walls. This holds for new and worn tops, for
-//! deep and shallow carving and for valleys that are filled with dirt, although the depth at which it happens differs
-//! between 0.05 and 0.3 of the relief. Only ratios of slopes are used, so depth and resolution do not matter.
+//! Stroke tops are nearly flat and walls are steep. Going down from the tops, the steepness rises to that of the walls.
+//! The tops end shortly before the steepness reaches that of the walls. The depth at which they end differs between
+//! 0.05 and 0.3 of the relief. The rule holds for new and worn tops, deep and shallow carving, and valleys filled with
+//! dirt. Only ratios of slopes are used, so the depth of the carving and the map's resolution do not matter.
 
 use super::height_histogram::{BINS, bin_of, bin_with, middle, smoothed};
 use super::sampling::sampled;
 use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 
-/// Slopes are measured between points this share of the map's longest side before and behind a sample.
+/// A slope is measured between two points, each this share of the map's longest side away from the sample.
 const REACH: f64 = 1.0 / 256.0;
 /// Number of bins averaged.
 const WIDTH: usize = 7;
 /// Range of depths that holds the flattest tops.
 const TOPS: [f64; 2] = [-0.02, 0.06];
-/// Range of depths that holds only walls, and the share of its bins that are less steep than the walls' steepness.
+/// Range of depths that holds only walls. The walls' steepness is the quantile `WALL_QUANTILE` over the bins of this
+/// range.
 const WALLS: [f64; 2] = [0.15, 0.6];
 const WALL_QUANTILE: f64 = 0.8;
-/// The tops end where the steepness is `walls^(1 - SHARE) * tops^SHARE`. Accuracy is about the same from 0.2 to 0.25 on
-/// generated reliefs of twelve kinds.
+/// The tops end where the steepness reaches `walls^(1 - SHARE) * tops^SHARE`. Values from 0.2 to 0.25 are about equally
+/// accurate on generated reliefs of twelve kinds.
 const SHARE: f64 = 0.22;
-/// Smallest steepness of tops, as a share of that of the walls. Perfectly flat tops would end at any slope.
+/// Smallest steepness of tops, as a share of the walls' steepness. Otherwise, perfectly flat tops would end at any
+/// slope.
 const FLATTEST: f64 = 0.05;
 /// Range of depths at which tops can end.
 const RANGE: [f64; 2] = [0.02, 0.4];
@@ -98,8 +100,8 @@ mod tests {
 
     const SIDE: usize = 256;
 
-    /// Returns the depth at which the tops of bars end. The tops are rounded and worn down to `worn`, where the walls
-    /// begin, as a share of the relief. The walls are `wall_px` wide.
+    /// Returns the depth at which the tops of bars end. The tops are rounded, and their edges are worn by up to `worn`,
+    /// a share of the relief. The walls are `wall_px` wide.
     fn tops_end(worn: f64, wall_px: f64) -> f64 {
         let depth = |x: usize, y: usize| {
             let from_axis = (x % 64).abs_diff(32) as f64;

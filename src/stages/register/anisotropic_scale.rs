@@ -7,7 +7,7 @@ use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 const ROUNDS: usize = 2;
 /// Maximum number of steps of the refinement in each round.
 const STEPS: usize = 6;
-/// The score is computed at scales that are larger and smaller by this share.
+/// The score is computed at the current scale, and at scales larger and smaller by this share.
 const TRIED: f64 = 0.008;
 /// Largest relative change of scale in one round, along each pair of axes.
 const MOST: f64 = 0.012;
@@ -36,8 +36,8 @@ pub(super) fn with_anisotropic_scale(
     if best.score > pose.score { best } else { *pose }
 }
 
-/// Returns where the parabola through the values at -1, 0 and 1 has its maximum, or 0 if the parabola has none. The
-/// result is limited to `MOST / TRIED` on either side.
+/// Returns the position of the maximum of the parabola through the values at -1, 0 and 1, clamped to `MOST / TRIED` on
+/// either side. Returns 0 if the parabola has no maximum.
 fn summit(before: f64, at: f64, after: f64) -> f64 {
     let bend = before - 2.0 * at + after;
     if bend >= 0.0 {

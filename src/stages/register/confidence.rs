@@ -10,9 +10,7 @@ use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithm of each pose feature except `spread`.
 const POSE_INPUTS: usize = 6;
-/// Number of inputs of the mask model: 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the correlation, the result of
-/// [`spread_input`] and the square of `Areas::rim`. `m` is `ln(Areas::mask / Areas::relief)`, and `i` is
-/// `ln(Areas::ink / Areas::relief)`.
+/// Number of inputs of the mask model, see `mask_inputs`.
 const MASK_INPUTS: usize = 8;
 
 /// Weights of the pose model's inputs.
@@ -20,7 +18,7 @@ const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
 /// Weights of the mask model's inputs. The last weight is large, because its input, the square of `Areas::rim`, is
 /// small: on hard generated pairs, the median rim is 0.03, and 3 % of the rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
-/// Unit of the spread in `spread_input`, as a share of the depth map's longest side. A spread below it is invisible.
+/// `spread_input` divides the spread by this share of the depth map's longest side. Smaller spreads are invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Lower bound of shares before their logarithm is taken.
 const FLOOR: f64 = 0.02;
@@ -72,8 +70,8 @@ struct Areas {
     relief: f64,
     /// Area of the print's ink.
     ink: f64,
-    /// Width of the rim that a slightly lower threshold would add: `ln(area with rim / area) * sqrt(area)`. If the mask
-    /// of the metric `relief` has a narrower rim, the width of that rim is used.
+    /// Width of the rim that a slightly lower threshold would add, `ln(area with rim / area) * sqrt(area)`, but at most
+    /// the width for the metric `relief`.
     rim: f64,
 }
 

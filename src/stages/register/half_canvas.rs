@@ -1,4 +1,4 @@
-//! Print and depth map on a canvas of half the size, on which masks are compared in a quarter of the time.
+//! Print and depth map on a canvas of half the side length, so comparing masks takes a quarter of the time.
 
 use super::ink_edge::InkEdge;
 use crate::domain::Affine2;
@@ -82,8 +82,8 @@ mod tests {
     const SIDE: usize = 96;
     const TOP: u16 = 1000;
 
-    /// Returns a canvas of two bars with a half width of 8 px. Ink covers each bar up to `ink_px` from its axis, and
-    /// ink or wood may be missing in parts of a bar.
+    /// Returns a canvas of two bars with a half width of 8 px, inked up to `ink_px` from their axes. The first bar has
+    /// ink only in the rows of `is_inked`. The second bar has wood only in the rows of `is_carved`.
     fn canvas(
         ink_px: f64,
         is_inked: impl Fn(usize) -> bool,

@@ -5,9 +5,9 @@ use crate::simd::{dispatch, min_f32};
 
 /// Largest distance that is measured, in pixels. Larger distances are set to this.
 const REACH: usize = 8;
-/// A distance counts for the mean only if it differs from the previous estimate by less than this, in pixels.
+/// `mean_near` averages only distances that differ from its previous estimate by less than this, in pixels.
 const NEAR: f32 = 2.0;
-/// Number of times the mean is computed from the distances near the previous estimate.
+/// Number of times that `mean_near` improves its estimate.
 const ROUNDS: usize = 3;
 
 /// Signed distance of each pixel to the edge of the ink, in pixels: positive on ink, negative on paper.
@@ -42,7 +42,7 @@ impl InkEdge {
         self.0.map(|distance| f64::from(*distance) > spread)
     }
 
-    /// Returns a robust mean of distances: the mean of those near their median. Returns 0 if there are none.
+    /// Returns a robust mean, which starts at the median and ignores outliers. Returns 0 if there are no distances.
     pub(super) fn mean_near(distances: &mut [f32]) -> f64 {
         if distances.is_empty() {
             return 0.0;
@@ -65,8 +65,8 @@ impl InkEdge {
     }
 }
 
-/// Returns the distance of each set pixel to the nearest pixel that is not set, at most [`REACH`] pixels; 0 for pixels
-/// that are not set. Pixels outside the mask count as set.
+/// Returns the distance from each set pixel to the nearest unset pixel, at most [`REACH`] pixels. The distance of an
+/// unset pixel is 0. Pixels outside the mask count as set.
 fn distances(mask: &Mask) -> Grid<f32> {
     let (width, height) = (mask.width(), mask.height());
     let most = REACH as f32;
@@ -95,7 +95,8 @@ fn distances(mask: &Mask) -> Grid<f32> {
     Grid::from_vec(width, height, all).expect("one distance per pixel")
 }
 
-/// Computes the smallest sum of a squared distance along a column and the squared distance to that column.
+/// Computes, for each pixel of a row, the smallest sum of a column's squared distance and the squared way to that
+/// column.
 #[inline(always)]
 fn nearest_in_row(padded: &[f32], nearest: &mut [f32]) {
     let width = nearest.len();

@@ -14,12 +14,13 @@ use crate::stages::score::{SsimReference, SsimWindow};
 const CANDIDATES: u32 = 40;
 /// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// `density` ignores strokes that are farther than this from the corrected ink, in pixels of the half canvas: their ink
-/// is missing.
+/// If a stroke pixel is farther than this from the corrected ink, in pixels of the half canvas, its ink is missing.
+/// `density` ignores such pixels.
 const MISSING_PX: f64 = 3.0;
-/// Distance from the corrected edge at which ink or paper counts fully for `ensemble`, in pixels of the half canvas.
+/// `ensemble` gives a pixel full weight if it is at least this far from the corrected edge of the ink, in pixels of the
+/// half canvas.
 const FULL_PX: f64 = 1.0;
-/// Weight of the distance from the depth of `relief` in the score of `ensemble`.
+/// Weight, in the score of `ensemble`, of the squared logarithm of a candidate's depth over the depth of `relief`.
 const PRIOR: f64 = 0.05;
 
 /// A candidate threshold, and how its mask fits the corrected ink.
@@ -30,7 +31,7 @@ struct Candidate {
     level: u16,
     /// Number of stroke pixels on the canvas.
     area: f64,
-    /// Number of stroke pixels of which the ink is not missing.
+    /// Number of stroke pixels whose ink is not missing.
     area_inked: f64,
     /// Agreement with the corrected ink: 1 if the mask covers all ink and no paper.
     agreement: f64,
@@ -106,8 +107,8 @@ fn lowest(candidates: &[Candidate], value: impl Fn(&Candidate) -> f64) -> usize 
         .unwrap_or(0)
 }
 
-/// Returns the depths that are tried and their levels, the shallowest first. The square roots of the shares are evenly
-/// spaced, because the best depths of most blocks are small.
+/// Returns the depths to try, as shares of the relief, with their levels, the shallowest first. The square roots of the
+/// depths are evenly spaced, because the best depth of most blocks is small.
 fn candidate_levels(
     depth: &DepthMap,
     relief: &ReliefHeights,
@@ -122,8 +123,8 @@ fn candidate_levels(
     levels
 }
 
-/// Returns the number of pixels of corrected ink that the deepest candidate covers. The strokes of other ink are lost on
-/// the block.
+/// Returns the number of pixels of corrected ink that the deepest candidate covers. Where other ink lies, the block has
+/// lost its strokes.
 fn carved_ink(canvas: &HalfCanvas, corrected: &Mask, deepest: u16) -> f64 {
     let both = corrected.data().iter().zip(canvas.levels.data());
     both.filter(|(ink, level)| **ink && **level >= deepest)
@@ -197,8 +198,8 @@ impl<'a> Structure<'a> {
     }
 
     /// Returns the best candidate. The score changes slowly with depth, so the search tries every fourth candidate
-    /// first and then the neighbours of the best one. If several are equally good, the search continues near the
-    /// first and the last of them: the last may be just above the tops of worn strokes.
+    /// first and then the neighbours of the best one. If several are equally good, the search continues near the first
+    /// and the last of them, because worn strokes may begin just below the last one.
     fn best_of_all(&mut self) -> usize {
         let count = self.candidates.len();
         let first = self.best((0..count).step_by(COARSE));
@@ -234,8 +235,8 @@ mod tests {
         tops_end: 0.08,
     };
 
-    /// Returns a relief of bars with sloping walls. The tops have a half width of 4 px; those of the third bar are worn
-    /// by `worn`, as a share of the relief.
+    /// Returns a relief of bars with sloping walls. The tops have a half width of 4 px. The top of the third bar is
+    /// worn by `worn`, a share of the relief.
     fn bars(worn: f64) -> DepthMap {
         let level = |x: usize, y: usize| {
             let from_axis = (x % 32).abs_diff(16) as f64;

@@ -35,7 +35,7 @@ const MIRROR_WINS: f64 = 1.06;
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
 /// `depth` and `normalized` are the results of earlier stages. The pose maps depth-map pixels to print-image pixels.
-/// All metrics share it.
+/// All metrics share this pose.
 ///
 /// # Errors
 /// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not

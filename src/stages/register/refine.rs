@@ -21,11 +21,11 @@ const SOFTNESS: f64 = 0.1;
 const COMPARED: f64 = 0.42;
 /// The threshold of the best pose is chosen at this share of the working size.
 const CLOSER: f64 = 0.67;
-/// If a competitor scores more than this share of the best score, both competitors are refined at `CLOSER` too.
+/// If a competitor scores more than this share of the best score, both competitors are refined at size `CLOSER` too.
 const CLOSE: f64 = 0.75;
-/// `fair_share` limits the ratio of the scores on all pixels to this. A symmetric character can reach the limit.
+/// In `fair_share`, the ratio of the scores on all pixels counts at most this much. A symmetric character can reach it.
 const SYMMETRIC: f64 = 0.9;
-/// Two further refinements start from the pose scaled down and up by this factor. Ideally, all end at the same pose.
+/// The refinement is repeated from the pose scaled down and up by this factor. Ideally, all three end at the same pose.
 const OTHER_SIZE: f64 = 1.08;
 /// Maximum number of steps of a refinement while poses are compared.
 const FEW_STEPS: usize = 8;
@@ -174,8 +174,8 @@ fn share(rival: Option<RefinedPose>, best: &RefinedPose) -> f64 {
 }
 
 /// Returns the score of a competitor divided by the score of the best pose, both on the pixels that are valid for both
-/// poses. If these pixels are few, the ratio may be too low by chance. The result is therefore at least the ratio on
-/// all pixels, or `SYMMETRIC` if that is smaller.
+/// poses. If these pixels are few, the ratio may be too low by chance. The result is therefore at least the smaller of
+/// `SYMMETRIC` and the ratio on all pixels.
 fn fair_share(thresholds: &SoftThresholds, rival: &RefinedPose, best: &RefinedPose) -> f64 {
     let [score, fair] =
         thresholds.compare_on_common_area([best, rival].map(|pose| (pose.nearest, &pose.found)));
@@ -249,8 +249,8 @@ impl<'a> WorkingImages<'a> {
     }
 
     /// Refines a pose from three starts: the pose, a smaller one and a larger one. Returns the best result, and the
-    /// spread: the largest distance between the best result and another, see `apart`. If strokes are few or broken, a
-    /// refinement stays near its start, and the spread is large.
+    /// spread: the largest distance between the best result and another result, see `apart`. If strokes are few or
+    /// broken, a refinement stays near its start, and the spread is large.
     fn refine_at_three_sizes(
         &self,
         refiner: &Refiner,
@@ -272,7 +272,8 @@ impl<'a> WorkingImages<'a> {
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Returns how far two poses move the depth map's corners apart, on average, as a share of the map's longest side.
+    /// Maps the depth map's corners by both poses. Returns the mean distance between the two images of a corner, as a
+    /// share of the map's longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];

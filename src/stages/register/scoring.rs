@@ -18,7 +18,7 @@ pub(crate) struct Alignment {
     pub(crate) print_from_depth: Affine2,
     /// Score of the pose minus the score of the best other pose.
     pub(crate) margin: f64,
-    /// Whether the threshold or the scale lies at the end of the range that was searched.
+    /// Whether the threshold or the scale lies at an end of its searched range.
     pub(crate) at_bound: bool,
 }
 

@@ -20,7 +20,8 @@ pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// A refiner for each threshold's strokes against the print's ink. The shallowest threshold comes first.
+/// One refiner for each threshold, which aligns the strokes at that threshold with the print's ink. The shallowest
+/// threshold comes first.
 pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
@@ -32,7 +33,7 @@ pub(super) struct BestThreshold<'a, 'b> {
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The threshold that fits best, interpolated between the tried ones so that it changes continuously with the pose.
+    /// Best threshold, interpolated between the tried thresholds so that it changes continuously with the pose.
     pub(super) cut: f64,
     /// Index of the tried threshold with the highest score.
     pub(super) nearest: usize,
