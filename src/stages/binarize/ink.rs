@@ -15,12 +15,12 @@ const DISTINCT_BACKGROUND: f64 = 0.945;
 const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
-/// A dark pixel is pale if it is above this position between the darkest tenth (0) and the background (1).
+/// A dark pixel is pale if its grey is more than this share of the way from the darkest tenth to the background.
 const PALE: f64 = 0.35;
 /// Stains are possible if more than this share of the dark pixels are pale.
 const LEAST_PALE: f64 = 0.15;
-/// Least difference between the greys of ink and background, as a share of the lighter grey. It is relative, because
-/// scans that use only part of 16 bits are dark.
+/// Least difference between the greys of ink and background, as a share of the lighter grey. It is relative, because a
+/// scan that uses only part of the 16-bit range is dark.
 const LEAST_CONTRAST: f64 = 0.08;
 /// Least difference between the greys of ink and background, as a share of full white. A smaller difference is noise.
 const NOISE: f64 = 0.012;

@@ -11,7 +11,7 @@ pub(crate) struct Split {
     pub(crate) high: f64,
 }
 
-/// Sorts values, and splits them at the largest variance between the classes. Returns `None` for fewer than two values.
+/// Sorts values, and splits them where the variance between the classes is largest. Returns `None` for fewer than two.
 pub(crate) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)

@@ -3,15 +3,15 @@
 use super::otsu::Split;
 use crate::raster::{Grid, Mask};
 
-/// Ink is clearly darker than the background if the sum of the evidence is below the negative of this.
+/// If the sum of the evidence is below minus this value, ink is clearly darker than the background.
 const CLEAR: f64 = 0.8;
-/// Ink is clearly lighter, as in rubbings, if the sum is above this. Heavy ink in a frame can cause a smaller sum.
+/// If the sum is above this, ink is clearly lighter, as in rubbings. Heavy ink in a frame can cause a smaller sum.
 const CLEAR_LIGHT: f64 = 1.6;
 /// Width of the rim that counts as evidence for the background, as a share of the image's shorter side.
 const RIM: f64 = 0.06;
 
-/// Returns whether ink is probably lighter than the background, and whether the polarity is clear. It is unclear if the
-/// evidence is weak, or if the image and `even`, the image divided by its background, disagree.
+/// Returns whether ink is probably lighter than the background, and whether the polarity is clear. The polarity is
+/// unclear if the evidence is weak, or if the image and `even`, the image divided by its background, disagree.
 pub(super) fn polarity(
     even: &Grid<f32>,
     levelled: Option<Split>,
@@ -27,9 +27,9 @@ pub(super) fn polarity(
     (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
-/// Returns the evidence that the dark class is the background, negative if it is ink. The larger class is assumed to be
-/// the background (weight 2), and so is the class that covers most of the rim (weight 1). Heavy ink breaks the first
-/// rule, and border lines break the second.
+/// Returns evidence that is positive if the dark class is the background, and negative if it is ink. The background is
+/// assumed to be the larger class (weight 2) and to cover most of the rim (weight 1). Heavy ink breaks the first
+/// assumption, and border lines break the second.
 fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());

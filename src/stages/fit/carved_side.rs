@@ -24,7 +24,7 @@ const AGREEMENT: f64 = 14.0;
 /// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
 /// If the likelier side reaches this agreement with the print, the other side is not measured. The highest agreement of
-/// 500 backs was 0.55, with walls and frame lines included.
+/// 500 backs was 0.55.
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;

@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 const SAMPLES: usize = 30_000;
 /// Normals within this angle, in radians, belong to the same plane.
 const SAME: f64 = 0.26;
-/// Directions closer than this angle, in radians, count as one. The fit of a side levels smaller tilts.
+/// Directions closer than this angle, in radians, count as one, because the fit of a side levels smaller tilts.
 const DISTINCT: f64 = 0.2;
 /// Least share of the area whose normals must lie within `SAME` of a direction.
 const LEAST_AREA: f64 = 0.04;

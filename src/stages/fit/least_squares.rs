@@ -206,7 +206,7 @@ impl MomentSums {
     }
 }
 
-/// Returns the index of the product of the monomials `i` and `j`, which are among the first six.
+/// Returns the index of the product of monomials `i` and `j` in the order 1, u, v, uu, uv, vv, uuu and so on.
 fn product(i: usize, j: usize) -> usize {
     // Degree and exponent of v of each monomial 1, u, v, uu, uv, vv.
     let of = |k: usize| [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)][k];

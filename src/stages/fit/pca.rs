@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::stages::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
-/// A mesh without faces needs at least this many points. 25 points along a side show one or two strokes.
+/// A mesh without faces needs at least this many points, about 25 along a side, to show one or two strokes.
 const LEAST_POINTS: usize = 600;
 
 /// Centre and principal axes, longest first, with the variance along each.

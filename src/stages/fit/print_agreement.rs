@@ -28,7 +28,7 @@ const PASSES: [RefinementPass; 2] = [
     },
 ];
 
-/// Returns a beam of mirrored poses only, because a block seen from outside shows mirror writing.
+/// Returns the width of a beam without upright poses, because a block seen from outside shows mirror writing.
 const fn mirrored(count: usize) -> BeamWidth {
     BeamWidth {
         upright: 0,
@@ -38,13 +38,13 @@ const fn mirrored(count: usize) -> BeamWidth {
 
 /// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Pixels with a lower nearness to the surface are assumed not to print. Without this limit, the slopes around thin
-/// strokes would count as strokes. Only the pose search uses the slopes.
+/// Pixels whose nearness to the surface is below this are assumed not to print. Without this limit, the slopes around
+/// thin strokes would count as strokes. Only the pose search uses the slopes.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
 
-/// Possible interpretations of a print as ink, ready to be compared with many sides.
+/// Image pyramids of all interpretations of a print, to be compared with many sides.
 #[derive(Debug)]
 pub(super) struct InkPyramids(Vec<ImagePyramid>);
 

@@ -1,4 +1,4 @@
-//! Parts of a scan that may be the block: without debris, and without the table below it.
+//! Finds the parts of a scan that may be the block. Debris and a table below the block are left out.
 
 use nalgebra::Vector3;
 
@@ -9,15 +9,15 @@ use crate::stages::robust_bounds::is_in_box;
 use crate::stages::scan::{of_faces, part_of};
 use crate::stages::zbuffer::IndexedSurface;
 
-/// Cells along the longest side of a scan. Surfaces in neighbouring cells are connected.
+/// Number of cells along the longest side of a scan. Surfaces in neighbouring cells are connected.
 const CELLS: f64 = 64.0;
 /// Approximate limit of the number of points at which cells are marked.
 const MARKS: f64 = 2e7;
-/// Components with a smaller share of the area of the largest one are debris.
+/// A component is debris if its area is below this share of the largest component's area.
 const DEBRIS: f64 = 0.05;
-/// Least share of the area that a support must have.
+/// Least share of the area that lies in a support, the plane on which a block stands.
 const LEAST_SUPPORT: f64 = 0.2;
-/// Share of the remaining area that may lie on the wrong side of a support.
+/// Largest share of the remaining area that may lie below a support.
 const WRONG_SIDE: f64 = 0.03;
 /// Number of layers into which a scan is cut to find the height of a support.
 const LAYERS: usize = 96;
@@ -26,8 +26,8 @@ const THICKNESS: f64 = 1.6;
 /// A smaller share of the faces is no block.
 const LEAST_PART: f64 = 0.02;
 
-/// Returns the parts that may be the block, the largest first: the scan without debris, and what lies on each of its
-/// large planes.
+/// Returns the parts that may be the block: first the scan without debris, then what lies on each large plane of the
+/// scan.
 pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     let whole = without_debris(mesh, indexed);
     let all = facets(&whole);
@@ -45,8 +45,9 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     parts
 }
 
-/// Returns the direction and the height of the plane with this normal on which the rest of the scan stands. Returns
-/// `None` if the largest plane with this normal is small, or if the rest lies on both sides of it.
+/// Finds the plane, with about this normal, on which the rest of the scan stands. Returns its normal, which points to
+/// the rest, and the height above which the rest lies. Returns `None` if the plane is small, or if the rest lies on
+/// both sides.
 fn support(facets: &[Facet], normal: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let total: f64 = facets.iter().map(|facet| facet.area).sum();
     let (layer, centre) = fullest_layer(facets, &normal)?;
@@ -75,7 +76,7 @@ fn support(facets: &[Facet], normal: Vector3<f64>) -> Option<(Vector3<f64>, f64)
     Some((up, up.dot(&normal) * centre + THICKNESS * layer))
 }
 
-/// Returns the thickness of a layer and the height of the middle of the layer with the largest area.
+/// Returns the thickness of a layer, and the height at which the two adjacent layers with the largest total area meet.
 fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> {
     let heights = || facets.iter().map(|facet| normal.dot(&facet.middle));
     let low = heights().fold(f64::INFINITY, f64::min);

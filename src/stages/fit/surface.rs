@@ -43,7 +43,7 @@ const TILT_SIGMA: f64 = 0.05;
 const BOW_SIGMA: f64 = 0.15;
 /// Prior standard deviation of the difference between the second-degree coefficients of tops and ground.
 const GROUND_BOW_SIGMA: f64 = 0.03;
-/// The fit of the ground starts at this quantile of the heights above the mean plane.
+/// The fit of the ground starts with the mean plane, shifted to this quantile of the heights.
 const GROUND_START: f64 = 0.25;
 /// Distances from the ground at which the weight of a point falls to 0, as shares of the height range.
 const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
@@ -289,7 +289,8 @@ impl HeightSamples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Returns an image of the nearness to the surface: 1 on or above it, 0 at half the relief below or deeper.
+    /// Returns an image of the nearness to the surface: 1 on or above the surface, falling to 0 at half the relief
+    /// below it.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {

@@ -19,26 +19,26 @@ use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// Least agreement of a side with the print. On generated scans, carved sides reached 0.65 to 0.93 and other sides at
-/// most 0.51. With dry or foreign prints, all sides are below.
+/// Least agreement with the print at which a side is accepted. On generated scans, carved sides reached 0.65 to 0.93
+/// and other sides at most 0.51. With a dry print, or the print of another character, no side reaches this.
 const LEAST: f64 = 0.58;
 /// Factor by which the agreement of a side must exceed the agreement of the usual side.
 const BETTER: f64 = 1.12;
 /// Sides whose normals differ by a larger angle, in radians, are rivals.
 const RIVAL: f64 = 0.5;
-/// Weight of the logarithm of the ratio of two agreements, as in the choice between two sides.
+/// Weight of the logarithm of the ratio of two agreements, the same as in `carved_side`.
 const AGREEMENT: f64 = 14.0;
-/// A region reaches this many times the relief below the surface. What lies lower is no ground of the carving.
+/// A region extends below the surface by this many times the relief. Anything lower is not part of the carving.
 const DEEPEST: f64 = 4.0;
-/// A region reaches this many times the relief above the surface. Whatever lies higher floats or is a spike.
+/// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
 const HIGHEST: f64 = 1.0;
 /// A carving is not deeper than this share of the extent of its side.
 const DEEPEST_CARVING: f64 = 0.2;
-/// Least share of the visible area that must lie deeper before it is cut off.
+/// If at least this share of the visible area lies deeper than any carving, that area is cut off.
 const DEEP_AREA: f64 = 0.02;
-/// Shares of a grid of characters, around its middle, in which the middle character lies.
+/// Shares of the width and height of a grid of characters that are tried for the middle character.
 const MIDDLE: [f64; 2] = [0.38, 0.5];
-/// Number of angles that are tried to find the edges of a grid, up to a right angle.
+/// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
 const ANGLES: i32 = 30;
 
 /// A carved side that the wider search found.
@@ -56,7 +56,8 @@ struct JudgedSide {
     region: ScanRegion,
 }
 
-/// Returns the side that resembles the print best. Returns `None` if no side is better than the usual one.
+/// Returns the side that resembles the print best. Returns `None` if that side is not clearly better than the usual
+/// one.
 pub(super) fn search(
     mesh: &Mesh,
     indexed: &IndexedSurface,
@@ -150,8 +151,8 @@ impl SideSearch<'_> {
         })
     }
 
-    /// Returns both sides of the middle of a flat scan, where the middle character of a grid lies. `share` is the share
-    /// of the width and the height.
+    /// Returns the carved sides of the middle of a flat scan, where the middle character of a grid lies. `share` is the
+    /// size of the middle, as a share of the width and the height.
     fn middle_of_grid(self, mesh: &Mesh, share: f64) -> Vec<JudgedSide> {
         let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
         let plane = tightest_frame(mesh, &axes);
@@ -177,8 +178,8 @@ impl SideSearch<'_> {
     }
 }
 
-/// Returns the part near the fitted surface, if much of the visible area lies deeper than any carving: the foot of a
-/// block, or a table below it.
+/// If much of the visible area lies deeper than any carving, returns the part of the mesh above that area. The area may
+/// be the foot of a block, or a table below it.
 fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
     let heights = side.samples.residuals(&side.surface);
@@ -192,7 +193,8 @@ fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     (near.vertices.len() >= 16).then_some(near)
 }
 
-/// Returns the frame perpendicular to the least axis in which the bounding box of the mesh is smallest.
+/// Returns the frame in which the bounding box of the mesh has the smallest area in x and y. Its z is the least
+/// principal axis.
 fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
     let normal = axes.normal();
     let level = frame(normal, axes.centre);
