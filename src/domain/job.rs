@@ -36,15 +36,15 @@ impl JobStatus {
     }
 }
 
-/// A pair is quarantined for killing workers only after this number of them died while they leased no other pair.
+/// A pair is quarantined for killing workers only if its crashes reach this number.
 pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair must be quarantined because it probably kills its workers.
 ///
-/// `crashes` is the number of workers that died while they leased only this pair. A finished stage resets `crashes`.
-/// `deaths` is the number of all recent worker deaths. If the pair is the cause, `deaths` exceeds `crashes` by at most
-/// one, for a worker that also leased other pairs. Each further death suggests an external cause, such as killed
-/// processes, and raises the limit by one.
+/// `crashes` is the number of workers that died while they leased only this pair, or hung on this pair. A finished
+/// stage resets `crashes`. `deaths` is the number of recent worker deaths. If the pair is the cause, `deaths` exceeds
+/// `crashes` by at most one, for a worker that also leased other pairs. Each further death suggests an external cause,
+/// such as killed processes, and raises the limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

@@ -14,8 +14,8 @@ use super::enum_names;
 ///
 /// The default method first corrects the ink's spread. The spread `r` is the robust mean distance of the edge of
 /// [`Self::Relief`]'s mask from the edge of `P`: positive if the ink spreads over the wood, negative if dry ink leaves
-/// its rim bare. `P'` is `P` with its edge moved inward by `r`. `s` is the signed distance from the edge of `P'`, in
-/// pixels of a canvas of half the size (positive on ink).
+/// the rim of the strokes bare. `P'` is `P` with its edge moved inward by `r`. `s` is the signed distance from the edge
+/// of `P'`, in pixels of a canvas of half the size (positive on ink).
 ///
 /// The paper's three metrics depend on the print. [`Self::Relief`] depends on the scanned relief alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -25,19 +25,18 @@ pub enum ThresholdMetric {
     /// `D(t)`. This is SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is
     /// the maximum.
     NlSsim,
-    /// Minimizes `|a(D(t)) / a(P') - 1|`, where `a` counts pixels. Strokes without ink (`s <= -3`) do not count, nor
-    /// does ink without strokes (lower than the deepest threshold). The paper's method minimizes `|d(D(t)) - d(P)|`,
-    /// where `d` is a mask's share of the canvas. The score is minus the minimum.
+    /// Minimizes `|a(D(t)) / a(P') - 1|`, where `a` counts pixels. Strokes far from any ink (`s <= -3`) and ink below
+    /// the deepest threshold are left out. The paper's method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share
+    /// of the canvas. The score is minus the minimum.
     Density,
-    /// Maximizes `sum over D(t) of w / sum of max(w, 0) - 0.05 ln(d / d_r)^2`, where `w` is `s`, clamped to -1..=1, and
+    /// Maximizes `sum over D(t) of w / sum of max(w, 0) - 0.05 ln(d / d_r)^2`, where `w` is `s` clamped to -1..=1, and
     /// `d_r` is the depth of [`Self::Relief`]. The score is the maximum. The first term is 1 if the strokes cover all
-    /// ink and no paper. Ink whose strokes are lost on the block adds the same at every depth. The paper's method
-    /// instead uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the registered masks.
+    /// ink and no paper. The paper's method uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of
+    /// the registered masks.
     Ensemble,
-    /// The depth at which the stroke tops end and the walls begin, as a share of the relief, from the heights alone.
-    /// There, the mean steepness of the relief reaches `g_w^0.78 g_t^0.22`, where `g_w` is the steepness of the walls
-    /// and `g_t` that of the flattest tops, at least `0.05 g_w`. The depth is at most 0.4. There is no score (0). Not
-    /// part of the paper's method.
+    /// Selects the depth at which the stroke tops end and the walls begin. It is the smallest depth at which the mean
+    /// steepness of the relief reaches `g_w^0.78 max(g_t, 0.05 g_w)^0.22`, where `g_w` is the steepness of the walls
+    /// and `g_t` that of the flattest tops. The score is always 0. Not part of the paper's method.
     Relief,
 }
 

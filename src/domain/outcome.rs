@@ -35,8 +35,8 @@ pub struct SideEvidence {
     /// are no faces, and under the paper's method.
     pub winding: Option<f64>,
     /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
-    /// stores `|a - b| / (a + b)` instead. For each side, `a` or `b` is the mean distance of the side's points from
-    /// their centroid.
+    /// stores `|a - b| / (a + b)` instead, where `a` and `b` measure the two sides: the mean distance of a side's
+    /// points from their centroid.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,
@@ -240,8 +240,9 @@ pub struct PoseFeatures {
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, divided by the score of the best pose.
     pub mirrored: f64,
-    /// Sensitivity of the pose to its start. The pose is refined from three starts with slightly different sizes. This
-    /// is the largest distance from the best result to another, as a share of the depth map's longest side.
+    /// Sensitivity of the pose to its start. The pose is refined from three starts with slightly different sizes. Two
+    /// results differ by the mean distance between their depth-map corners. This is the largest difference from the
+    /// best result, as a share of the map's longest side.
     #[serde(default)]
     pub spread: f64,
 }

@@ -95,7 +95,7 @@ impl Checkpointer {
     pub(super) async fn finish(self, end: PairEnd) -> PairReport {
         let context = Arc::clone(&self.context);
         let settled = if end == PairEnd::Done {
-            // No slot waits for this pair, so its commit may be delayed and shared with other pairs.
+            // Nothing waits for the last stages of this pair, so their commit may be delayed.
             drop(self.stages);
             task_result(self.task.await)
         } else {

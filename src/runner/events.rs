@@ -53,7 +53,7 @@ pub enum RunEvent {
         /// Class and message.
         #[serde(flatten)]
         failure: Failure,
-        /// Number of the pair's stages that will not run, including the failed one. Progress bars advance by it.
+        /// Number of the pair's stages that will not complete, including the failed one. For progress bars.
         skipped: u64,
     },
     /// A stage failed in a way that may pass; it is retried later.

@@ -62,7 +62,7 @@ const VERSION_2: GroupFiles = GroupFiles {
 };
 
 impl MemoryGroup {
-    /// Finds the group that limits this process. Uses version 1 if it controls memory, otherwise version 2.
+    /// Finds the group that limits this process. Uses cgroup version 1 if it controls memory, otherwise version 2.
     fn of_this_process(root: &Path) -> Option<Self> {
         let groups = std::fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
         let mounts = std::fs::read_to_string(root.join("proc/self/mountinfo")).ok()?;

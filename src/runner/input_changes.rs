@@ -43,8 +43,8 @@ pub(super) async fn store_changes(
     Ok(())
 }
 
-/// Stores the current versions of the input files of pairs that were quarantined because their workers died. Stores
-/// only versions that no stage has reported. Later runs compare the files with the stored versions.
+/// For each pair that was quarantined because its workers died or hung, hashes the input files that no stage has read,
+/// and stores their versions. A later run compares the files with these versions.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
@@ -131,7 +131,7 @@ impl ReadItem for CurrentInput {
     }
 }
 
-/// Returns the current versions of the input files that no stage has reported.
+/// Returns the current version of each input file without a known version.
 fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
     let current = |known: Option<&InputVersion>, stored: &str| match known {
         Some(_) => None,
@@ -152,8 +152,8 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
     (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// Returns the current version of a file if it may differ from the known version. A missing file counts as changed if
-/// an import has changed its path since the last read. If the path is the same, earlier results stay valid.
+/// Returns the current version of a file if it may differ from the known version. A missing file counts as changed only
+/// if an import has changed its path since the last read.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);

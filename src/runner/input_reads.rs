@@ -18,7 +18,7 @@ const MAX_HANGING: usize = 64;
 /// A file that takes longer than this is named to the user.
 const SLOW: Duration = Duration::from_secs(10);
 
-/// Conditions that end waiting for a read. The thread of an abandoned read stays until the read returns.
+/// Conditions under which a read is abandoned. Its thread stays until the system call returns.
 #[derive(Debug, Clone)]
 pub(super) struct ReadLimits {
     /// Longest time for one item.
@@ -104,8 +104,8 @@ struct Readers<T: ReadItem> {
 }
 
 impl<T: ReadItem> Readers<T> {
-    /// Starts a thread that reads items until the queue is empty. If no thread can start, `PendingReads` gives the
-    /// items up.
+    /// Starts a thread that reads items until the queue is empty. If no thread can start, `PendingReads::check` ends
+    /// the wait.
     fn start_thread(&self) {
         let (queue, sender) = (Arc::clone(&self.queue), self.sender.clone());
         let work = move || {
@@ -186,7 +186,7 @@ impl PendingReads {
         self.oldest() + wait
     }
 
-    /// Reports the first slow read and every overdue one. Returns how many are overdue since the last call.
+    /// Reports the first slow read and every overdue one. Returns how many became overdue since the last call.
     fn check(&mut self, path_of: impl Fn(usize) -> PathBuf) -> usize {
         let (now, timeout) = (Instant::now(), self.timeout);
         if self.started.is_empty() {

@@ -11,8 +11,8 @@ use crate::store::{Project, open_regular};
 /// Bytes reserved for the maps and masks of each pair, in addition to the memory for its mesh and print.
 pub(super) const PAIR_BYTES: u64 = 32 << 20;
 /// Bytes needed per byte of a mesh file, including the file's content. Measured with one to two million vertices:
-/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5. For OBJ it is 1.8, or 5.7 with normals or
-/// texture coordinates.
+/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, point clouds 2.5. For OBJ it is 1.8, or 5.7 with
+/// normals or texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
 /// Bytes needed per pixel of a print. Measured: 32 to 39, with grey and colour images of 10 and 28 million pixels.
@@ -39,8 +39,8 @@ impl MemoryBudget {
         self.limit.is_some()
     }
 
-    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. If nothing is reserved, a pair may
-    /// exceed the limit. In that case no other pair fits beside it.
+    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. A pair that needs more than the limit
+    /// is accepted if nothing else is reserved.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);

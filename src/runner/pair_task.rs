@@ -149,7 +149,7 @@ async fn store_failure(
     pair: PairSummary,
     failed: FailedStage,
 ) -> Result<PairEnd, RunError> {
-    // If the project was renamed, its inputs seem to be missing. That is no failure of the pair.
+    // If the project directory was renamed, end the run instead of failing the pair for missing inputs.
     let project = context.project.clone();
     run_blocking(move || project.check_in_place()).await?;
     let inputs = match failed.inputs {
@@ -203,8 +203,8 @@ async fn store_failure(
     Ok(PairEnd::Retry)
 }
 
-/// Data of a pair that is stored with a failure. The task keeps this copy, because the thread's data is lost if the
-/// thread hangs or panics.
+/// Data that is stored if the pair fails. The task keeps this copy, because the thread's data is lost if the thread
+/// hangs or panics.
 struct PairSummary {
     attributes: PairAttributes,
     attributes_json: String,

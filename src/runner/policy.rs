@@ -59,9 +59,9 @@ pub(super) const fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Intervals of heartbeats and recovery. Every worker uses the same lease length, so it knows when others may consider
-/// it dead. Each measures time with its own clock. The pairs of a dead worker are ready again within a minute: one
-/// lease and two recovery intervals.
+/// Intervals of heartbeats and recovery. All workers use the same lease length, so each worker knows when others may
+/// consider it dead. Every worker measures time with its own clock. The pairs of a dead worker are ready again within a
+/// minute: one lease and two recovery intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timing {
     /// Interval between heartbeats.
@@ -70,7 +70,7 @@ pub(super) struct Timing {
     pub(super) lease: Duration,
     /// Interval between searches for dead workers.
     pub(super) recover_every: Duration,
-    /// A living worker loses a lease if it sends a heartbeat more than this time after the lease's deadline.
+    /// A living worker loses a lease if it still sends heartbeats this long after the lease's deadline.
     pub(super) deadline_margin: Duration,
 }
 

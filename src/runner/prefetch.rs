@@ -18,7 +18,7 @@ use crate::domain::{PairName, Stage, WorkerId};
 use crate::raster;
 use crate::store::Project;
 
-/// How much work is claimed ahead for each slot, as computing time. One claim then serves several short pairs.
+/// Each slot gets as many extra pairs as it is expected to compute in this time. This saves claims if pairs are short.
 const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;
@@ -205,8 +205,8 @@ impl Prefetch {
         exclusive: bool,
     ) -> Result<(), RunError> {
         let context = &self.context;
-        // If more pairs are claimed than slots are free, some pairs first wait for another pair's last stage. Their
-        // deadline is therefore one stage timeout later.
+        // If more pairs are claimed than slots are free, some pairs first wait for another pair's last stage. Every
+        // deadline of this claim is therefore extended by one stage timeout.
         let wait = if count > self.free_slots() {
             context.stage_timeout.as_millis() as i64
         } else {
@@ -231,8 +231,8 @@ impl Prefetch {
         Ok(())
     }
 
-    /// Adds memory estimates, for which the headers of print images are read. If reading a pair's files takes too long,
-    /// the files count as empty.
+    /// Adds a memory estimate to each pair. Reads the headers of the print images. If this takes too long for a pair,
+    /// its files count as empty.
     async fn estimate(&self, leased: impl Iterator<Item = (Lease, PairWork)>) -> Vec<LeasedPair> {
         let leased: Vec<_> = leased.collect();
         let estimates = if self.memory.is_limited() {
@@ -329,7 +329,7 @@ impl DurationEstimate {
         self.mean = Some(self.mean.map_or(elapsed, |mean| (mean * 3 + elapsed) / 4));
     }
 
-    /// Ends claiming ahead. If memory is short, pairs claimed ahead would have to be released again.
+    /// Ends claiming ahead. Called if memory is short, because the pairs would have to be released again.
     const fn disable(&mut self) {
         self.is_disabled = true;
     }

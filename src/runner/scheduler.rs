@@ -145,7 +145,7 @@ impl Scheduler {
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
-    /// Starts leased pairs while slots and memory are free and the disk keeps up.
+    /// Starts leased pairs while slots and memory are free and fewer than `max_storing` pairs are being stored.
     async fn start_pairs(&mut self) -> Result<(), RunError> {
         while self.storing.len() < self.max_storing
             && let Some((slot, pair)) = self.prefetch.next_pair().await?

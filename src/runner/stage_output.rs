@@ -105,7 +105,7 @@ pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     ContentHash::of(result.to_string().as_bytes())
 }
 
-/// Adds a hash to each metric. It covers the numbers and images that a reviewer sees, and verdicts refer to it.
+/// Adds a hash to each metric. The hash covers the numbers and images that a reviewer sees. Verdicts refer to it.
 pub fn metric_results(
     metrics: &[MetricOutcome],
     files: &ArtifactSet,

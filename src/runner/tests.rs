@@ -18,7 +18,7 @@ use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
-/// A project with pairs that only a fake executor can run, and the events of its runs.
+/// A project whose pairs only the fake executor can run, and the events of all runs.
 struct RunFixture {
     project: Project,
     catalog: Catalog,

@@ -87,7 +87,7 @@ async fn finished_stages_are_stored_while_a_long_stage_is_computed() {
     assert_eq!((summary.done, summary.stages), (1, 4));
 }
 
-/// Shorter than the interval between heartbeats, because a heartbeat ends the delay of commits.
+/// This timeout is shorter than the heartbeat interval, because a heartbeat ends the delay of commits.
 const SOON: Duration = Duration::from_secs(8);
 
 #[tokio::test]
@@ -182,7 +182,7 @@ async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
     assert_eq!(summary.done, 5);
 }
 
-/// A pair claimed ahead has one more stage timeout until its deadline, because it first waits for a slot.
+/// A pair claimed ahead has one stage timeout more until its deadline, because it first waits for a slot.
 #[tokio::test]
 async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     let fixture = RunFixture::new(&["lasts_1", "next"]).await;
@@ -279,13 +279,13 @@ async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
     };
     let take_leases = async {
         tasks(2).await;
-        // As after a suspension, the pairs are ready again and the process does not know it.
+        // The process does not notice that its pairs are ready again, as after the machine was suspended.
         for pair in [PairId(1), PairId(2)] {
             let lease = first_lease(pair);
             fixture.catalog.release(lease).await.expect("released");
         }
         tasks(3).await;
-        // A fourth task must not start: there is no event to wait for, only the next polls.
+        // A fourth task must not start. No event shows this, so let the scheduler poll for a second.
         let fourth = timeout(Duration::from_secs(1), tasks(4)).await;
         fixture.executor.open();
         fourth
