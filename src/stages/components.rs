@@ -118,7 +118,7 @@ fn row_runs(row: &[bool]) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Returns the first run of the component of run `k`. Shortens the path to the first run.
+/// Returns the first run of the component of run `k`, with path halving.
 fn find_root(runs: &mut [Run], mut k: usize) -> usize {
     while runs[k].root != k {
         runs[k].root = runs[runs[k].root].root;

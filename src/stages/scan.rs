@@ -19,7 +19,7 @@ impl Scan {
         &self.mesh
     }
 
-    /// Returns the faces, or the points, that lie in a region with all their corners.
+    /// Returns the faces with all corners in a region. For a mesh without faces, returns the points in the region.
     pub(super) fn mesh_in(&self, region: &ScanRegion) -> Mesh {
         part_of(&self.mesh, |corner| region.contains(corner))
     }
@@ -39,8 +39,7 @@ impl From<Mesh> for Scan {
     }
 }
 
-/// Returns the faces whose corners are all kept, with these corners. Of a mesh without faces, returns the points that
-/// are kept.
+/// Returns the faces with only corners that `keeps` accepts. For a mesh without faces, returns the accepted points.
 pub(super) fn part_of(mesh: &Mesh, keeps: impl Fn([f64; 3]) -> bool) -> Mesh {
     let kept: Vec<bool> = mesh.vertices.iter().map(keeps).collect();
     let faces = mesh.triangles.iter().copied();

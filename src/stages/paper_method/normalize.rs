@@ -1,8 +1,8 @@
 //! The paper's normalization (III-C): scales both images to one size by their bounding boxes, before the rotation is
 //! known, and searches for a grey threshold on the scaled images.
 //!
-//! If the text leaves a choice open, the authors' program decides. Depths become greys: the nearest 1 % of the pixels
-//! are at most 49 (dark), the nearest 95 % at most 201. Each threshold is tried at four rotations by 90 degrees.
+//! If the text leaves a choice open, the authors' program decides. Depths become greys, the nearest the darkest: 1 % of
+//! the pixels get at most 49, and 95 % get at most 201. Each threshold is tried at four rotations by 90 degrees.
 
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};

@@ -28,8 +28,8 @@ struct Turn {
     iou: f64,
 }
 
-/// Registers the structure and the density mask. Uses the alignment with the higher IoU for the ensemble. Scores all
-/// three alignments.
+/// Registers the masks of the structure and the density threshold. Uses the alignment with the higher IoU for the
+/// ensemble. Scores all three alignments.
 ///
 /// # Errors
 /// Returns an error if normalization chose no threshold or a mask is empty.
@@ -109,7 +109,7 @@ fn longest_side(mask: &Mask) -> Option<f64> {
     Some(mask.bounding_box()?.longest_side() as f64)
 }
 
-/// A depth mask that is wrapped again after each rotation, because a rotation changes the bounding box.
+/// A depth mask that is scaled and centred again after each rotation, because a rotation changes the bounding box.
 struct Turner {
     /// Set pixels of the depth mask.
     points: Vec<[f64; 2]>,

@@ -22,7 +22,7 @@ const MAX_BORDER_SHARE: f64 = 0.5;
 /// Width of the band that is masked along the border, as a share of the level's longest side.
 const BORDER_BAND: f64 = 0.1;
 /// The border strokes of two levels agree if their overlap is at least this share of the overlap of all other pixels.
-/// To compute an overlap, the smaller amounts of all pixels are summed and divided by the sum of the larger amounts.
+/// An overlap is the sum of each pixel's smaller amount, divided by the sum of each pixel's larger amount.
 const MIN_RELATIVE_OVERLAP: f64 = 0.75;
 
 /// Returns the valid mask of a level: 1 where it is known and not masked near the border, 0 elsewhere.

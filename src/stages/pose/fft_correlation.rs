@@ -119,8 +119,8 @@ impl FftCorrelator {
     }
 }
 
-/// Returns the FFT of length [`FFT_SIZE`], with AVX if the processor has it. The general planner would compile every
-/// algorithm of the library into this crate.
+/// Returns the FFT of length [`FFT_SIZE`], with AVX if the processor has it. `FftPlanner` is not used, because it would
+/// compile every algorithm of the library into this crate.
 fn fft(direction: FftDirection) -> Arc<dyn Fft<f32>> {
     match FftPlannerAvx::new() {
         Ok(mut planner) => planner.plan_fft(FFT_SIZE, direction),

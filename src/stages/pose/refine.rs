@@ -164,8 +164,8 @@ impl<'a> Refiner<'a> {
         self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
     }
 
-    /// Converts a map between image pixels to its inverse between working pixels. Positions in the fixed level are
-    /// relative to its centre. Returns `None` if the map has no inverse.
+    /// Inverts a map between image pixels, and converts it to working pixels. Positions in the fixed level are relative
+    /// to its centre. Returns `None` if the map has no inverse.
     fn moving_from_fixed(&self, fixed_from_moving: &Affine2) -> Option<Affine2> {
         let image = fixed_from_moving.inverse()?;
         let from_work = self.fixed.work_from_image.inverse()?;

@@ -3,8 +3,8 @@
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use crate::simd::{max_f32, min_f32};
 
-/// Boxes are enlarged by this share of a length: the extent of the surface, plus half the side of the box, plus its
-/// distance from the origin. This exceeds rounding errors, so no corner is outside its box.
+/// A box is enlarged by this share of the sum of three lengths: the extent of the surface, half the side of the box,
+/// and the distance of its centre from the origin. This exceeds rounding errors, so no corner is outside its box.
 const MARGIN: f32 = 2e-6;
 
 /// Boxes of [`LANES`] blocks, one per lane. Each box is stored as its centre and half its sides, in x, y and z.

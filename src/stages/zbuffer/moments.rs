@@ -134,7 +134,7 @@ mod tests {
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// Computes the moments for comparison: cuts each triangle into small ones, and weights their centroids by area.
+    /// Computes reference moments: cuts each triangle into small ones, and weights their centroids by area.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {

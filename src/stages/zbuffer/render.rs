@@ -13,7 +13,8 @@ use crate::stages::robust_bounds::bulk_along;
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
-/// If there are more triangles per pixel than this, `fill_sparse_blocks` is used: few blocks contain a pixel centre.
+/// If there are more triangles per pixel than this, few blocks contain a pixel centre, and `fill_sparse_blocks` is
+/// used.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
 /// Each point is drawn as a square. Its side is this multiple of the mean point spacing, so the squares leave no holes.

@@ -162,7 +162,8 @@ impl IndexedSurface {
     }
 }
 
-/// Returns twice the signed area of each triangle, projected along the normal: negative if it faces away.
+/// Returns twice the signed area of each triangle, projected along the normal. A triangle that faces away has a
+/// negative area.
 fn facing(
     [x, y, z]: [f32; 3],
     a: &[LaneArray; 3],

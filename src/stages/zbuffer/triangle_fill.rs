@@ -50,7 +50,7 @@ pub(super) fn fill_triangle(
     }
 }
 
-/// Returns the columns of a row to test: in a wide triangle, the columns between the edges and one more at each end.
+/// Returns the columns to test in a row. In a wide triangle, these lie between the edges, or one column beyond.
 #[inline(always)]
 fn clip_columns(
     columns: &std::ops::Range<usize>,

@@ -17,7 +17,8 @@ pub(crate) struct Viewport {
 }
 
 impl Viewport {
-    /// Returns a viewport around `bounds`. Its longest side has `longest_px` pixels, and one pixel at each end is free.
+    /// Returns a viewport around `bounds` with `longest_px` pixels along the longest side. One pixel at each end is
+    /// free.
     ///
     /// The viewport is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays.
     /// `mirrored` reflects x, so that mirror writing reads correctly. y points down in both cases.
