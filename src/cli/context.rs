@@ -19,7 +19,7 @@ use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
 
-/// Maximum number of characters of a line in warnings and errors. The longest path that can exist has 4,096 bytes.
+/// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
 
 /// The global flags and the state derived from them.
@@ -53,7 +53,7 @@ impl Context {
         context
     }
 
-    /// Returns the same context without `--config` and `--set`, because the project's file contains their settings.
+    /// Returns a copy without `--config` and `--set`, for use after their settings were saved in the project's file.
     pub(super) fn without_setting_flags(&self) -> Self {
         let mut context = self.clone();
         context.global.config = None;

@@ -246,8 +246,8 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     Ok(context.without_setting_flags())
 }
 
-/// Formats the settings of a preset, a file or flags as a settings file. Settings from environment variables are left
-/// out, because the environment does not belong to the project.
+/// Formats the settings that come from a preset, a file or flags as a settings file. Leaves out settings from
+/// environment variables, because the environment does not belong to the project.
 fn changed_settings(tree: &Tree) -> String {
     let mut preset = "";
     let mut changed = Vec::new();

@@ -73,8 +73,8 @@ fn max_open_files() -> u64 {
     getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
 }
 
-/// Returns whether a command failed because it may not open more files. `SQLite` does not say why it cannot open a
-/// file, so a low limit counts as the reason.
+/// Returns whether a command failed because its limit of open files is reached. `SQLite` does not say why it cannot
+/// open a file. In that case, a limit below `FILES_NEEDED` counts as the reason.
 fn is_out_of_files(error: &anyhow::Error) -> bool {
     let mut system_errors = error
         .chain()

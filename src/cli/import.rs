@@ -103,7 +103,7 @@ struct ImportList {
     truths: Vec<(PairName, Value)>,
 }
 
-/// What an import changed, the number of true alignments stored, and a line per missing file.
+/// The summary of an import, the number of stored true alignments, and a message for each missing file.
 type StoredList = (ImportSummary, u64, Vec<String>);
 
 /// Returns the missing directories of a path, the deepest first.
@@ -134,7 +134,7 @@ async fn store(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<Stor
     stored
 }
 
-/// Begins a catalog if the project has none. Tries again if another import that failed removes the directory meanwhile.
+/// Begins a catalog if the project has none. Tries again if a failing import removes the project directory meanwhile.
 async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
     const ATTEMPTS: usize = 20;
     for _ in 1..ATTEMPTS {
@@ -161,7 +161,7 @@ async fn store_in(
     let (project, shared) = (project.clone(), Arc::clone(list));
     let sent = tokio::task::spawn_blocking(move || send_rows(&shared.listing, &project, &sender));
     let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
-    // If a row fails, the catalog only reports that the list ended early, so the row's error is returned first.
+    // Return a row's error first, because the catalog then only reports that the list ended early.
     let missing = sent
         .await
         .context("the task that reads the list stopped")??;

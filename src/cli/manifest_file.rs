@@ -8,7 +8,7 @@ use super::files;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
-/// Valid pairs to import. For a manifest file, only its text is kept; the rows are parsed again when they are needed.
+/// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]
 pub(super) struct Listing {
     source: ListingSource,
@@ -107,7 +107,7 @@ impl Listing {
         })
     }
 
-    /// Calls `each` for every row, with a message for each missing file. Paths include the manifest's directory.
+    /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
     pub(super) fn rows(&self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
         let mut each = |row: ManifestRow| {
             let missing = missing_files(&self.row_label, &row);

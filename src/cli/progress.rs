@@ -34,7 +34,7 @@ enum Display {
 
 /// Time after which the next event prints a plain line.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
-/// Percentage points of progress after which a plain line is printed before `PLAIN_INTERVAL` is over.
+/// After this many percentage points of progress, a plain line is printed before `PLAIN_INTERVAL` is over.
 const PLAIN_PERCENT: u64 = 5;
 /// Shortest time between two plain lines.
 const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);

@@ -110,8 +110,8 @@ impl Palette {
     /// Never any colour.
     pub(super) const PLAIN: Self = Self { on: false };
 
-    /// Returns the palette for one stream. `--color always` and `--color never` decide alone. With `auto`, text has
-    /// colours on a terminal unless `NO_COLOR` is set or `TERM` is `dumb`.
+    /// Returns the palette for one stream. With `--color auto`, text has colours only on a terminal, and only if
+    /// `NO_COLOR` is not set and `TERM` is not `dumb`.
     pub(super) fn choose(when: ColorChoice, is_terminal: bool) -> Self {
         let on = match when {
             ColorChoice::Always => true,

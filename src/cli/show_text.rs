@@ -254,7 +254,7 @@ fn verdicts(record: &MetricRecord) -> String {
 pub(super) struct ManualResult {
     #[serde(flatten)]
     pub(super) stored: StoredAlignment,
-    /// Difference from the automatic result. `None` if there is no such result, or if the depth map has changed.
+    /// Difference from the automatic result. `None` if there is no automatic result, or if the depth map has changed.
     pub(super) adjustment: Option<Adjustment>,
 }
 

@@ -137,7 +137,7 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> RefusedLine {
     RefusedLine::new(line, &reason)
 }
 
-/// A line written by `verdict log --json` or an export. Other fields are ignored.
+/// A line written by `verdict log --json` or an export. Unknown fields are ignored.
 #[derive(Debug, Deserialize)]
 struct VerdictLine {
     #[serde(flatten)]

@@ -176,10 +176,10 @@ impl Project {
         Ok(())
     }
 
-    /// Removes the folder of temporary files, which killed processes leave. No process may write artifacts meanwhile.
+    /// Removes the temporary files of killed processes. No process may write artifacts during this call.
     ///
     /// # Errors
-    /// Returns an error if the folder exists and cannot be removed.
+    /// Returns an error if their folder exists and cannot be removed.
     pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         match std::fs::remove_dir_all(&folder) {
@@ -231,7 +231,7 @@ impl Project {
             let number = NEXT.fetch_add(1, Ordering::Relaxed);
             let temporary = folder.join(format!("{}-{number}", std::process::id()));
             match write_synced(&temporary, bytes) {
-                // A process with the same pid has this file: it died, or works in another container.
+                // A dead process, or one in another container, had the same pid and created this file.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 written => break (temporary, written),
             }

@@ -14,7 +14,7 @@ use super::Project;
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// Number of attempts to get the exclusive lock. [`RunLock::is_held`] in another process may hold it for a moment.
+/// Attempts to get the exclusive lock. [`RunLock::is_held`] of another process may hold the lock for a moment.
 const ATTEMPTS: u32 = 20;
 const RETRY_AFTER: Duration = Duration::from_millis(5);
 
@@ -136,7 +136,7 @@ impl RunLock {
     }
 }
 
-/// Tries to lock the file exclusively. Repeats the attempt because [`RunLock::is_held`] may hold the lock for a moment.
+/// Tries to lock the file exclusively. Repeats the attempt, because [`RunLock::is_held`] takes the lock for a moment.
 fn try_exclusive(members: &File) -> bool {
     for _ in 0..ATTEMPTS {
         if members.try_lock().is_ok() {

@@ -53,7 +53,7 @@ impl LockFile {
         attempt(OpenOptions::new().read(true).write(true), path)
     }
 
-    /// Removes the file and ends the lock. Another process that waits for this file notices the removal.
+    /// Removes the file and ends the lock. A process that has already opened the file notices the removal.
     ///
     /// # Errors
     /// Returns an error if the file cannot be removed.

@@ -16,7 +16,7 @@ const ARTIFACTS: &str = "artifacts";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Project {
     dir: PathBuf,
-    /// Device and inode of the directory when it was opened; `None` if it may not exist yet.
+    /// Device and inode of the directory when it was opened. `None` if the project may not exist yet.
     identity: Option<(u64, u64)>,
 }
 

@@ -11,7 +11,7 @@ use super::target_lock::{TargetLock, TargetLockError};
 
 /// The new content in the staging folder.
 const NEW: &str = "new";
-/// The earlier content in the staging folder, on file systems that cannot exchange two folders.
+/// The earlier content in the staging folder. Only used if the file system cannot exchange two folders.
 const EARLIER: &str = "earlier";
 
 /// A folder that is filled next to its target and then replaces the target. It is removed if it is dropped unfinished.
@@ -48,7 +48,7 @@ pub enum ReplaceError {
         /// Why.
         source: io::Error,
     },
-    /// The target could not be replaced, nor the earlier content be moved back.
+    /// The target could not be replaced, and its earlier content could not be moved back.
     #[error(
         "{path}: {source}; the earlier folder is {earlier}, and the next call of this command restores it"
     )]
@@ -62,7 +62,7 @@ pub enum ReplaceError {
     },
 }
 
-/// What finishing left on the disk: the path of the earlier content, and why it was not removed.
+/// A staging folder that `ReplacementFolder::finish` could not remove, with the reason.
 pub type Leftover = Option<(PathBuf, io::Error)>;
 
 impl ReplacementFolder {
@@ -106,8 +106,8 @@ impl ReplacementFolder {
     /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be synced or renamed. An earlier folder is then kept, except if only the new
-    /// name's durability is unknown. `ReplaceError::Displaced` names the earlier folder if it has no longer its path.
+    /// Returns an error if the folder cannot be synced or renamed. The target is then unchanged, with two exceptions:
+    /// after `NotDurable` it is already replaced, and `Displaced` names the path of its earlier content.
     pub fn finish(self) -> Result<Leftover, ReplaceError> {
         let Self {
             target,

@@ -73,7 +73,7 @@ impl StagingFolder {
         Err(Error::other(text))
     }
 
-    /// Returns the folders of dead processes that wrote this output. They are removed when they are dropped.
+    /// Returns the folders of dead processes that wrote this output. Dropping a folder removes it from the disk.
     pub(super) fn stale(target: &Path) -> Vec<Self> {
         let Ok(entries) = fs::read_dir(parent_folder(target)) else {
             return Vec::new();
@@ -99,7 +99,7 @@ impl StagingFolder {
                 is_kept: false,
             }),
             Err(error) if error.kind() == ErrorKind::NotFound => {
-                // The folder is empty: its process died, or has not created the lock yet and tries another name.
+                // The folder has no lock file: its process died, or is just starting and will then try another name.
                 let _ = fs::remove_dir(&dir);
                 None
             }

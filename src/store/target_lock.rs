@@ -37,8 +37,7 @@ pub enum TargetLockError {
 }
 
 impl TargetLock {
-    /// Acquires the right to replace an output, which need not exist. The lock file is a hidden file next to the
-    /// output.
+    /// Acquires the right to replace an output by locking a hidden file next to it. The output need not exist.
     ///
     /// # Errors
     /// Returns an error if another process has the lock, or the lock file cannot be used.
@@ -61,7 +60,7 @@ impl TargetLock {
 impl Drop for TargetLock {
     fn drop(&mut self) {
         if let Some(lock) = self.lock.take() {
-            // A lock file that cannot be removed is not locked any more, so the next command uses it again.
+            // If the file cannot be removed, its lock still ends, so the next command can lock it again.
             let _ = lock.remove();
         }
     }
