@@ -8,9 +8,9 @@ use super::AlignedPair;
 use super::testing::{SyntheticSheet, print, settings, some_turn};
 use crate::raster::{Grid, decode_grey8, png_grey8};
 
-/// A pixel may differ by this much of 255 ...
+/// Largest difference between matching pixels, on a scale of 0 to 255.
 const TOLERANCE: u8 = 12;
-/// ... and this share of the pixels by more.
+/// Share of pixels that may differ by more than `TOLERANCE`.
 const OTHERS: f64 = 0.01;
 
 fn hold(name: &str, got: &Grid<u8>) {

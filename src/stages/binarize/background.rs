@@ -21,8 +21,7 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
     };
-    // The grid of cells is centred on the known area, so neither a rotation by a right angle nor a wider margin changes
-    // it.
+    // The grid of cells is centred on the known area, so right-angle rotations and wider margins do not change it.
     let lengths = [bounds.width(), bounds.height()];
     let longest = lengths[0].max(lengths[1]) as f64;
     let scale = (CELLS / longest).min(1.0);

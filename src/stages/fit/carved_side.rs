@@ -23,8 +23,7 @@ const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 14.0;
 /// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
-/// If the likelier side reaches this agreement with the print, the other side is not measured. The highest agreement of
-/// 500 backs was 0.55.
+/// If the likelier side has this agreement with the print, the other side is not measured. 500 backs had at most 0.55.
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;
@@ -138,8 +137,7 @@ fn log_odds(
     SideOdds { odds, agreements }
 }
 
-/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief. Heights far below the
-/// surface are left out.
+/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief.
 fn layer_width(side: &FittedSide) -> f64 {
     let mut upper = side.samples.residuals(&side.surface);
     upper.retain(|r| *r > -0.4 * side.relief);

@@ -26,8 +26,7 @@ const THICKNESS: f64 = 1.6;
 /// A smaller share of the faces is no block.
 const LEAST_PART: f64 = 0.02;
 
-/// Returns the parts that may be the block: first the scan without debris, then what lies on each large plane of the
-/// scan.
+/// Returns the parts that may be the block: first the scan without debris, then the part above each large plane.
 pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     let whole = without_debris(mesh, indexed);
     let all = facets(&whole);
@@ -45,9 +44,8 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     parts
 }
 
-/// Finds the plane, with about this normal, on which the rest of the scan stands. Returns its normal, which points to
-/// the rest, and the height above which the rest lies. Returns `None` if the plane is small, or if the rest lies on
-/// both sides.
+/// Finds the plane, with about this normal, on which the rest of the scan stands. Returns its normal, towards the rest,
+/// and the height above which the rest lies. Returns `None` if the plane is small or the rest lies on both sides.
 fn support(facets: &[Facet], normal: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let total: f64 = facets.iter().map(|facet| facet.area).sum();
     let (layer, centre) = fullest_layer(facets, &normal)?;

@@ -289,8 +289,7 @@ impl HeightSamples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Returns an image of the nearness to the surface: 1 on or above the surface, falling to 0 at half the relief
-    /// below it.
+    /// Returns an image of the nearness to the surface: 1 on or above it, falling to 0 at half the relief below it.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {

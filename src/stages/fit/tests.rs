@@ -81,8 +81,7 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
     }
 }
 
-/// Adds a square grid of faces to a mesh. `at` maps two coordinates from -1 to 1 to a point of the sheet, in
-/// millimetres.
+/// Adds a square grid of faces to a mesh. `at` maps two coordinates from -1 to 1 to a sheet point in millimetres.
 fn add_patch(mesh: &mut Mesh, world: &SyntheticSheet, at: impl Fn(f64, f64) -> [f64; 3]) {
     const SIDE: u32 = 40;
     let first = mesh.vertices.len() as u32;

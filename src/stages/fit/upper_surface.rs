@@ -1,6 +1,6 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
-//! carved side is then fitted again at a finer one. If this side does not resemble the print, all other sides and parts
-//! of the scan are tried.
+//! carved side is then fitted again at a finer resolution. If this side does not resemble the print, all sides of all
+//! parts of the scan are tried.
 
 use super::carved_side::{self, SideInputs};
 use super::params::{FitError, FitParams};

@@ -20,7 +20,7 @@ use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
 
 /// Least agreement with the print at which a side is accepted. On generated scans, carved sides reached 0.65 to 0.93
-/// and other sides at most 0.51. With a dry print, or the print of another character, no side reaches this.
+/// and other sides at most 0.51.
 const LEAST: f64 = 0.58;
 /// Factor by which the agreement of a side must exceed the agreement of the usual side.
 const BETTER: f64 = 1.12;
@@ -56,8 +56,7 @@ struct JudgedSide {
     region: ScanRegion,
 }
 
-/// Returns the side that resembles the print best. Returns `None` if that side is not clearly better than the usual
-/// one.
+/// Returns the side that resembles the print best, or `None` if it is not clearly better than the usual side.
 pub(super) fn search(
     mesh: &Mesh,
     indexed: &IndexedSurface,
@@ -151,8 +150,8 @@ impl SideSearch<'_> {
         })
     }
 
-    /// Returns the carved sides of the middle of a flat scan, where the middle character of a grid lies. `share` is the
-    /// size of the middle, as a share of the width and the height.
+    /// Returns the carved sides of the middle of a flat scan, where the middle character of a grid lies. The middle has
+    /// `share` of the width and of the height.
     fn middle_of_grid(self, mesh: &Mesh, share: f64) -> Vec<JudgedSide> {
         let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
         let plane = tightest_frame(mesh, &axes);
@@ -193,8 +192,7 @@ fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     (near.vertices.len() >= 16).then_some(near)
 }
 
-/// Returns the frame in which the bounding box of the mesh has the smallest area in x and y. Its z is the least
-/// principal axis.
+/// Returns the frame whose z is the least axis and in which the bounding box of the mesh has the smallest area.
 fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
     let normal = axes.normal();
     let level = frame(normal, axes.centre);

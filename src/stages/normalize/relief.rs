@@ -26,8 +26,7 @@ const LOWERED_BY: f64 = 0.03;
 /// Measures the heights of tops and ground over the fitted surface. Returns `None` if no two sampled heights differ.
 ///
 /// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The top is the
-/// most frequent height near the upper class. The median of that class would be too low, because of worn rims and
-/// walls.
+/// most frequent height near the upper class, whose median would be too low because of worn rims and walls.
 pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
     let heights = |margin| heights(depth, bounds, margin);

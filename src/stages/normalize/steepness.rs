@@ -16,15 +16,13 @@ const REACH: f64 = 1.0 / 256.0;
 const WIDTH: usize = 7;
 /// Range of depths that holds the flattest tops.
 const TOPS: [f64; 2] = [-0.02, 0.06];
-/// Range of depths that holds only walls. The walls' steepness is the quantile `WALL_QUANTILE` over the bins of this
-/// range.
+/// Range of depths that holds only walls. Their steepness is the quantile `WALL_QUANTILE` over the bins of this range.
 const WALLS: [f64; 2] = [0.15, 0.6];
 const WALL_QUANTILE: f64 = 0.8;
 /// The tops end where the steepness reaches `walls^(1 - SHARE) * tops^SHARE`. Values from 0.2 to 0.25 are about equally
 /// accurate on generated reliefs of twelve kinds.
 const SHARE: f64 = 0.22;
-/// Smallest steepness of tops, as a share of the walls' steepness. Otherwise, perfectly flat tops would end at any
-/// slope.
+/// Smallest steepness of tops, as a share of the walls' steepness. Without it, flat tops would end at any slope.
 const FLATTEST: f64 = 0.05;
 /// Range of depths at which tops can end.
 const RANGE: [f64; 2] = [0.02, 0.4];

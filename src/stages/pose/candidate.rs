@@ -41,8 +41,7 @@ pub(crate) struct SearchRange {
 pub(crate) struct PoseCandidate {
     /// Maps moving image pixels to fixed image pixels. The map contains a reflection if `mirrored` is set.
     pub(crate) fixed_from_moving: Affine2,
-    /// Correlation of the high-pass filtered images where both are known, normalised by their energies. At most about
-    /// 1.
+    /// Normalised correlation of the high-pass filtered images where both are known. It is at most about 1.
     pub(crate) score: f64,
     /// Whether the moving image is mirrored.
     pub(crate) mirrored: bool,

@@ -116,8 +116,7 @@ impl Peak {
     }
 }
 
-/// Warps the values of a level into the square of the FFT. `turn` is a rotation in radians and a scale, both about the
-/// centre of the level.
+/// Warps a level into the square of the FFT. `turn` is a rotation in radians and a scale, both about the centre.
 fn warp_to_square(level: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let middle = (FFT_SIZE / 2) as f64;
     let [cx, cy] = level.centre();

@@ -95,8 +95,7 @@ fn distances(mask: &Mask) -> Grid<f32> {
     Grid::from_vec(width, height, all).expect("one distance per pixel")
 }
 
-/// Computes, for each pixel of a row, the smallest sum of a column's squared distance and the squared way to that
-/// column.
+/// Computes the squared distances of the pixels of a row, from the squared distances along the columns.
 #[inline(always)]
 fn nearest_in_row(padded: &[f32], nearest: &mut [f32]) {
     let width = nearest.len();

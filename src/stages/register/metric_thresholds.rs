@@ -14,11 +14,10 @@ use crate::stages::score::{SsimReference, SsimWindow};
 const CANDIDATES: u32 = 40;
 /// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// If a stroke pixel is farther than this from the corrected ink, in pixels of the half canvas, its ink is missing.
-/// `density` ignores such pixels.
+/// If a stroke pixel is farther than this from the corrected ink, its ink is missing, and `density` ignores it. The
+/// distance is in pixels of the half canvas.
 const MISSING_PX: f64 = 3.0;
-/// `ensemble` gives a pixel full weight if it is at least this far from the corrected edge of the ink, in pixels of the
-/// half canvas.
+/// `ensemble` gives full weight to pixels at least this far from the edge of the corrected ink, in half-canvas pixels.
 const FULL_PX: f64 = 1.0;
 /// Weight, in the score of `ensemble`, of the squared logarithm of a candidate's depth over the depth of `relief`.
 const PRIOR: f64 = 0.05;
@@ -123,8 +122,7 @@ fn candidate_levels(
     levels
 }
 
-/// Returns the number of pixels of corrected ink that the deepest candidate covers. Where other ink lies, the block has
-/// lost its strokes.
+/// Returns the number of pixels of corrected ink that the deepest candidate covers. Other ink has lost its strokes.
 fn carved_ink(canvas: &HalfCanvas, corrected: &Mask, deepest: u16) -> f64 {
     let both = corrected.data().iter().zip(canvas.levels.data());
     both.filter(|(ink, level)| **ink && **level >= deepest)

@@ -20,8 +20,7 @@ pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// One refiner for each threshold, which aligns the strokes at that threshold with the print's ink. The shallowest
-/// threshold comes first.
+/// One refiner for each threshold, the shallowest first. It aligns the strokes at the threshold with the print's ink.
 pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,

@@ -13,8 +13,7 @@ use crate::stages::robust_bounds::bulk_along;
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
-/// If there are more triangles per pixel than this, few blocks contain a pixel centre, and `fill_sparse_blocks` is
-/// used.
+/// Above this number of triangles per pixel, few blocks contain a pixel centre, and `fill_sparse_blocks` is used.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
 /// Each point is drawn as a square. Its side is this multiple of the mean point spacing, so the squares leave no holes.
@@ -96,8 +95,8 @@ impl IndexedSurface {
         });
     }
 
-    /// Fills the same blocks as [`Self::fill_every_block`]. This is faster if few blocks contain a pixel centre: such
-    /// blocks are too far apart for the hardware prefetcher, so a group of blocks is read before it is filled.
+    /// Fills the same blocks as [`Self::fill_every_block`]. This is faster if few blocks contain a pixel centre. The
+    /// hardware prefetcher does not fetch such distant blocks, so a group of them is read before it is filled.
     fn fill_sparse_blocks(
         &self,
         rows: &[AffineForm; 3],

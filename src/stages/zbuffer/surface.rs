@@ -162,8 +162,7 @@ impl IndexedSurface {
     }
 }
 
-/// Returns twice the signed area of each triangle, projected along the normal. A triangle that faces away has a
-/// negative area.
+/// Returns twice each triangle's signed area, projected along the normal. Triangles facing away have a negative area.
 fn facing(
     [x, y, z]: [f32; 3],
     a: &[LaneArray; 3],

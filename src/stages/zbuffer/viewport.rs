@@ -17,8 +17,7 @@ pub(crate) struct Viewport {
 }
 
 impl Viewport {
-    /// Returns a viewport around `bounds` with `longest_px` pixels along the longest side. One pixel at each end is
-    /// free.
+    /// Returns a viewport around `bounds` with `longest_px` pixels along the longest side. A pixel at each end is free.
     ///
     /// The viewport is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays.
     /// `mirrored` reflects x, so that mirror writing reads correctly. y points down in both cases.
