@@ -109,7 +109,7 @@ pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     Ok(cli)
 }
 
-/// Counts `-v`. Requires a command line that clap has accepted, because it assumes that no value starts with a dash.
+/// Counts `-v`. Only for a command line that clap has accepted: in such a line, no value starts with a dash.
 fn count_verbose(args: &[OsString]) -> u8 {
     let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
     let words = words.take_while(|word| *word != "--");

@@ -46,7 +46,7 @@ fn as_json(settings: &[Setting]) -> serde_json::Value {
     json!({"schema": 1, "settings": values})
 }
 
-/// Formats settings as a settings file. On request, comments give the origins and explanations.
+/// Formats settings as a settings file. On request, adds the origin and explanation of each setting as comments.
 pub(super) fn as_toml(settings: &[Setting], args: &ConfigShowArgs, palette: Palette) -> String {
     let longest = settings.iter().map(|setting| line(setting).len()).max();
     let mut lines = Vec::new();

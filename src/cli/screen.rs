@@ -111,7 +111,7 @@ impl Palette {
     pub(super) const PLAIN: Self = Self { on: false };
 
     /// Returns the palette for one stream. With `--color auto`, text has colours only on a terminal, and only if
-    /// `NO_COLOR` is not set and `TERM` is not `dumb`.
+    /// `NO_COLOR` is empty or unset and `TERM` is not `dumb`.
     pub(super) fn choose(when: ColorChoice, is_terminal: bool) -> Self {
         let on = match when {
             ColorChoice::Always => true,

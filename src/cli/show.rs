@@ -105,7 +105,7 @@ fn as_json(
     Ok(value)
 }
 
-/// Reads the manual alignments of a pair that were not undone, oldest first.
+/// Reads a pair's manual alignments, oldest first. Skips alignments that were undone.
 async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,

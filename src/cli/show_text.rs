@@ -35,7 +35,7 @@ fn section(
 }
 
 impl PairPage<'_> {
-    /// Formats everything except manual alignments, verdicts and the next run.
+    /// Formats the page without manual alignments, verdicts and what the next run would do.
     pub(super) fn text(&self) -> String {
         [
             self.attributes(),

@@ -1,6 +1,6 @@
 //! Stores the stages of one pair under its lease, in order. A separate task does this, so that the compute thread does
-//! not wait for the disk. The files of a stage are on the disk before its row is stored. Stages that arrive while an
-//! earlier one is being stored share a transaction. The task returns the lease at its end.
+//! not wait for the disk. The files of a stage are on the disk before the stage's row is stored. Stages that arrive
+//! during a transaction share the next transaction. At its end, the task returns the lease.
 
 use std::io;
 use std::sync::Arc;

@@ -29,7 +29,7 @@ pub(super) async fn store_changes(
             project: project.clone(),
             known,
         });
-        // Read the next page from the catalog while the files of this one are compared.
+        // Read the catalog's next page while the files of the current page are compared.
         let (changed, next) = tokio::join!(
             read_each(compared.collect(), limits),
             catalog.known_inputs(after, PAGE, among)

@@ -100,7 +100,7 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Records an event of a running pair. If the pair starts its last stage, its slot counts as free soon.
+    /// Records an event of a running pair. If the pair starts its last stage, its slot will soon be free.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
             && *stage == self.context.until

@@ -135,7 +135,7 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // This process has no other pair in progress. The catalog refuses the claim while another process has one.
+        // This process has no pair in progress. If another process has one, the catalog refuses the claim.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {

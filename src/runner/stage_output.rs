@@ -90,8 +90,8 @@ pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid
     })
 }
 
-/// Decodes an image from [`encode_print_masks`]. A first run decodes its own masks too, so that a resumed run gives the
-/// same results.
+/// Decodes an image from [`encode_print_masks`]. Also used right after encoding, so that a resumed run gives the same
+/// results.
 pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     PrintMasks {
         ink: grey.map(|grey| *grey == INK),
