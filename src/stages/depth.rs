@@ -1,4 +1,4 @@
-//! The depth stage (paper III-B): renders the mesh along the plane's normal. Each pixel gets the highest surface.
+//! The depth stage (paper III-B): renders the mesh along the plane's normal. Each pixel gets the highest hit.
 
 use serde::{Deserialize, Serialize};
 

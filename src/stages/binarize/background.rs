@@ -8,7 +8,8 @@ use crate::stages::blur::gaussian_blur;
 const CELLS: f64 = 96.0;
 /// Usual half width of the closing, as a share of the longest side.
 pub(super) const NARROW: f64 = 0.12;
-/// Half width of the closing if the print may be stained. Dark areas wider than twice this are then stains.
+/// Half width of the closing if the print may be stained, as a share of the longest side. Dark areas wider than twice
+/// this are then stains.
 pub(super) const STROKE: f64 = 0.05;
 /// Least share of a cell that must be known for it to count.
 const LEAST_KNOWN: f32 = 0.3;

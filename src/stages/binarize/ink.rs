@@ -236,7 +236,7 @@ fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     grey.zip_map(&level, |grey, level| (grey / level.max(0.01)).min(1.5))
 }
 
-/// Returns the amount of ink: 0 at the median of the background, 1 at the median of the ink, linear between. Pixels
+/// Returns the amount of ink, which rises linearly from 0 at the background's median to 1 at the ink's median. Pixels
 /// more than one pixel away from the ink mask get 0.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
     let span = (split.high - split.low).max(1e-6);

@@ -13,7 +13,7 @@ use super::surface::quantile;
 use crate::domain::SideEvidence;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// If the relief of one side is below this share of the opposite relief, that side is the back of the block.
+/// If the relief of a side is below this share of the other side's relief, the side is the back of the block.
 const BACK: f64 = 0.35;
 /// Weight of the winding, from -1 (inward) to 1 (outward).
 const WINDING: f64 = 2.0;
@@ -23,7 +23,7 @@ const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 14.0;
 /// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
-/// If the likelier side has this agreement with the print, the other side is not measured. 500 backs had at most 0.55.
+/// If the likelier side has this agreement with the print, the other side is not measured. Backs had at most 0.55.
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;

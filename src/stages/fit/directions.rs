@@ -11,7 +11,7 @@ const SAMPLES: usize = 30_000;
 const SAME: f64 = 0.26;
 /// Directions closer than this angle, in radians, count as one, because the fit of a side levels smaller tilts.
 const DISTINCT: f64 = 0.2;
-/// Least share of the area whose normals must lie within `SAME` of a direction.
+/// A plane is large if at least this share of the area has normals within `SAME` of the plane's normal.
 const LEAST_AREA: f64 = 0.04;
 /// Number of directions of large planes.
 const PLANES: usize = 6;
@@ -62,7 +62,7 @@ pub(super) fn large_planes(facets: &[Facet]) -> Vec<Vector3<f64>> {
     let mut planes = Vec::new();
     while planes.len() < PLANES && !left.is_empty() {
         let mut normal = fullest_cell(&left);
-        // The mean of the near normals is closer to the plane than the middle of the cell.
+        // The mean of all near normals is closer to the plane's normal than the mean of one cell.
         let mut area = 0.0;
         for _ in 0..3 {
             let mut sum = Vector3::zeros();

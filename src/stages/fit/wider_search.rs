@@ -192,7 +192,7 @@ fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     (near.vertices.len() >= 16).then_some(near)
 }
 
-/// Returns the frame whose z is the least axis and in which the bounding box of the mesh has the smallest area.
+/// Returns the frame with the least principal axis as z in which the mesh has the smallest bounding box.
 fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
     let normal = axes.normal();
     let level = frame(normal, axes.centre);
@@ -222,7 +222,7 @@ fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
     bounds
 }
 
-/// Returns the box around a side of a part. The edges of the box are parallel to the axes of `along`.
+/// Returns the box around a side of a part. Its z is the side's normal, and its x is close to that of `along`.
 fn region(mesh: &Mesh, indexed: &IndexedSurface, side: &FittedSide, along: &Rigid3) -> ScanRegion {
     let row = |of: &Rigid3, k: usize| Vector3::new(of.0[k][0], of.0[k][1], of.0[k][2]);
     let origin = side.plane_from_mesh.inverse().apply([0.0; 3]);

@@ -113,7 +113,7 @@ fn longest_side(mask: &Mask) -> Option<f64> {
 struct Turner {
     /// Set pixels of the depth mask.
     points: Vec<[f64; 2]>,
-    /// The mask at about the size of the canvas. Rotating it needs no further averaging of pixels.
+    /// The mask scaled to about the size of the canvas, so that rotating it needs no averaging of pixels.
     small: Mask,
     small_from_depth: Affine2,
     side: usize,

@@ -9,7 +9,7 @@ const ROUNDS: usize = 2;
 const STEPS: usize = 6;
 /// The score is computed at the current scale, and at scales larger and smaller by this share.
 const TRIED: f64 = 0.008;
-/// Largest relative change of scale in one round, along each pair of axes.
+/// Largest relative change of scale in one round, along the axes and along the diagonals.
 const MOST: f64 = 0.012;
 
 /// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. Scaling along

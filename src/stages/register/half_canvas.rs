@@ -49,8 +49,8 @@ impl HalfCanvas {
         self.levels.map(|l| *l >= level)
     }
 
-    /// Estimates how far the ink spreads over the edge of the strokes, in pixels of this canvas. It is negative if dry
-    /// ink leaves the edge of the strokes bare. See [`InkEdge::mean_near`].
+    /// Estimates how far the ink spreads over the edge of the strokes, in pixels of this canvas. The result is negative
+    /// if dry ink leaves the edge of the strokes bare. See [`InkEdge::mean_near`].
     pub(super) fn ink_spread(&self, level: u16) -> f64 {
         let (width, height) = (self.levels.width(), self.levels.height());
         let levels = self.levels.data();

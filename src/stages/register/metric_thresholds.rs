@@ -19,7 +19,7 @@ const COARSE: usize = 4;
 const MISSING_PX: f64 = 3.0;
 /// `ensemble` gives full weight to pixels at least this far from the edge of the corrected ink, in half-canvas pixels.
 const FULL_PX: f64 = 1.0;
-/// Weight, in the score of `ensemble`, of the squared logarithm of a candidate's depth over the depth of `relief`.
+/// Weight of the prior in the score of `ensemble`: a candidate's depth is probably close to the depth of `relief`.
 const PRIOR: f64 = 0.05;
 
 /// A candidate threshold, and how its mask fits the corrected ink.
@@ -122,7 +122,8 @@ fn candidate_levels(
     levels
 }
 
-/// Returns the number of pixels of corrected ink that the deepest candidate covers. Other ink has lost its strokes.
+/// Returns the number of pixels of corrected ink that the deepest candidate covers. For the other ink, the block has no
+/// strokes left.
 fn carved_ink(canvas: &HalfCanvas, corrected: &Mask, deepest: u16) -> f64 {
     let both = corrected.data().iter().zip(canvas.levels.data());
     both.filter(|(ink, level)| **ink && **level >= deepest)

@@ -79,7 +79,7 @@ pub enum RegisterError {
     },
 }
 
-/// Largest ratio that is given as a number. A larger one means that the relief as read does not match at all.
+/// Largest ratio that is given as a number. A larger ratio means that the upright relief does not match at all.
 const LARGEST_RATIO: f64 = 100.0;
 
 /// Formats the ratio of two scores.

@@ -30,8 +30,8 @@ impl IndexedSurface {
         heights
     }
 
-    /// Renders the highest z, and the highest -z as seen from the back. The frame of the back is `plane_from_mesh`
-    /// rotated by 180 degrees about its x axis.
+    /// Renders the heights of both sides. The back's frame is `plane_from_mesh` rotated by 180 degrees about its x
+    /// axis.
     pub(crate) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,

@@ -1,6 +1,6 @@
 //! Fills small triangles in parallel, one per lane. Each step tests the same pixel offset in every lane.
 //!
-//! Most triangles of a scan contain one or two pixels. Each lane computes the same bits as
+//! Most triangles of a scan contain one or two pixels. The results are bit-identical to those of
 //! [`fill_triangle`](super::triangle_fill::fill_triangle). The order of the triangles differs, so heights of 0.0 and
 //! -0.0 may be swapped at pixels that two triangles share.
 

@@ -121,7 +121,7 @@ impl IndexedSurface {
         [low, high].map(f64::from)
     }
 
-    /// Returns the indices of the blocks with the lowest and the highest bound along `row` inside the bulk.
+    /// Returns the indices of the two blocks whose bounds along `row` reach lowest and highest inside the bulk.
     fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
         dispatch!({
@@ -140,8 +140,8 @@ impl IndexedSurface {
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
-    /// Returns the share of the projected area whose winding faces +z of the frame, 0..=1. The area is projected along
-    /// z. Returns `None` if there are no faces, or if the area is zero.
+    /// Projects the surface along z of the frame. Returns the share of the projected area, 0..=1, with a winding that
+    /// faces +z. Returns `None` if there are no faces, or if the area is zero.
     pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;
