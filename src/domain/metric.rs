@@ -29,14 +29,15 @@ pub enum ThresholdMetric {
     /// the deepest threshold are left out. The paper's method minimizes `|d(D(t)) - d(P)|`, where `d` is a mask's share
     /// of the canvas. The score is minus the minimum.
     Density,
-    /// Maximizes `sum over D(t) of w / sum of max(w, 0) - 0.05 ln(d / d_r)^2`, where `w` is `s` clamped to -1..=1, and
-    /// `d_r` is the depth of [`Self::Relief`]. The score is the maximum. The first term is 1 if the strokes cover all
-    /// ink and no paper. The paper's method uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of
-    /// the registered masks.
+    /// Maximizes `sum over D(t) of w / sum of max(w, 0) - 0.05 ln(d / d_r)^2`. `w` is `s` clamped to -1..=1, and `d_r`
+    /// is the depth of [`Self::Relief`]. The score is the maximum. The first term is 1 if the strokes cover all ink and
+    /// no paper. The paper's method uses the better of [`Self::NlSsim`] and [`Self::Density`], by the IoU of the
+    /// registered masks.
     Ensemble,
-    /// Selects the depth at which the stroke tops end and the walls begin. It is the smallest depth at which the mean
-    /// steepness of the relief reaches `g_w^0.78 max(g_t, 0.05 g_w)^0.22`, where `g_w` is the steepness of the walls
-    /// and `g_t` that of the flattest tops. The score is always 0. Not part of the paper's method.
+    /// Selects the depth at which the stroke tops end and the walls begin, at most 40 % of the relief. It is the
+    /// smallest depth at which the mean steepness of the relief reaches `g_w^0.78 max(g_t, 0.05 g_w)^0.22`. `g_w` is
+    /// the steepness of the walls, and `g_t` is the steepness of the flattest tops. The score is always 0. Not part of
+    /// the paper's method.
     Relief,
 }
 

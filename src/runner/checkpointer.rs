@@ -38,7 +38,7 @@ impl StoredStages {
     /// Returns the lease if this process still holds it and no stage was left unstored.
     ///
     /// # Errors
-    /// Returns `self` if the lease is lost, if it ended with the pair's last stage, or if a stage was left unstored.
+    /// Returns `self` if the lease is lost or ended with the pair's last stage, or if a stage was left unstored.
     pub(super) fn into_lease(self) -> Result<Lease, Self> {
         match self.lease {
             CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),

@@ -169,7 +169,7 @@ mod tests {
         free_memory(root.path())
     }
 
-    /// Returns the free memory in bytes for a process in `group` of version 2, with files below `/sys/fs/cgroup`.
+    /// Returns the free memory in bytes for a process in a version 2 `group`. `files` are below `/sys/fs/cgroup`.
     fn free_in_v2(group: &str, mount: &str, files: &[(&str, &str)]) -> Option<u64> {
         let groups = format!("0::{group}\n");
         let mut all = vec![
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_container_whose_group_is_mounted_as_the_root_is_limited_by_it() {
         let limit = [("memory.max", "5000"), ("memory.current", "1000")];
-        // Three views: the group's own namespace, the host's paths, and a path outside the namespace.
+        // Three forms of a group's path: within its own namespace, on the host, and outside the namespace.
         assert_eq!(free_in_v2("/", V2_MOUNT, &limit), Some(4000));
         let mount = V2_MOUNT.replace(" / /sys", " /docker/7f /sys");
         assert_eq!(free_in_v2("/docker/7f", &mount, &limit), Some(4000));

@@ -43,8 +43,8 @@ pub(super) async fn store_changes(
     Ok(())
 }
 
-/// For each pair that was quarantined because its workers died or hung, hashes the input files that no stage has read,
-/// and stores their versions. A later run compares the files with these versions.
+/// Stores the versions of input files that no stage has read, for pairs that were quarantined because their workers
+/// died or hung. A later run compares the files with these versions.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,

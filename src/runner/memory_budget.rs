@@ -8,7 +8,7 @@ use crate::domain::Stage;
 use crate::raster;
 use crate::store::{Project, open_regular};
 
-/// Bytes reserved for the maps and masks of each pair, in addition to the memory for its mesh and print.
+/// Bytes reserved for each pair's maps and masks, in addition to its mesh and print.
 pub(super) const PAIR_BYTES: u64 = 32 << 20;
 /// Bytes needed per byte of a mesh file, including the file's content. Measured with one to two million vertices:
 /// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, point clouds 2.5. For OBJ it is 1.8, or 5.7 with

@@ -89,7 +89,7 @@ impl PairContext {
         }
     }
 
-    /// Returns the versions of the input files that were read, or no versions if the last report had the same ones.
+    /// Returns the versions of the input files that were read, or nothing if they have not changed since the last call.
     pub(super) fn unreported_inputs(&mut self) -> InputVersions {
         if self.reported == self.inputs {
             return InputVersions::default();

@@ -18,7 +18,7 @@ use crate::domain::{PairName, Stage, WorkerId};
 use crate::raster;
 use crate::store::Project;
 
-/// Each slot gets as many extra pairs as it is expected to compute in this time. This saves claims if pairs are short.
+/// Pairs are claimed ahead to keep each slot busy for this time. One claim then covers several short pairs.
 const CLAIM_AHEAD: Duration = Duration::from_millis(250);
 /// Most pairs claimed ahead for one slot, however short they are.
 const MAX_AHEAD_PER_SLOT: u128 = 16;

@@ -160,9 +160,9 @@ impl Scheduler {
         self.computing.is_empty() && self.storing.is_empty()
     }
 
-    /// Turns the catalog's commit delay off if a slot is free and a pair is being stored, or if more than half of
-    /// `max_storing` pairs are being stored. Otherwise commits may be delayed. While a slot is free, the run's end or a
-    /// pair that must run alone may be waiting for the commit.
+    /// Turns the catalog's commit delay off in two cases: a slot is free while a pair is being stored, or more than
+    /// half of `max_storing` pairs are being stored. Otherwise turns the delay on. While a slot is free, the run's end
+    /// or a pair that must run alone may be waiting for the commit.
     async fn flush_where_needed(&mut self) -> Result<(), RunError> {
         let is_slot_free = self.prefetch.free_slots() > 0 && !self.storing.is_empty();
         let is_needed = is_slot_free || self.storing.len() > self.max_storing / 2;
