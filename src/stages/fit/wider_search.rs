@@ -177,8 +177,8 @@ impl SideSearch<'_> {
     }
 }
 
-/// If much of the visible area lies deeper than any carving, returns the part of the mesh above that area. The area may
-/// be the foot of a block, or a table below it.
+/// Cuts off the area that lies deeper than any carving, such as the foot of a block or a table below it. Returns `None`
+/// if that area is a small share of the visible area.
 fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
     let heights = side.samples.residuals(&side.surface);
