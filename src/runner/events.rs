@@ -102,7 +102,7 @@ pub struct RunSummary {
     pub stages: u64,
     /// Selected pairs with stages left to run.
     pub left: u64,
-    /// Number of selected pairs that this or an earlier run quarantined. If it is not 0, the exit code is 3.
+    /// Number of selected pairs that this or an earlier run quarantined.
     pub failed_in_all: u64,
     /// Whether a signal stopped the run before everything was done.
     pub stopped: bool,
