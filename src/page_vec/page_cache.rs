@@ -10,7 +10,7 @@ const MAX_CACHED_BYTES: usize = 128 << 20;
 /// A vector uses cached pages of at most this many times its size.
 const MAX_OVERSIZE: usize = 4;
 /// If a new allocation and the cached pages together exceed this many bytes, cached pages are freed.
-const MIN_CACHED_BYTES: usize = 32 << 20;
+const KEPT_BYTES: usize = 32 << 20;
 
 /// Pages that are free.
 struct PageCache {
@@ -34,7 +34,7 @@ impl PageCache {
         if let Some(found) = self.pages.iter().position(fits) {
             return Some(self.pages.remove(found));
         }
-        let over = (self.bytes_cached() + bytes).saturating_sub(MIN_CACHED_BYTES);
+        let over = (self.bytes_cached() + bytes).saturating_sub(KEPT_BYTES);
         let mut over = over.min(bytes);
         while over > 0
             && let Some(pages) = self.pages.pop()

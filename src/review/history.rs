@@ -13,7 +13,7 @@ pub(super) struct ReviewerHistory {
     answers: BTreeMap<AnsweredOn, Answer>,
     alignments: BTreeMap<ContentHash, ManualAlignment>,
     /// Whether alignments are returned for unanswered items. True if there are no attention checks.
-    is_open: bool,
+    shows_all_alignments: bool,
 }
 
 impl ReviewerHistory {
@@ -39,7 +39,7 @@ impl ReviewerHistory {
             alignments: current
                 .map(|stored| (stored.made.seen, stored.made))
                 .collect(),
-            is_open: !options.has_attention_checks(),
+            shows_all_alignments: !options.has_attention_checks(),
         })
     }
 
@@ -58,6 +58,6 @@ impl ReviewerHistory {
     /// unanswered item: an alignment would reveal that the item is a duplicate.
     pub(super) fn alignment(&self, item: &ReviewItem) -> Option<&ManualAlignment> {
         let found = self.alignments.get(&item.view.hash());
-        found.filter(|_| self.is_open || self.answer(item).is_some())
+        found.filter(|_| self.shows_all_alignments || self.answer(item).is_some())
     }
 }

@@ -45,7 +45,7 @@ pub(super) async fn store_changes(
 
 /// Stores the versions of input files that no stage has read, for pairs that were quarantined because their workers
 /// died or hung. A later run compares the files with these versions.
-pub(super) async fn store_of_poisoned(
+pub(super) async fn store_inputs_of_quarantined(
     project: &Project,
     catalog: &Catalog,
     pairs: &[PairId],

@@ -193,7 +193,8 @@ impl RunStart<'_> {
         let recovered = self.catalog.recover(dead, now).await?;
         let (project, poisoned) = (self.project, &recovered.poisoned);
         let limits = read_limits(self.options, self.stop);
-        input_changes::store_of_poisoned(project, self.catalog, poisoned, &limits).await?;
+        input_changes::store_inputs_of_quarantined(project, self.catalog, poisoned, &limits)
+            .await?;
         self.project.clear_temporary()?;
         lock.downgrade()?;
         Ok(recovered.ready)

@@ -109,7 +109,8 @@ impl WorkerSession {
             stop: context.stop.clone(),
             until: StopLevel::Drain,
         };
-        input_changes::store_of_poisoned(&context.project, catalog, &poisoned, &limits).await?;
+        input_changes::store_inputs_of_quarantined(&context.project, catalog, &poisoned, &limits)
+            .await?;
         Ok(ready)
     }
 }
