@@ -15,10 +15,12 @@
 //!
 //! 1. `src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs in one transaction
-//! 3. `src/runner/run.rs`: starts a run: takes the lock, recovers jobs of dead workers, requeues stale pairs
+//! 3. `src/runner/run.rs`: starts a run: takes the lock, registers this process as a worker, recovers jobs of dead
+//!    workers, stores which inputs changed, requeues stale pairs, ends back-offs that are due
 //! 4. `src/runner/scheduler.rs`: the main loop, which starts a task for each leased pair
 //! 5. `src/runner/prefetch.rs`: leases pairs for free slots, and a few more in advance
-//! 6. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token; called through `api.rs`
+//! 6. `src/catalog/queue/claim.rs`: leases as many jobs as were asked for in one statement, each with a new fencing
+//!    token; claims, heartbeats and releases are called through `api.rs` beside it
 //! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
 //! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
 //! 9. `src/runner/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
@@ -30,9 +32,11 @@
 //! 13. `src/catalog/db/group_commit.rs`: stores all requests that wait for the writer task of this process in one
 //!     transaction; several processes take turns by SQLite's lock (`busy_retry.rs`)
 //! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
-//! 15. `src/catalog/records/pair_results.rs`: reads results back; the scores come from `stage_result.outcome`
+//! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the scores
+//!     come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
 //! 16. `src/report/build.rs`: iterates over all pairs
-//! 17. `src/report/accumulate.rs`: sums results per metric
+//! 17. `src/report/accumulate.rs`: sums results per metric; Acc counts the passes of `consensus.rs`, and
+//!     `truth_evaluation.rs` compares results with ground truth, if there is any
 //! 18. `src/report/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML; `csv.rs` has its own
 //!     columns, and JSON is the serialized `Report`
 //!
@@ -45,12 +49,12 @@
 //!
 //! ## A lost lease
 //!
-//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if a process that joined the
-//! run recovers the job because the stage is more than a minute past its deadline (both in
-//! `src/runner/worker_session.rs`). The start of a run (`src/runner/run.rs`) and a repair recover only jobs of dead
-//! processes, because they hold the lock `run.members` alone. After a refused heartbeat, a process recovers the jobs of
-//! its own old id (`register_again`). The statements are in `src/catalog/queue/recovery.rs` and
-//! `src/catalog/audit/repair.rs`. Each of them increases the job's fencing token.
+//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the same
+//! run recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline (both in
+//! `src/runner/worker_session.rs`). The start of a run (`src/runner/run.rs`) and a repair (`src/cli/check.rs`,
+//! `src/check/mod.rs`) recover only jobs of dead processes, because they hold the lock `run.members` alone. After a
+//! refused heartbeat, a process recovers the jobs of its own old id (`register_again`). The statements are in
+//! `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`. Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
 //! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
@@ -59,17 +63,22 @@
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
-//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; `pair_task.rs` notices at the next finished stage, and the thread ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; after the last stage, `finish` in `checkpointer.rs` notices (a task in `storing` of `scheduler.rs`), before that `pair_task.rs` at the next finished stage; `compute_thread.rs` ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
 //! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
-//! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process registers as a new worker; its running pairs end at their next write |
-//! | claim | no leases | `prefetch.rs` | nothing, until the next heartbeat |
-//! | release | `false`, ignored | | nothing: the job was recovered meanwhile |
+//! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process warns, releases the pairs that it has not started, ends its old id, registers as a new worker, and recovers the jobs of the old id; its running pairs end at their next write |
+//! | claim | no leases | not distinguished from "no pair is ready" | tried again at every poll, until the next heartbeat |
+//! | release | `false`, ignored | `release_all` in `prefetch.rs`, `finish` in `checkpointer.rs` | nothing: the job was recovered meanwhile |
 //!
 //! The pair ends as `PairEnd::LeaseLost`. `StoredStages::finish` in `checkpointer.rs` decides this after any refused
-//! checkpoint, `store_failure` after a refused failure. Stages stored before stay. The pair is leased again when its
-//! job is ready, unless the recovery quarantined it. Artifact files without a row are used again if a stage gives the
-//! same bytes. If heartbeats fail with an error for as long as a lease lasts, the run finishes its stages and ends with
-//! that error.
+//! checkpoint, `store_failure` after a refused failure. `count` in `scheduler.rs` counts it as neither done nor failed,
+//! and claims again. Stages stored before stay. The pair is leased again when its job is ready, unless the recovery
+//! quarantined it. If the worker died or the lease was overdue, the pair runs alone until its next stage is stored. Its
+//! crash count grows if it was the dead worker's only lease, or if the lease was overdue. Artifact files without a row
+//! are used again if a stage gives the same bytes.
+//!
+//! If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in progress and ends with
+//! that error. If the write-ahead log is lost, it does so after the first failed heartbeat. An error while registering
+//! again or recovering jobs ends the run immediately.
 //!
 //! ## Why `fit` reads the print
 //!
@@ -93,7 +102,8 @@
 //! - `src/stages/register/confidence.rs`: compares each mask with the mask of the relief metric; has fitted weights
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
-//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text in `src/cli/verdict.rs`, the `CHECK` lists of
+//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text of `--metric` in `src/cli/verdict.rs` (its
+//! default metric stays), the `CHECK` lists of
 //! three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`,
 //! `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
 //!

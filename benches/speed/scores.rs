@@ -30,7 +30,7 @@ pub(super) fn measure(criterion: &mut Criterion) {
     png.finish();
 }
 
-/// Draws rings about as wide as strokes. `shift` moves them, as a share of their width.
+/// Draws rings about as wide as strokes, moved to the right by `shift` times the width of a ring.
 fn rings(side: usize, shift: f64) -> Mask {
     let width = side as f64 / 14.0;
     Mask::from_fn(side, side, |x, y| {

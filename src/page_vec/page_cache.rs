@@ -5,18 +5,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use memmap2::MmapMut;
 
-/// Most bytes in the cache of the process.
+/// The cache of the process holds at most this many bytes.
 const MAX_CACHED_BYTES: usize = 128 << 20;
 /// A vector uses cached pages of at most this many times its size.
 const MAX_OVERSIZE: usize = 4;
-/// If a new allocation and the cached pages together exceed this many bytes, cached pages are freed.
+/// Before a new allocation, cached pages are freed only if they and the new pages need more bytes than this.
 const KEPT_BYTES: usize = 32 << 20;
 
 /// Pages that are free.
 struct PageCache {
     /// In ascending order of size.
     pages: Vec<MmapMut>,
-    /// Most bytes in the cache.
     max_bytes: usize,
 }
 

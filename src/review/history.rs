@@ -12,7 +12,7 @@ use crate::domain::ContentHash;
 pub(super) struct ReviewerHistory {
     answers: BTreeMap<AnsweredOn, Answer>,
     alignments: BTreeMap<ContentHash, ManualAlignment>,
-    /// Whether alignments are returned for unanswered items. True if there are no attention checks.
+    /// Whether alignments are also shown for items without an answer. False if there are attention checks.
     shows_all_alignments: bool,
 }
 

@@ -47,7 +47,7 @@ pub(super) enum PairEnd {
     Retry,
     /// The pair was released unfinished.
     Released,
-    /// The lease was lost: it expired, or a run or repair recovered the job.
+    /// The lease was lost: it expired, or another process of the run recovered the job.
     LeaseLost,
 }
 

@@ -16,8 +16,8 @@ use crate::uninterrupted::{Expected, files};
 /// Deaths during a claim, before the random kills.
 const DEATHS_WHILE_CLAIMING: u32 = 12;
 
-/// Kills runs while no pair is leased. These deaths raise the number of crashes that quarantines a pair. Without them,
-/// the random kills could quarantine a pair that is the only leased pair three times.
+/// Kills runs while no pair is leased. After deaths without a lease, a pair is quarantined only after more crashes, so
+/// the random kills later do not quarantine a pair that happens to be the only leased one three times.
 fn die_while_claiming(project: &Project) {
     for _ in 0..DEATHS_WHILE_CLAIMING {
         let died = run(project, &[])

@@ -75,11 +75,11 @@ impl UnplacedFile {
         &self.file
     }
 
-    /// Renames the file to the target durably, unless the target exists. Returns whether the file was renamed. All
+    /// Syncs the file and renames it to the target, unless the target exists. Returns whether the file was renamed. All
     /// connections to the file must be closed.
     ///
     /// # Errors
-    /// Returns an error if SQLite left part of the content in the log, or the disk returns an error.
+    /// Returns an error if the write-ahead log of the file is not empty, or the disk returns an error.
     pub(crate) fn place(self) -> Result<bool> {
         let Self { file, target, .. } = &self;
         let io_error = |source| CatalogError::Io {

@@ -30,7 +30,8 @@ pub struct ClaimRequest {
 }
 
 impl ClaimRequest {
-    /// Requests pairs that need not run exclusively, with any next stage. Does not limit the age of the last heartbeat.
+    /// Returns a request for pairs that may run beside others, whatever their next stage. The age of the last
+    /// heartbeat is not limited.
     pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
         Self {
             worker,

@@ -32,7 +32,7 @@ const OFF_TOP_WEIGHT: f64 = 1e-6;
 const LEAST_OWN: f64 = 0.4;
 /// Share of the view's width and height left out at each border when the depth of the carving is measured.
 const MARGIN: f64 = 0.15;
-/// Number of neighbouring pixels that count as one observation, because their errors are correlated.
+/// Errors of neighbouring pixels are correlated: this many pixels count as one independent observation.
 const CORRELATED_PX: f64 = 40.0;
 /// Standard deviation of the heights on rough stroke tops, as a share of the height range.
 const TOP_SIGMA: f64 = 0.05;

@@ -24,7 +24,7 @@ pub struct RegisterParams {
     pub threshold_max: f64,
     /// Smallest confidence in the pose, 0..=1, with which a pair is accepted.
     pub min_confidence: f64,
-    /// SSIM window, used for the scores and for choosing the thresholds of `nl_ssim` and `ensemble`.
+    /// SSIM window, used for the scores and for choosing the threshold of `nl_ssim`.
     pub window: SsimWindow,
     /// Number of angles over the full circle that the paper's method tries first, 4 or more.
     pub coarse_angles: u32,
