@@ -11,6 +11,7 @@ mod ids;
 mod job;
 mod metric;
 mod outcome;
+mod print_outline;
 mod review_order;
 mod sanitize;
 mod seeded_random;
@@ -36,6 +37,7 @@ pub use outcome::{
     PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores, SideEvidence,
     ThresholdChoice,
 };
+pub use print_outline::PrintOutline;
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;

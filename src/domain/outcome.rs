@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Affine2, LengthUnit, Rigid3, ThresholdMetric};
+use super::{Affine2, LengthUnit, PrintOutline, Rigid3, ThresholdMetric};
 
 /// The curved surface of the stroke tops. All lengths are in mesh units.
 ///
@@ -80,6 +80,9 @@ pub struct FitOutcome {
     /// The part of the scan that shows the character. `None` for the whole scan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub region: Option<ScanRegion>,
+    /// The part of the print that shows the character. `None` for the whole print.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub print_outline: Option<PrintOutline>,
     /// Number of vertices in the file, duplicates included.
     pub vertices: u64,
     /// Number of triangles in the file; 0 for a point set.

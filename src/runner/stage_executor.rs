@@ -86,7 +86,8 @@ impl PipelineExecutor {
 
     fn normalize(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.inputs.depth_map(pair)?;
-        let print = self.inputs.print(pair)?;
+        let fit = StageInputs::fit(pair)?;
+        let print = self.inputs.print(pair)?.within(fit.print_outline.as_ref());
         let normalized = pipeline::normalize(&depth, &print, &self.settings).map_err(|error| {
             let path = match error {
                 NormalizeError::Print(_) => &pair.attributes.print_path,

@@ -1,6 +1,6 @@
 //! Connected components of a mask, labelled by runs with union-find (4-connectivity).
 
-use crate::raster::{Grid, Mask};
+use crate::raster::{Grid, Mask, PixelBox};
 
 /// Components smaller than this share of an image are specks. The value is from the program of the paper's authors.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
@@ -62,6 +62,35 @@ impl ConnectedComponents {
     /// Returns the pixels of components of at least this area, in pixels.
     pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
         self.select(|label| self.sizes[label] >= size)
+    }
+
+    /// Returns the component of a pixel, or `None` if the mask is not set there.
+    pub(super) fn label_at(&self, x: usize, y: usize) -> Option<usize> {
+        let label = self.labels.at(x, y);
+        (label != u32::MAX).then_some(label as usize)
+    }
+
+    /// Returns the bounding box and the number of the pixels of `mask` in each component. Every component must contain
+    /// such a pixel.
+    pub(super) fn parts_of(&self, mask: &Mask) -> Vec<(PixelBox, usize)> {
+        let mut parts: Vec<Option<(PixelBox, usize)>> = vec![None; self.sizes.len()];
+        for y in 0..mask.height() {
+            for (x, is_set) in mask.row(y).iter().enumerate() {
+                if let Some(label) = is_set.then(|| self.label_at(x, y)).flatten() {
+                    let pixel = PixelBox {
+                        x0: x,
+                        y0: y,
+                        x1: x,
+                        y1: y,
+                    };
+                    let part = &mut parts[label];
+                    *part = Some(
+                        part.map_or((pixel, 1), |(bounds, area)| (bounds.union(pixel), area + 1)),
+                    );
+                }
+            }
+        }
+        parts.into_iter().flatten().collect()
     }
 
     /// Returns the pixels of the components for which `wanted` is true.
@@ -146,7 +175,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{ConnectedComponents, remove_specks};
-    use crate::raster::Mask;
+    use crate::raster::{Mask, PixelBox};
 
     /// Reference implementation: returns for each set pixel the lowest index of a connected pixel.
     fn flooded(mask: &Mask) -> Vec<Option<usize>> {
@@ -200,6 +229,28 @@ mod tests {
 
     fn drawn(rows: [&str; 5]) -> Mask {
         Mask::from_fn(6, 5, |x, y| rows[y].as_bytes()[x] == b'#')
+    }
+
+    #[test]
+    fn parts_of_a_mask_are_measured_in_each_component() {
+        let joined = drawn(["####..", "......", "....##", "....##", "......"]);
+        let mask = drawn(["#..#..", "......", ".....#", "......", "......"]);
+        let found = ConnectedComponents::label(&joined);
+        let parts = found.parts_of(&mask);
+        let pixel = |x: usize, y: usize| PixelBox {
+            x0: x,
+            y0: y,
+            x1: x,
+            y1: y,
+        };
+        assert_eq!(
+            parts,
+            [(pixel(0, 0).union(pixel(3, 0)), 2), (pixel(5, 2), 1)]
+        );
+        assert_eq!(
+            [(3, 0), (4, 0), (4, 3)].map(|(x, y)| found.label_at(x, y)),
+            [Some(0), None, Some(1)]
+        );
     }
 
     #[test]

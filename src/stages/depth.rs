@@ -226,6 +226,7 @@ mod tests {
                 confidence: 1.0,
             },
             region: None,
+            print_outline: None,
             vertices: 0,
             triangles: 0,
         }

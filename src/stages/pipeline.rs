@@ -153,7 +153,10 @@ impl AlignedPair {
     pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
         let fit = fit(scan, Some(print), None, settings)?;
         let depth = depth::depth(scan, &fit, None, &settings.depth)?;
-        let normalized = normalize(&depth, print, settings)?;
+        let normalized = match &fit.print_outline {
+            Some(outline) => normalize(&depth, &print.clone().within(Some(outline)), settings),
+            None => normalize(&depth, print, settings),
+        }?;
         let registered = register(&depth, &normalized, settings)?;
         Ok(Self {
             fit,

@@ -170,6 +170,28 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     (PrintImage::from(rgb).into(), print_from_sheet)
 }
 
+/// Renders the print among eight neighbours in mirror writing. The edges of the image cut off a
+/// quarter of the neighbours.
+pub(super) fn grid_print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
+    let (one, print_from_sheet) = print(px_per_mm, turn_deg);
+    let one = &one.image().rgb;
+    let side = one.width();
+    let cut = side / 4;
+    let rgb = Grid::from_fn(3 * side - 2 * cut, 3 * side - 2 * cut, |x, y| {
+        let [x, y] = [x + cut, y + cut];
+        let is_middle = [x / side, y / side] == [1, 1];
+        let column = if is_middle {
+            x % side
+        } else {
+            side - 1 - x % side
+        };
+        one.at(column, y % side)
+    });
+    let shift = (side - cut) as f64;
+    let moved = Affine2::scale_shift(1.0, [shift; 2]);
+    (PrintImage::from(rgb).into(), moved.after(&print_from_sheet))
+}
+
 /// The default settings of all stages, at a smaller depth map.
 pub(super) fn settings() -> Settings {
     Settings {

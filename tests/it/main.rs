@@ -27,6 +27,7 @@ mod fault_scenario;
 #[cfg(target_os = "linux")]
 mod faults;
 #[cfg(target_os = "linux")]
+mod grid_print;
 mod hanging;
 mod hostile;
 #[cfg(target_os = "linux")]

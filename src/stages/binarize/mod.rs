@@ -3,8 +3,10 @@
 mod background;
 mod ink;
 mod otsu;
+mod outlined;
 mod polarity;
 
 pub(super) use ink::BinarizeError;
 pub(super) use ink::{InkMask, fixed, hypotheses};
 pub(super) use otsu::{Split, split, split_inner};
+pub(super) use outlined::{hypotheses_within, inside};

@@ -3,15 +3,18 @@
 //! Both sides of the mesh are rendered, and a surface is fitted to the stroke tops of each rendering. The plane depends
 //! on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the side is chosen in
 //! this stage. If the chosen side does not resemble the print, all sides and parts of the scan are tried
-//! (`wider_search`). The outcome then has a region, the part of the scan that the depth map shows. The paper's own fit
+//! (`wider_search`), and parts of the print (`part_search`). The outcome then has a region, the part of the scan that the
+//! depth map shows, or an outline, the part of the print that shows the character. The paper's own fit
 //! is in `paper_method::fit`.
 
 mod carved_side;
 mod directions;
 mod least_squares;
 mod params;
+mod part_search;
 mod pca;
 mod print_agreement;
+mod print_parts;
 mod scan_parts;
 mod side_surface;
 mod surface;
@@ -24,7 +27,7 @@ pub(super) use surface::quantile;
 pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 12;
+pub const REVISION: u32 = 13;
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,9 @@
 //! Measures how well the relief of one side of a block resembles the print.
 
 use super::side_surface::FittedSide;
+use crate::domain::PrintOutline;
+use crate::raster::Grid;
+use crate::stages::binarize::inside;
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
 };
@@ -57,6 +60,32 @@ impl InkPyramids {
             .iter()
             .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
             .collect();
+        Some(Self(inks))
+    }
+
+    /// Reads the ink of the part of a print inside an outline. Returns `None` if the print shows none.
+    pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
+        let mut inks = Vec::new();
+        for ink in print.hypotheses().ok()? {
+            let known = &ink.soft.known;
+            let inside = inside(outline, [known.width(), known.height()]);
+            let Some(bounds) = inside.bounding_box() else {
+                continue;
+            };
+            let (width, height) = (bounds.width(), bounds.height());
+            let at = |x: usize, y: usize| (bounds.x0 + x, bounds.y0 + y);
+            let part = SoftMask {
+                amount: Grid::from_fn(width, height, |x, y| {
+                    let (x, y) = at(x, y);
+                    ink.soft.amount.at(x, y)
+                }),
+                known: Grid::from_fn(width, height, |x, y| {
+                    let (x, y) = at(x, y);
+                    known.at(x, y) && inside.at(x, y)
+                }),
+            };
+            inks.extend(ImagePyramid::new(&part, BASE_PX));
+        }
         Some(Self(inks))
     }
 

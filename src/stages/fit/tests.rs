@@ -5,8 +5,9 @@ use nalgebra::Vector3;
 use super::{FitError, fit};
 use crate::domain::{FailureClass, FitOutcome, ScanRegion};
 use crate::mesh::Mesh;
+use crate::stages::Print;
 use crate::stages::paper_method;
-use crate::stages::testing::{SyntheticSheet, print, settings, some_turn};
+use crate::stages::testing::{SyntheticSheet, grid_print, print, settings, some_turn};
 
 fn normal_error_deg(world: &SyntheticSheet, found: &FitOutcome) -> f64 {
     let [x, y, z, _] = found.plane_from_mesh.0[2];
@@ -183,6 +184,29 @@ fn middle_character_of_a_grid_is_found() {
     let region = assert_region_found(&world, mesh);
     assert!(!region.contains(world.place(12.0, 0.0, -0.5)));
     assert!(!region.contains(world.place(0.0, -12.0, -0.5)));
+}
+
+#[test]
+fn character_among_neighbours_in_the_print_is_outlined() {
+    let world = SyntheticSheet {
+        turn: some_turn(6),
+        ..SyntheticSheet::default()
+    };
+    let fitted = |print: &Print| {
+        fit(&world.mesh().into(), Some(print), None, &settings().fit).expect("a plane")
+    };
+    let (print, print_from_sheet) = grid_print(14.0, 2.0);
+    let found = fitted(&print);
+    assert!(normal_error_deg(&world, &found) < 0.4);
+    let outline = found.print_outline.expect("an outline");
+    let is_inside = |x: f64, y: f64| {
+        let [x, y] = print_from_sheet.apply([x, y]);
+        let columns = outline.columns_in_row(y);
+        columns.is_some_and(|[first, last]| first <= x && x <= last)
+    };
+    assert!(is_inside(-4.0, -4.0) && is_inside(3.0, 3.3) && is_inside(-2.5, 4.1));
+    assert!(!is_inside(-7.0, 0.0) && !is_inside(7.0, 0.0) && !is_inside(0.0, -7.0));
+    assert_eq!(fitted(&self::print(14.0, 2.0).0).print_outline, None);
 }
 
 /// A fit of points without faces.

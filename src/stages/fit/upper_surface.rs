@@ -1,14 +1,15 @@
 //! Fits the surface of the stroke tops. Both sides of the mesh are rendered and fitted at a coarse resolution. The
-//! carved side is then fitted again at a finer resolution. If this side does not resemble the print, all sides of all
-//! parts of the scan are tried.
+//! carved side is then fitted again at a finer resolution. If this side does not resemble the print, parts of the print
+//! are tried, and all sides of all parts of the scan.
 
 use super::carved_side::{self, SideInputs};
 use super::params::{FitError, FitParams};
+use super::part_search;
 use super::pca::{Axes, frame};
 use super::print_agreement::InkPyramids;
 use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
-use super::wider_search;
-use crate::domain::{FitOutcome, ScanRegion, SideEvidence};
+use super::wider_search::{self, BETTER};
+use crate::domain::{FitOutcome, SideEvidence};
 use crate::mesh::Mesh;
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
@@ -60,15 +61,20 @@ pub fn fit(
         .as_ref()
         .filter(|_| fine.as_ref().is_some_and(is_carved));
     let agreement = carved.map_or(0.0, |carved| carved.agreement.unwrap_or(1.0));
-    if let Some(inks) = inks.as_ref().filter(|_| agreement < CONVINCING)
-        && let Some(found) = wider_search::search(mesh, indexed, inks, agreement, params)
+    if let (Some(print), Some(inks)) = (print, &inks)
+        && agreement < CONVINCING
     {
-        return Ok(outcome(
-            &found.side,
-            found.evidence,
-            Some(found.region),
-            mesh,
-        ));
+        let parts = part_search::search(indexed, &start, print, params);
+        let parts = parts.filter(|found| found.agreement > agreement * BETTER);
+        let wider = wider_search::search(mesh, indexed, inks, agreement, params);
+        let found = [parts, wider].into_iter().flatten();
+        if let Some(found) = found.max_by(|a, b| a.agreement.total_cmp(&b.agreement)) {
+            return Ok(FitOutcome {
+                region: found.region,
+                print_outline: found.print_outline,
+                ..outcome(&found.side, found.evidence, mesh)
+            });
+        }
     }
     let (Some(usual), Some(fine)) = (usual, fine) else {
         return Err(FitError::NoSurface(mesh.vertices.len()));
@@ -80,16 +86,11 @@ pub fn fit(
             min_relief: params.min_relief,
         });
     }
-    Ok(outcome(&fine, usual.evidence, None, mesh))
+    Ok(outcome(&fine, usual.evidence, mesh))
 }
 
-/// Returns the result of the stage for a surface.
-fn outcome(
-    fine: &FittedSide,
-    side: SideEvidence,
-    region: Option<ScanRegion>,
-    mesh: &Mesh,
-) -> FitOutcome {
+/// Returns the result of the stage for a surface, for the whole scan and the whole print.
+fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
     FitOutcome {
         plane_from_mesh: fine.plane_from_mesh,
         bow: fine.bow,
@@ -98,7 +99,8 @@ fn outcome(
         rms: fine.surface.rms,
         relief: fine.relief,
         side,
-        region,
+        region: None,
+        print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
     }

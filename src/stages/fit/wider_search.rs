@@ -14,20 +14,22 @@ use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
 use super::scan_parts::parts;
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
-use crate::domain::{Rigid3, ScanRegion, SideEvidence};
+use crate::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
 use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
 
 /// Least agreement with the print at which a side is accepted. On generated scans, carved sides reached 0.65 to 0.93
 /// and other sides at most 0.51.
-const LEAST: f64 = 0.58;
+pub(super) const LEAST: f64 = 0.58;
 /// Factor by which the agreement of a side must exceed the agreement of the usual side.
-const BETTER: f64 = 1.12;
+pub(super) const BETTER: f64 = 1.12;
 /// Sides whose normals differ by a larger angle, in radians, are rivals.
 const RIVAL: f64 = 0.5;
 /// Weight of the logarithm of the ratio of two agreements, the same as in `carved_side`.
 const AGREEMENT: f64 = 14.0;
+/// A lower agreement of the best rival counts as this.
+const LEAST_RIVAL: f64 = 0.1;
 /// A region extends below the surface by this many times the relief. Anything lower is not part of the carving.
 const DEEPEST: f64 = 4.0;
 /// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
@@ -41,12 +43,17 @@ const MIDDLE: [f64; 2] = [0.38, 0.5];
 /// Number of angles, from 0 to a right angle, that are tried to find the edges of a grid.
 const ANGLES: i32 = 30;
 
-/// A carved side that the wider search found.
+/// A carved side that is not the usual side of the whole scan, or that resembles a part of the print.
 #[derive(Debug)]
 pub(super) struct FoundSide {
     pub(super) side: FittedSide,
     pub(super) evidence: SideEvidence,
-    pub(super) region: ScanRegion,
+    /// The part of the scan that shows the character. `None` for the whole scan.
+    pub(super) region: Option<ScanRegion>,
+    /// The part of the print that shows the character. `None` for the whole print.
+    pub(super) print_outline: Option<PrintOutline>,
+    /// Agreement of the side with the print or its part, from 0 to 1.
+    pub(super) agreement: f64,
 }
 
 /// A side with its agreement with the print.
@@ -91,23 +98,35 @@ pub(super) fn search(
     let rivals = found
         .iter()
         .filter(|other| normal(&other.plane_from_mesh).angle(&here) > RIVAL);
-    let rival = rivals.map(|other| other.agreement).fold(0.1, f64::max);
+    let rival = rivals.map(|other| other.agreement).fold(0.0, f64::max);
     let part = part_of(mesh, |corner| best.region.contains(corner));
     let indexed = IndexedSurface::new(&part);
     let side = fit_view(&indexed, &best.plane_from_mesh, params.curved_blocks, FINE)?;
     if side.relief < params.min_relief * side.extent {
         return None;
     }
-    let odds = AGREEMENT * (best.agreement / rival).ln();
     Some(FoundSide {
-        evidence: SideEvidence {
-            winding: indexed.upward_facing_share(&side.plane_from_mesh),
-            flatness: side.surface.tops,
-            confidence: (odds / 2.0).tanh(),
-        },
-        region: best.region,
+        evidence: evidence(&indexed, &side, best.agreement, rival),
+        region: Some(best.region),
+        print_outline: None,
+        agreement: best.agreement,
         side,
     })
+}
+
+/// Returns the evidence for a side. `agreement` is the agreement of the side, and `rival` the best other agreement.
+pub(super) fn evidence(
+    indexed: &IndexedSurface,
+    side: &FittedSide,
+    agreement: f64,
+    rival: f64,
+) -> SideEvidence {
+    let odds = AGREEMENT * (agreement / rival.max(LEAST_RIVAL)).ln();
+    SideEvidence {
+        winding: indexed.upward_facing_share(&side.plane_from_mesh),
+        flatness: side.surface.tops,
+        confidence: (odds / 2.0).tanh(),
+    }
 }
 
 /// What all sides are compared with.

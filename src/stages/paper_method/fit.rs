@@ -59,6 +59,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
             confidence: flatness,
         },
         region: None,
+        print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
     })

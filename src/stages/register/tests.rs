@@ -5,7 +5,7 @@ use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
 use crate::stages::testing::{
-    SyntheticSheet, landmark_error_px, paper_settings, print, run, settings, some_turn,
+    SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings, some_turn,
 };
 
 #[test]
@@ -178,4 +178,21 @@ fn a_rotated_and_shifted_print_rotates_and_shifts_the_alignment() {
     });
     let turned = (angles[1] - angles[0]).rem_euclid(360.0);
     assert!((turned - 140.0).abs() < 0.3, "{turned} degrees");
+}
+
+#[test]
+fn a_character_among_neighbours_in_the_print_is_aligned() {
+    let (picture, truth) = grid_print(14.0, -5.0);
+    let world = SyntheticSheet {
+        turn: some_turn(9),
+        ..SyntheticSheet::default()
+    };
+    let results = run(&world.mesh(), &picture, &settings()).expect("an alignment");
+    for (found, metric) in results {
+        let error = landmark_error_px(&world, &truth, &found);
+        assert!(error < 0.6, "{error} px, {metric:?}");
+        assert!(metric.confidence.is_some_and(|confidence| confidence > 0.9));
+        // The neighbours are no ink on the canvas.
+        assert!(metric.scores.iou > 0.6, "{:?}", metric.scores);
+    }
 }

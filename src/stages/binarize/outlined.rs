@@ -1,0 +1,101 @@
+//! Binarizes the part of a print inside an outline.
+
+use super::ink::{BinarizeError, InkMask, hypotheses};
+use crate::domain::PrintOutline;
+use crate::raster::{Grid, Mask, PrintImage};
+use crate::stages::pose::SoftMask;
+
+/// Binarizes the smallest box around the outline like a print of its own, because a part of a print has smaller specks
+/// and may be shaded differently. Returns masks of the whole print, in which pixels outside the outline are unknown.
+pub(crate) fn hypotheses_within(
+    picture: &PrintImage,
+    outline: &PrintOutline,
+) -> Result<Vec<InkMask>, BinarizeError> {
+    let size = [picture.rgb.width(), picture.rgb.height()];
+    let inside = inside(outline, size);
+    let Some(bounds) = inside.bounding_box() else {
+        return hypotheses(picture);
+    };
+    let part = PrintImage {
+        rgb: Grid::from_fn(bounds.width(), bounds.height(), |x, y| {
+            picture.rgb.at(bounds.x0 + x, bounds.y0 + y)
+        }),
+        turned: picture.turned,
+    };
+    let whole = |ink: InkMask| {
+        let from_part = |x: usize, y: usize| {
+            let is_inside = inside.at(x, y);
+            is_inside.then(|| [x - bounds.x0, y - bounds.y0])
+        };
+        let mask = |of: &Mask| {
+            Mask::from_fn(size[0], size[1], |x, y| {
+                from_part(x, y).is_some_and(|[x, y]| of.at(x, y))
+            })
+        };
+        let amount = Grid::from_fn(size[0], size[1], |x, y| {
+            from_part(x, y).map_or(0.0, |[x, y]| ink.soft.amount.at(x, y))
+        });
+        InkMask {
+            mask: mask(&ink.mask),
+            soft: SoftMask {
+                amount,
+                known: mask(&ink.soft.known),
+            },
+            ..ink
+        }
+    };
+    Ok(hypotheses(&part)?.into_iter().map(whole).collect())
+}
+
+/// Returns the pixels inside an outline.
+pub(crate) fn inside(outline: &PrintOutline, [width, height]: [usize; 2]) -> Mask {
+    let mut inside = Mask::new(width, height, false);
+    for (y, row) in inside.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
+        if let Some([first, last]) = outline.columns_in_row(y as f64) {
+            let first = first.ceil().max(0.0) as usize;
+            let end = ((last.floor() + 1.0).max(0.0) as usize).min(width);
+            if first < end {
+                row[first..end].fill(true);
+            }
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{hypotheses_within, inside};
+    use crate::domain::PrintOutline;
+    use crate::raster::{Grid, PrintImage};
+
+    fn outline() -> PrintOutline {
+        PrintOutline::around(&[[30.0, 10.0], [80.0, 20.0], [70.0, 70.0], [25.0, 60.0]])
+            .expect("an area")
+    }
+
+    #[test]
+    fn pixels_outside_the_outline_are_unknown() {
+        // Bars of 6 pixels, on paper that is darker at the right.
+        let bar = |x: usize| x % 15 < 6;
+        let grey = |x: usize, y: usize| {
+            let paper = 230 - x - y % 3;
+            if bar(x) { paper / 4 } else { paper }
+        };
+        let picture = PrintImage {
+            rgb: Grid::from_fn(120, 90, |x, y| [grey(x, y) as u16 * 257; 3]),
+            turned: None,
+        };
+        let inks = hypotheses_within(&picture, &outline()).expect("ink");
+        let inside = inside(&outline(), [120, 90]);
+        assert!((2000..3000).contains(&inside.count()));
+        let [ink, ..] = &inks[..] else {
+            panic!("an interpretation")
+        };
+        assert_eq!(ink.soft.known, inside);
+        for y in 0..90 {
+            for x in 0..120 {
+                assert_eq!(ink.mask.at(x, y), inside.at(x, y) && bar(x), "{x}, {y}");
+            }
+        }
+    }
+}
