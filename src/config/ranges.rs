@@ -62,7 +62,7 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Checks that all numbers of a setting are in its range. If there are two, the first must not be above the second.
+/// Checks that all numbers of a setting are in its range. The first of two must not exceed the second.
 fn check_range(setting: &Setting) -> Result<(), ConfigError> {
     let Some((_, range)) = RANGES.iter().find(|(key, _)| *key == setting.key) else {
         return Ok(());

@@ -20,7 +20,7 @@ const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
 
-/// Sends jobs back to a stage, never forward. Voids leases too: because the token increases, later writes under an old
+/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
 /// lease fail.
 pub(crate) const RESTORE: &str = concat!(
     "
@@ -33,7 +33,7 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
-/// Removes the results that are to be computed again, because their values may be invalid.
+/// Removes the results of the stages that are to run again, because their values may be invalid.
 const REMOVE_RESULTS: &str = "
 DELETE FROM stage_result WHERE (pair, stage) IN (
     SELECT item.value ->> 0, later.value FROM json_each(?1) AS item, json_each('[0,1,2,3]') AS later

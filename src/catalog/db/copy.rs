@@ -177,7 +177,7 @@ fn disk_error(file: &Path, error: sqlx::Error) -> CatalogError {
             return CatalogError::Damaged(file.to_owned());
         }
         Some(CatalogErrorKind::Disk) => "the disk refused",
-        // SQLite also says this if the disk does not report the length of a new file.
+        // SQLite also reports this error if the disk does not report the length of a new file.
         _ if error.to_string().contains("output file already exists") => "the disk refused",
         _ => return error.into(),
     };

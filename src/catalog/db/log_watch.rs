@@ -18,7 +18,7 @@ use crate::domain::UnixMillis;
 const LOG_HEADER: u64 = 32;
 /// Length of the header of a frame in bytes. A frame holds one page.
 const FRAME_HEADER: u64 = 24;
-/// Result of a checkpoint: 1 if it was blocked, pages in the log, and pages copied to the catalog's main file.
+/// Result of a checkpoint: 1 if it was blocked, else 0; the pages in the log; the pages copied to the main file.
 type LogState = (i64, i64, i64);
 
 /// The log of the open write connection.

@@ -23,7 +23,7 @@ pub(crate) struct UnplacedFile {
     folder: File,
 }
 
-/// Removes the files that SQLite keeps beside a hidden file, when it is dropped.
+/// When dropped, removes the files that SQLite keeps beside a hidden file.
 #[derive(Debug)]
 struct HiddenSidecars(PathBuf);
 
@@ -46,7 +46,7 @@ impl UnplacedFile {
         for ending in ["-wal", "-journal"] {
             let log = sidecar(target, ending);
             let has_content = std::fs::metadata(&log).is_ok_and(|meta| meta.len() > 0);
-            // The log is looked for first, because another process may create the catalog and its log meanwhile.
+            // Looks for the log before the catalog, because another process may create both meanwhile.
             if has_content && !target.exists() {
                 return Err(CatalogError::LogAlone(log));
             }
@@ -54,7 +54,7 @@ impl UnplacedFile {
         let not_created = || CatalogError::NotCreated(target.to_owned());
         let folder = File::open(folder_of(target)).or(Err(not_created()))?;
         remove_if_stale(target, &folder);
-        // A file system without locks refuses the exclusive lock too, so that nobody removes files there.
+        // A file system without locks also refuses the exclusive lock, so no process removes files there.
         let _ = folder.lock_shared();
         let file = tempfile::Builder::new()
             .prefix(&hidden_prefix(target))
