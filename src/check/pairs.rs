@@ -34,7 +34,7 @@ impl PairCheck {
     }
 
     /// Returns the stage from which a repair queues the pair again. Returns `None` if the pair is not damaged, or if an
-    /// input is missing: then a run could not compute the results again that the repair removes.
+    /// input is missing: a run could then not recompute the results that the repair removes.
     pub(super) fn back_to(&self) -> Option<Stage> {
         let can_run = self.inputs_missing.is_empty();
         self.damaged_from().filter(|_| can_run)

@@ -123,8 +123,7 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair. With `repair`, a damaged pair was sent back if it has its inputs, and then its damage
-    /// counts as repaired.
+    /// Adds the check of a pair. With `repair`, its damage counts as repaired if the pair can be queued again.
     pub(super) fn count(&mut self, check: PairCheck, repair: bool) {
         let requeued = repair && check.back_to().is_some();
         self.repaired.not_requeued += u64::from(repair && check.lacks_inputs());
