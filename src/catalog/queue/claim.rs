@@ -19,7 +19,7 @@ pub struct ClaimRequest {
     pub slots: usize,
     /// Lease only pairs whose next stage is this one or an earlier one.
     pub until: Stage,
-    /// Whether to lease one pair that must run exclusively, or pairs that need not.
+    /// If set, leases one pair that must run exclusively; otherwise, leases only pairs that need not.
     pub exclusive: bool,
     /// Lease only these pairs. `None` for all pairs.
     pub among: Option<PairSelection>,
@@ -53,9 +53,9 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. An exclusive job is leased only while no other job
-/// is leased, by this worker or another one, and while it is leased, no other job is. The limit is `+?`, which hides its value from
-/// SQLite's query planner. With a plain `?`, SQLite would prepare the statement again each time.
+/// Leases the first ready jobs in the order of the index `job_ready`. While an exclusive job is leased, no worker holds
+/// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
+/// prepare the statement again each time.
 pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
