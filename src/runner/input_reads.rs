@@ -12,9 +12,9 @@ use tokio::time::{Instant, sleep_until};
 use super::stop::{Stop, StopLevel};
 
 /// Reads in progress at the same time, not counting overdue reads.
-const THREADS: usize = 8;
+pub(super) const THREADS: usize = 8;
 /// After this many reads that hang, the remaining ones are given up.
-const MAX_HANGING: usize = 64;
+pub(super) const MAX_HANGING: usize = 64;
 /// A file that takes longer than this is named to the user.
 const SLOW: Duration = Duration::from_secs(10);
 

@@ -100,6 +100,12 @@ impl Timing {
         }
     }
 
+    /// Returns the time limit for each input file that the scheduler waits for. Even if `MAX_HANGING` files hang, the
+    /// scheduler sends its next heartbeat before its leases expire.
+    pub(super) fn read_timeout(&self) -> Duration {
+        self.heartbeat_every / 5
+    }
+
     /// Returns the length of a lease in milliseconds.
     pub(super) const fn lease_ms(&self) -> i64 {
         self.lease.as_millis() as i64
@@ -145,6 +151,7 @@ mod tests {
     use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Timing, backoff_ms, failure_action};
     use crate::catalog::FailureAction;
     use crate::domain::{FailureClass, PairId};
+    use crate::runner::input_reads::{MAX_HANGING, THREADS};
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
         FailedAttempt {
@@ -219,5 +226,14 @@ mod tests {
         // One recovery records the last heartbeat. A recovery at least one lease length later finds it unchanged.
         assert!(lease + recover_every * 2 <= Duration::from_mins(1));
         assert!(lease >= heartbeat_every * 4);
+    }
+
+    #[test]
+    fn files_that_hang_do_not_make_a_worker_lose_its_leases() {
+        let timing = Timing::DEFAULT;
+        let longest_wait = timing.read_timeout() * MAX_HANGING.div_ceil(THREADS) as u32;
+        // The reads may begin just before a heartbeat is due, and two reads may follow each other: one to recover
+        // pairs and one to estimate their memory.
+        assert!(timing.heartbeat_every + longest_wait * 2 < timing.lease);
     }
 }

@@ -242,9 +242,8 @@ impl Prefetch {
                 from: lease.cursor(),
                 limits: self.image_limits,
             });
-            // The scheduler waits for these reads, so they must not delay the next heartbeat.
             let limits = ReadLimits {
-                timeout: self.context.timing.heartbeat_every / 5,
+                timeout: self.context.timing.read_timeout(),
                 stop: self.context.stop.clone(),
                 until: StopLevel::Drain,
             };

@@ -103,9 +103,8 @@ impl WorkerSession {
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }
-        // The scheduler waits for these reads, so they must not delay the next heartbeat.
         let limits = ReadLimits {
-            timeout: context.timing.heartbeat_every,
+            timeout: context.timing.read_timeout(),
             stop: context.stop.clone(),
             until: StopLevel::Drain,
         };
