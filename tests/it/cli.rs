@@ -44,9 +44,20 @@ pub(crate) fn mocban(dir: &Path, args: &[&str]) -> Call {
     call(binary().current_dir(dir).args(args))
 }
 
-/// Returns the binary, ready to be called.
+/// Returns a command that calls the binary.
 pub(crate) fn binary() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mocban"));
+    without_settings(Command::new(env!("CARGO_BIN_EXE_mocban")))
+}
+
+/// Returns a command that runs a script in the shell. The script may call the binary.
+pub(crate) fn shell(script: &str) -> Command {
+    let mut command = without_settings(Command::new("sh"));
+    command.args(["-c", script]);
+    command
+}
+
+/// Removes the environment variables that change the binary's output.
+fn without_settings(mut command: Command) -> Command {
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("MOCBAN_") || name == "RUST_LOG" {
             command.env_remove(name);
@@ -336,12 +347,7 @@ fn every_next_line_can_be_run_unchanged() {
     let mut lines = mocban(dir.path(), &import).expect(0).next();
     for wanted in [3, 0] {
         let line = lines.first().expect("a next line");
-        let ran = call(
-            Command::new("sh")
-                .current_dir(dir.path())
-                .args(["-c", line]),
-        )
-        .expect(wanted);
+        let ran = call(shell(line).current_dir(dir.path())).expect(wanted);
         lines = ran.next();
     }
 }

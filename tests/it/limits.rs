@@ -1,11 +1,11 @@
 //! Pairs that kill their process, hang, or need too much memory, and runs in which too many pairs fail.
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use mocban::domain::{FailureClass, JobStatus};
 use mocban::store::Project;
 
-use crate::cli::call;
+use crate::cli::{call, shell};
 use crate::resume::{attempts, pairs, project, run};
 
 fn status(project: &Project) -> Vec<JobStatus> {
@@ -166,10 +166,9 @@ fn a_low_limit_of_open_files_is_named_as_the_reason() {
     let mut failed = 0;
     for limit in (8..24).step_by(2) {
         let command = run(&project, &["--rerun", "all"]);
-        let mut shell = Command::new("sh");
-        let script = format!("ulimit -n {limit}; exec \"$@\"");
-        shell.args(["-c", &script, "sh"]).arg(command.get_program());
-        let ended = call(shell.args(command.get_args()));
+        let mut script = shell(&format!("ulimit -n {limit}; exec \"$@\""));
+        script.arg("sh").arg(command.get_program());
+        let ended = call(script.args(command.get_args()));
         let is_named = ended.err.contains("ulimit -n");
         assert!(ended.code == 0 || is_named, "{limit}: {}", ended.err);
         failed += usize::from(ended.code != 0);

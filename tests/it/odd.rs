@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban::store::Project;
 
 use crate::check::{at, below, done, exported, sql};
-use crate::cli::{binary, call, empty, mocban};
+use crate::cli::{binary, call, empty, mocban, shell};
 
 /// Overwrites the catalog from `from` eighths to `to` eighths of its length with garbage. Returns the former content.
 pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<u8> {
@@ -218,12 +218,7 @@ fn export_that_would_lack_files_leaves_the_previous_one() {
     let lines = std::fs::read_to_string(dir.path().join("new/pairs.jsonl")).expect("read");
     assert!(lines.contains("is missing"), "{lines}");
     for command in again.next() {
-        let ran = call(
-            std::process::Command::new("sh")
-                .current_dir(project.dir())
-                .args(["-c", &command]),
-        );
-        ran.expect(0);
+        call(shell(&command).current_dir(project.dir())).expect(0);
     }
     assert!(exported(&project, "out") == before);
 }

@@ -12,7 +12,7 @@ use mocban::store::Project;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
-use crate::cli::{call, mocban};
+use crate::cli::{call, mocban, shell};
 use crate::resume::{attempts, pairs, project, results, run, run_with_progress, stages_done};
 
 /// Shortens leases from nearly a minute to about a second, and the intervals that depend on leases by the same factor.
@@ -351,11 +351,9 @@ fn one_signal_drains_and_does_not_count_the_attempt() {
 fn a_hang_up_that_is_ignored_from_the_start_does_not_stop_a_run() {
     let fixture = Fixture::new("2");
     let (mut child, file) = fixture.hold_at_under("fit:computed", |run| {
-        let mut shell = Command::new("sh");
-        let script = "trap '' HUP; exec \"$@\"";
-        shell.args(["-c", script, "sh"]).arg(run.get_program());
-        shell.args(run.get_args());
-        shell
+        let mut script = shell("trap '' HUP; exec \"$@\"");
+        script.arg("sh").arg(run.get_program()).args(run.get_args());
+        script
     });
     child.send(Signal::HUP);
     std::fs::remove_file(file).expect("removed");
