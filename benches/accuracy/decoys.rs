@@ -131,7 +131,7 @@ fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
     ]
 }
 
-/// Returns the confidence below which the share `FALSE_ALARMS` of the right pairs lies.
+/// Returns the confidence that is not reached by the share `FALSE_ALARMS` of the right pairs.
 fn level(trials: &[Trial], method: &Method, metric: ThresholdMetric) -> Option<f64> {
     let of_method = trials.iter().filter(|trial| trial.method == method.name);
     let found = of_method.filter_map(|trial| trial.found(metric));

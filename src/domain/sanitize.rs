@@ -75,7 +75,8 @@ pub fn one_line(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Returns a text like [`one_line`]. If it is longer than `most` characters, it is cut and three dots are added.
+/// Returns a text as one line, as [`one_line`] does. A result of more than `most` characters is cut, and three dots are
+/// added.
 ///
 /// ```
 /// use mocban::domain::sanitize;

@@ -104,7 +104,7 @@ fn plain_lines(bytes: &[u8]) -> Vec<u8> {
             lines.push(b' ');
             lines.extend_from_slice(word);
         }
-        // The parser must reject a `v` without coordinates. Without the space, it would ignore such a line.
+        // Because of the space, the parser rejects a `v` without coordinates. Otherwise it would ignore the line.
         lines.extend_from_slice(b" \n");
     }
     lines

@@ -28,7 +28,8 @@ impl DepthMap {
         levels.filter(|level| *level > 0).collect()
     }
 
-    /// Returns the stroke mask at a threshold: the pixels of at least `level`. Pixels without data are never set.
+    /// Returns the stroke mask at a threshold: the pixels whose level is at least `level`. Pixels without data are never
+    /// set.
     pub fn stroke_mask(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
     }

@@ -8,8 +8,8 @@ use crate::domain::Affine2;
 /// Side in pixels of the square blocks of output pixels that are tested together for missing data.
 const BLOCK_PX: usize = 4;
 
-/// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel with data in less than about half
-/// of its square gets level 0 (no data). If the map has no inverse, all pixels get level 0.
+/// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel gets
+/// level 0 (no data) if data covers less than about half of its square, or if the map has no inverse.
 ///
 /// `to_from` maps depth-map pixels to output pixels. A level means the same height in the result as in `depth`.
 pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usize) -> Grid<u16> {

@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_container_whose_group_is_mounted_as_the_root_is_limited_by_it() {
         let limit = [("memory.max", "5000"), ("memory.current", "1000")];
-        // Three forms of a group's path: within its own namespace, on the host, and outside the namespace.
+        // The path of a group may start at its own namespace, start at the host's root, or leave the namespace ("..").
         assert_eq!(free_in_v2("/", V2_MOUNT, &limit), Some(4000));
         let mount = V2_MOUNT.replace(" / /sys", " /docker/7f /sys");
         assert_eq!(free_in_v2("/docker/7f", &mount, &limit), Some(4000));

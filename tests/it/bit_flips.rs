@@ -1,4 +1,5 @@
-//! Single flipped bits of the catalog: a check finds each, or no output changes. `MOCBAN_TRIALS` sets how many.
+//! Flips single bits of the catalog. For each flip, a check finds the damage, or no output changes. `MOCBAN_TRIALS`
+//! sets the number of flips.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -239,7 +239,8 @@ fn rows_and_counters_that_disagree_are_found_and_repaired() {
 fn indexes_that_disagree_with_their_tables_are_rebuilt() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
-    // While all jobs become ready, the index of ready jobs has another condition. Afterwards it lacks these jobs.
+    // Changes the condition of the index of ready jobs, makes all jobs ready, and restores the condition. The index
+    // then lacks these jobs.
     let redefine = |from: &str, to: &str| {
         format!(
             "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'status = {from}', 'status = {to}')

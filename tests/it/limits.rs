@@ -13,7 +13,8 @@ fn status(project: &Project) -> Vec<JobStatus> {
     all.iter().map(|pair| pair.results.status).collect()
 }
 
-/// Starts runs until one ends by itself. Returns the number of runs that died before it, and its exit code.
+/// Starts up to 10 runs, until one ends by itself. Returns the number of runs that died, and the exit code of the one
+/// that ended, or `None` if all died.
 fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
     for deaths in 0..10 {
         let mut command = run(project, &["-j", jobs]);

@@ -13,7 +13,7 @@ use crate::resume::{copy, pairs, project};
 const PAIRS: u64 = 4;
 /// Most pixels of each print; each has only a few less.
 const PIXELS: usize = 2_500_000;
-/// Memory limit of a run. One pair needs up to 50 bytes per pixel, so one pair fits, but not two.
+/// Memory limit of a run. A pair is estimated to need 50 bytes per pixel and 32 MiB, so one pair fits, but not two.
 const MEMORY_MIB: u64 = 240;
 
 /// Scales a print up to nearly the given number of pixels.

@@ -21,7 +21,8 @@ pub enum CatalogErrorKind {
     Disk,
     /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
-    /// A statement failed. Statements are fixed, so a check concludes that the schema or a stored JSON text is damaged.
+    /// A statement failed. All statements are tested, so a check concludes that the schema or a stored JSON text is
+    /// damaged.
     Statement,
 }
 

@@ -237,7 +237,8 @@ fn is_read_only(error: &CatalogError) -> bool {
 /// Replaces the error if the file is not a database or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // `kind` opens and closes the file. This could drop locks only if a connection had the file open, and none has.
+        // `kind` opens and closes the file, which drops all locks of this process on the file (POSIX). That is harmless
+        // here, because this process has no connection to the file.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),

@@ -115,8 +115,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns the settings that differ between another process and `fingerprints`. `hash_line` is the other process's
-    /// [`Fingerprints::hash_line`]. Skips hashes that are not stored.
+    /// Returns the settings in which `fingerprints` differ from those of another process, which is described by its
+    /// [`Fingerprints::hash_line`]. Skips a stage if the catalog does not know the other process's hash.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

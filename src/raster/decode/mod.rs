@@ -93,7 +93,7 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
     limits.check_size(side(16)?, side(20)?)
 }
 
-/// Decodes the pixels as stored, and the orientation that the decoder finds.
+/// Decodes the pixels in stored order. Returns them with the orientation from the metadata, which is not yet applied.
 fn decode_pixels(
     bytes: &[u8],
     format: ImageFormat,

@@ -17,7 +17,7 @@ const LEAST_BACKGROUND: f64 = 0.2;
 const LEAST_WHITE: f64 = 0.004;
 /// A dark pixel is pale if its grey is more than this share of the way from the darkest tenth to the background.
 const PALE: f64 = 0.35;
-/// Stains are possible if more than this share of the dark pixels are pale.
+/// A print may have stains if more than this share of its dark pixels are pale (see [`PALE`]).
 const LEAST_PALE: f64 = 0.15;
 /// Least difference between the greys of ink and background, as a share of the lighter grey. It is relative, because a
 /// scan that uses only part of the 16-bit range is dark.

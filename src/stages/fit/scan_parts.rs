@@ -93,7 +93,8 @@ fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> 
     Some((layer, low + (fullest + 1) as f64 * layer))
 }
 
-/// Returns a mesh without specks and without small components that touch nothing else.
+/// Returns a mesh without distant specks and without connected components that are smaller than [`DEBRIS`] of the
+/// largest one.
 fn without_debris(mesh: &Mesh, indexed: &IndexedSurface) -> Mesh {
     let inside = part_of(mesh, |corner| is_in_box(&indexed.bulk, &corner));
     if inside.triangles.is_empty() {

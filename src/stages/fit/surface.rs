@@ -306,7 +306,8 @@ impl HeightSamples {
 
     /// Returns the plane `z = a + b x + c y` through the stroke tops, in plane coordinates and mesh units.
     ///
-    /// If the surface is curved, tops of neighbouring characters (at the mesh's edge) hardly influence the plane.
+    /// A flat surface is this plane already. If the surface is curved, a plane is fitted to the tops, and tops at the
+    /// mesh's edge, which belong to neighbouring characters, hardly count.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
         let is_bent = c[3..].iter().any(|c| *c != 0.0);
@@ -373,8 +374,8 @@ pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
-/// Returns the weight of a residual. Above the surface, the weight is `ABOVE`, or 0 for spikes higher than three
-/// windows. Below the surface, the weight falls from 1 to 0 at a depth of `window`.
+/// Returns the weight of a residual. Below the surface, the weight falls from 1 to 0 at a depth of `window`. Above the
+/// surface, the weight is `ABOVE`, but 0 for spikes higher than `3 * window`.
 #[inline(always)]
 fn one_sided_weight(r: f64, window: f64) -> f64 {
     let below = smooth_weight(r, window);

@@ -229,8 +229,9 @@ impl PyramidLevel {
 /// A position between four pixels, for bilinear interpolation in all grids of the same size.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BilinearCell {
-    /// Index of the upper left pixel, and the offset from this pixel along x and y, 0..1.
+    /// Index of the upper left pixel.
     pub(super) from: usize,
+    /// Offset from this pixel along x and y, 0..1.
     pub(super) fraction: [f32; 2],
     width: usize,
 }

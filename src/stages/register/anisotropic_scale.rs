@@ -12,8 +12,8 @@ const TRIED: f64 = 0.008;
 /// Largest relative change of scale in one round, along the axes and along the diagonals.
 const MOST: f64 = 0.012;
 
-/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. Scaling along
-/// the axes and along the diagonals can produce a scale along any two perpendicular directions.
+/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. Tries scales
+/// along the axes and along the diagonals. Together, they produce a scale along any two perpendicular directions.
 ///
 /// `middle` is the centre of the scaling, in pixels of the moving image. The score of `pose` must come from `refiner`.
 pub(super) fn with_anisotropic_scale(
