@@ -24,61 +24,73 @@
 //! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
 //! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
 //! 9. `src/runner/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
-//! 10. `src/stages/pipeline.rs`: chooses the method of each stage; the stages start in `fit/upper_surface.rs` (plane,
-//!     curvature, carved side), `depth.rs` (depth map), `normalize/mod.rs` (print and relief on a common scale) and
-//!     `register/mod.rs` (pose, thresholds, scores, confidence)
+//! 10. `src/stages/pipeline.rs`: chooses the method of `fit`, `normalize` and `register`; `depth` has only one. The
+//!     stages start in `fit/upper_surface.rs` (plane, curvature, carved side), `depth.rs` (depth map),
+//!     `normalize/mod.rs` (ink of the print, heights of tops and ground) and `register/mod.rs` (pose, thresholds,
+//!     scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash
-//! 13. `src/catalog/db/group_commit.rs`: stores all requests that wait for the writer task of this process in one
-//!     transaction; several processes take turns by SQLite's lock (`busy_retry.rs`)
+//! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
+//!     transaction; import, registration and recovery have their own; several processes take turns by SQLite's lock
+//!     (`busy_retry.rs`)
 //! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
-//! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the scores
-//!     come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
+//! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
+//!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
 //! 16. `src/report/build.rs`: iterates over all pairs
 //! 17. `src/report/accumulate.rs`: sums results per metric; Acc counts the passes of `consensus.rs`, and
 //!     `truth_evaluation.rs` compares results with ground truth, if there is any
-//! 18. `src/report/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML; `csv.rs` has its own
-//!     columns, and JSON is the serialized `Report`
+//! 18. `src/report/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML, together with
+//!     `comparison_tables.rs` and `risk_coverage_tables.rs`; `csv.rs` has its own columns, and JSON is the serialized
+//!     `Report`
 //!
-//! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `stage_inputs.rs` and
-//! `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns the write connection),
-//! `records/stage_results.rs` (the SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its
-//! catalog gets its name), `records/pair_work.rs` (attributes and earlier results of leased pairs),
-//! `records/checksums.rs` (checksums of the rows that no run can compute again) and `cli/report.rs`. `src/failpoint.rs`
-//! lists the points of this path at which tests kill the process.
+//! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
+//! (checks the values of a row), `cli/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
+//! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns
+//! the write connection), `records/stage_results.rs` (the SQL that reads results), `catalog/new_catalog.rs` (a new
+//! project is durable when its catalog gets its name), `records/pair_work.rs` (attributes and earlier results of leased
+//! pairs), `records/checksums.rs` (checksums of the rows that no run can compute again) and `cli/report.rs`.
+//! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
 //! ## A lost lease
 //!
-//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the same
-//! run recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline (both in
-//! `src/runner/worker_session.rs`). The start of a run (`src/runner/run.rs`) and a repair (`src/cli/check.rs`,
-//! `src/check/mod.rs`) recover only jobs of dead processes, because they hold the lock `run.members` alone. After a
-//! refused heartbeat, a process recovers the jobs of its own old id (`register_again`). The statements are in
-//! `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`. Each of them increases the job's fencing token.
+//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the
+//! same run recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline (both
+//! in `src/runner/worker_session.rs`; the times are in `Timing` in `src/runner/policy.rs`). The start of a run
+//! (`src/runner/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
+//! workers are then dead. A repair (`src/cli/check.rs`, `src/check/mod.rs`) must hold the same lock. It resets only the
+//! jobs of damaged pairs, which ends their leases. After a refused heartbeat, a process recovers the jobs of its own
+//! old id (`register_again`). The statements are in `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`.
+//! Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
 //! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
-//! lease, the worker has not ended, and its last heartbeat is recent. If a statement changes no row, `group_commit.rs`
-//! stores nothing of that request, and the worker learns it from the reply of `src/catalog/queue/api.rs`:
+//! lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock. If a statement
+//! changes no row, `group_commit.rs` stores nothing of that request, and the worker learns it from the reply of
+//! `src/catalog/queue/api.rs`:
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
-//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped; after the last stage, `finish` in `checkpointer.rs` notices (a task in `storing` of `scheduler.rs`), before that `pair_task.rs` at the next finished stage; `compute_thread.rs` ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped. After the last stage, `Checkpointer::finish` notices (a task in `storing` of `scheduler.rs`). Before that, `pair_task.rs` notices as soon as a stage finishes after the refusal (`store` returns `false`), a stage fails or times out (`fail`), or the run stops. `compute_thread.rs` ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
 //! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
 //! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process warns, releases the pairs that it has not started, ends its old id, registers as a new worker, and recovers the jobs of the old id; its running pairs end at their next write |
 //! | claim | no leases | not distinguished from "no pair is ready" | tried again at every poll, until the next heartbeat |
-//! | release | `false`, ignored | `release_all` in `prefetch.rs`, `finish` in `checkpointer.rs` | nothing: the job was recovered meanwhile |
+//! | release | `false`, ignored | `release_all` in `prefetch.rs`, `StoredStages::finish` in `checkpointer.rs` | nothing: the job was recovered meanwhile; a pair that had started counts as released, or as done after `--until` |
 //!
 //! The pair ends as `PairEnd::LeaseLost`. `StoredStages::finish` in `checkpointer.rs` decides this after any refused
 //! checkpoint, `store_failure` after a refused failure. `count` in `scheduler.rs` counts it as neither done nor failed,
 //! and claims again. Stages stored before stay. The pair is leased again when its job is ready, unless the recovery
-//! quarantined it. If the worker died or the lease was overdue, the pair runs alone until its next stage is stored. Its
-//! crash count grows if it was the dead worker's only lease, or if the lease was overdue. Artifact files without a row
-//! are used again if a stage gives the same bytes.
+//! quarantined it. Artifact files without a row are used again if a stage gives the same bytes.
+//!
+//! If another worker recovered the job, the pair runs alone until its next stage is stored, and its crash count grows
+//! if it was the only lease of its worker or if the lease was overdue. A suspended worker counts as dead here. A job
+//! that a process recovers itself (`register_again`), or that an ended worker left, is neither blamed nor alone. A
+//! repair resets both.
 //!
 //! If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in progress and ends with
-//! that error. If the write-ahead log is lost, it does so after the first failed heartbeat. An error while registering
-//! again or recovering jobs ends the run immediately.
+//! that error. If the write-ahead log is lost, it does so after the first failed heartbeat. An error while the files, a
+//! checkpoint, a failure or the release of a running pair are stored has the same effect (`count`); the pair does not
+//! fail, and its lease stays until it is recovered. An error of the main loop itself ends the run immediately: of a
+//! claim, of the release of pairs that have not started, of a recovery, or of registering again.
 //!
 //! ## Why `fit` reads the print
 //!
@@ -91,7 +103,7 @@
 //!
 //! These source files name a variant of [`domain::ThresholdMetric`]; all others iterate over its `ALL` or `PAPER`:
 //!
-//! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics
+//! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics; its default metric stays
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
@@ -102,16 +114,16 @@
 //! - `src/stages/register/confidence.rs`: compares each mask with the mask of the relief metric; has fitted weights
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
-//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text of `--metric` in `src/cli/verdict.rs` (its
-//! default metric stays), the `CHECK` lists of
+//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text of `--metric` in `src/cli/verdict.rs`, the
+//! `CHECK` lists of
 //! three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`,
 //! `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## Rooms
 //!
 //! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
-//! source files do not import each other in cycles, that the files listed above exist, and that every file that
-//! names a metric is listed.
+//! source files do not import each other in cycles, that the files in the two lists above exist, that the first list
+//! stays short, and that every file that names a metric is listed.
 //!
 //! | room | purpose | may import |
 //! |---|---|---|
@@ -136,7 +148,8 @@
 //!
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;
 //! `benches/speed` times readers and stages by scan size; `benches/queue` times the catalog on many pairs;
-//! `benches/peers` runs other tools on the same files.
+//! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
+//! (see `benches/queue/main.rs`).
 
 #[cfg(not(unix))]
 compile_error!(

@@ -42,6 +42,7 @@ impl FaultScenario {
 
     /// Runs the command with a fault at the n-th call, then checks the outcome and completes the work without faults.
     /// Returns the exit code, or `None` if the command made fewer than `nth` calls.
+    #[expect(clippy::print_stderr, reason = "names the fault if an assertion fails")]
     fn check(&self, comparison: &Comparison, fault: &Fault, nth: usize, end: End) -> Option<i32> {
         let (root, notes) = (comparison.folder("injected"), comparison.folder("notes"));
         (self.before)(comparison, &root);
@@ -51,6 +52,7 @@ impl FaultScenario {
         }
         let at = format!("{fault}, call {nth}: code {}, {}", result.code, result.err);
         assert_outcome(&result, end, &root, &at);
+        eprintln!("the state after {at}");
         (self.after)(comparison, &root, result.code == 0);
         Some(result.code)
     }

@@ -109,7 +109,8 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     ),
     (Fault::once("write", "*", EIO).and_later(), End::Fails),
     (Fault::half(".b.*catalog.sqlite"), End::Succeeds),
-    (Fault::once("sync", ".b.*", EIO), End::Fails),
+    // SQLite ignores whether it can sync the folder of a journal.
+    (Fault::once("sync", ".b.*catalog.sqlite*", EIO), End::Fails),
     (Fault::once("sync", "*", EIO).and_later(), End::Fails),
     (Fault::once("rename", "b.sqlite", EIO), End::Fails),
     // SQLite cannot finish the copy if it cannot remove the copy's journal.
