@@ -193,7 +193,9 @@ impl Weights {
             let sum: f64 = weights.iter().zip(inputs).map(|(w, x)| w * x).sum();
             1.0 / (1.0 + (-sum).exp())
         };
-        logistic(&self.pose, &inputs.pose) * logistic(&self.mask, &inputs.mask)
+        logistic(&self.pose, &inputs.pose)
+            * logistic(&self.mask, &inputs.mask)
+            * inputs.of_character()
     }
 }
 

@@ -115,13 +115,14 @@ impl Worker {
     }
 }
 
-/// Encodes ink, background and unknown pixels, as a run does.
-fn encode(PrintMasks { ink, known }: &PrintMasks) -> Grid<u8> {
+/// Encodes ink, specks, background and unknown pixels, as a run does.
+fn encode(PrintMasks { ink, specks, known }: &PrintMasks) -> Grid<u8> {
     Grid::from_fn(ink.width(), ink.height(), |x, y| {
-        match (ink.at(x, y), known.at(x, y)) {
-            (true, _) => 255,
-            (false, true) => 0,
-            (false, false) => 128,
+        match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
+            (true, _, _) => 255,
+            (false, true, true) => 64,
+            (false, true, false) => 0,
+            (false, false, _) => 128,
         }
     })
 }

@@ -248,6 +248,16 @@ pub struct PoseFeatures {
     /// best result, as a share of the map's longest side.
     #[serde(default)]
     pub spread: f64,
+    /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
+    #[serde(default)]
+    pub tops_alone: f64,
+    /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
+    #[serde(default)]
+    pub ink_alone: f64,
+    /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a share of the stroke
+    /// width.
+    #[serde(default)]
+    pub edge_scatter: f64,
 }
 
 /// Alignment and scores of one metric: one row of the catalog and of the export.

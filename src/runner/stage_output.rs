@@ -17,6 +17,7 @@ use crate::store::NewArtifact;
 const INK: u8 = 255;
 const BACKGROUND: u8 = 0;
 const UNKNOWN: u8 = 128;
+const SPECK: u8 = 64;
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,13 +80,15 @@ pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
     }
 }
 
-/// Encodes ink, background and unknown pixels as one image.
-pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid<u8> {
+/// Encodes ink, specks, background and unknown pixels as one image. Specks lie on known pixels only.
+pub(super) fn encode_print_masks(masks: &PrintMasks) -> Grid<u8> {
+    let PrintMasks { ink, specks, known } = masks;
     Grid::from_fn(ink.width(), ink.height(), |x, y| {
-        match (ink.at(x, y), known.at(x, y)) {
-            (true, _) => INK,
-            (false, true) => BACKGROUND,
-            (false, false) => UNKNOWN,
+        match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
+            (true, _, _) => INK,
+            (false, true, true) => SPECK,
+            (false, true, false) => BACKGROUND,
+            (false, false, _) => UNKNOWN,
         }
     })
 }
@@ -95,6 +98,7 @@ pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid
 pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
     PrintMasks {
         ink: grey.map(|grey| *grey == INK),
+        specks: grey.map(|grey| *grey == SPECK),
         known: grey.map(|grey| *grey != UNKNOWN),
     }
 }
@@ -144,7 +148,10 @@ fn without_confidence(outcome: &MetricOutcome) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{BACKGROUND, INK, UNKNOWN, encode_print_masks, metric_results, result_hash};
+    use super::{
+        BACKGROUND, INK, SPECK, UNKNOWN, decode_print_masks, encode_print_masks, metric_results,
+        result_hash,
+    };
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
     use crate::runner::tests::values;
@@ -152,10 +159,15 @@ mod tests {
 
     #[test]
     fn ink_counts_even_where_the_print_is_unknown() {
-        let ink = Mask::from_fn(3, 1, |x, _| x == 0);
-        let known = Mask::from_fn(3, 1, |x, _| x == 1);
-        let grey = encode_print_masks(&PrintMasks { ink, known });
-        assert_eq!(grey.data(), [INK, BACKGROUND, UNKNOWN]);
+        let masks = PrintMasks {
+            ink: Mask::from_fn(4, 1, |x, _| x == 0),
+            specks: Mask::from_fn(4, 1, |x, _| x == 3),
+            known: Mask::from_fn(4, 1, |x, _| x == 1 || x == 3),
+        };
+        let grey = encode_print_masks(&masks);
+        assert_eq!(grey.data(), [INK, BACKGROUND, UNKNOWN, SPECK]);
+        let back = decode_print_masks(&grey);
+        assert_eq!((back.ink, back.specks), (masks.ink, masks.specks));
     }
 
     #[test]

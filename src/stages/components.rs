@@ -102,6 +102,19 @@ impl ConnectedComponents {
     /// Returns the pixels of all components near `other` or the border. A component is near if a step of `distance`
     /// pixels along an axis leads from one of its pixels into `other` or out of the grid.
     pub(super) fn touching(&self, other: &Mask, distance: i64) -> Mask {
+        let touches = self.touches(other, distance);
+        self.select(|label| touches[label])
+    }
+
+    /// Returns the area of the largest component that is not near `other` or the border, as in [`Self::touching`].
+    pub(super) fn largest_apart_from(&self, other: &Mask, distance: i64) -> usize {
+        let touches = self.touches(other, distance);
+        let apart = self.sizes.iter().zip(touches).filter(|(_, near)| !near);
+        apart.map(|(size, _)| *size).max().unwrap_or(0)
+    }
+
+    /// Returns for each component whether it is near `other` or the border.
+    fn touches(&self, other: &Mask, distance: i64) -> Vec<bool> {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {
             for x in 0..self.labels.width() {
@@ -116,7 +129,7 @@ impl ConnectedComponents {
                     .any(|(dx, dy)| other.get(x + dx, y + dy).unwrap_or(true));
             }
         }
-        self.select(|label| touches[label])
+        touches
     }
 
     /// Returns the pixels of components that touch the border of the grid.
@@ -258,6 +271,16 @@ mod tests {
         let mask = drawn(["#.....", ".####.", ".#.##.", ".####.", ".....#"]);
         let clean = drawn(["......", ".####.", ".####.", ".####.", "......"]);
         assert_eq!(remove_specks(&mask, 2400), clean);
+    }
+
+    #[test]
+    fn largest_component_apart_from_the_border_is_measured() {
+        let mask = drawn(["###...", "......", "..##.#", "......", ".#...."]);
+        let none = Mask::new(6, 5, false);
+        let found = ConnectedComponents::label(&mask);
+        assert_eq!(found.largest_apart_from(&none, 1), 2);
+        let beside = drawn(["......", "...#..", "......", "......", "......"]);
+        assert_eq!(found.largest_apart_from(&beside, 1), 0);
     }
 
     #[test]

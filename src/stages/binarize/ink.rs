@@ -65,6 +65,8 @@ pub enum BinarizeError {
 pub(crate) struct InkMask {
     /// Pixels that are ink.
     pub(crate) mask: Mask,
+    /// Pixels as dark as ink, in pieces that are too small to count as ink.
+    pub(crate) specks: Mask,
     /// Amount of ink, 0..=1, and where the image is ink or background at all.
     pub(crate) soft: SoftMask,
     /// Grey between ink and background, 0..=1.
@@ -98,6 +100,7 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
             amount: ink.to_weights(),
             known: Mask::new(ink.width(), ink.height(), true),
         },
+        specks: raw.zip_map(&ink, |raw, ink| raw && !ink),
         mask: ink,
         threshold,
         light_on_dark: false,
@@ -192,6 +195,7 @@ fn binarize_even(
             amount: amount(even, &ink, split),
             known: known.clone(),
         },
+        specks: raw.zip_map(&ink, |raw, ink| raw && !ink),
         mask: ink,
         threshold: split.threshold,
         light_on_dark,

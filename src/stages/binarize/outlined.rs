@@ -37,6 +37,7 @@ pub(crate) fn hypotheses_within(
         });
         InkMask {
             mask: mask(&ink.mask),
+            specks: mask(&ink.specks),
             soft: SoftMask {
                 amount,
                 known: mask(&ink.soft.known),

@@ -11,6 +11,8 @@ use crate::stages::pose::SoftMask;
 pub struct PrintMasks {
     /// Pixels that are ink.
     pub ink: Mask,
+    /// Pixels as dark as ink, in pieces that are too small to count as ink. They are often traces of dry ink.
+    pub specks: Mask,
     /// Pixels that are ink or background. All other pixels are the white around the print.
     pub known: Mask,
 }
@@ -52,6 +54,7 @@ impl Normalized {
             };
             let masks = PrintMasks {
                 ink: ink.mask.clone(),
+                specks: ink.specks.clone(),
                 known: ink.soft.known.clone(),
             };
             Some((hypothesis, masks))

@@ -11,6 +11,8 @@ pub(super) struct HalfCanvas {
     pub(super) levels: Grid<u16>,
     /// Ink where both hold data.
     pub(super) ink: Mask,
+    /// Pixels with a speck of ink, see `PrintMasks::specks`.
+    pub(super) specks: Mask,
     /// Distances to the edge of the ink.
     pub(super) edge: InkEdge,
 }
@@ -35,13 +37,22 @@ impl HalfCanvas {
             *level *= u16::from(*paper);
             *ink &= *level > 0;
         }
-        Self::of(levels, ink)
+        Self {
+            specks: scattered(&print.specks, &half_from_print, side),
+            ..Self::of(levels, ink)
+        }
     }
 
-    /// Creates a canvas of levels and ink. The ink must be clear where the level is 0.
+    /// Creates a canvas of levels and ink, without specks. The ink must be clear where the level is 0.
     pub(super) fn of(levels: Grid<u16>, ink: Mask) -> Self {
         let edge = InkEdge::of(&ink);
-        Self { levels, ink, edge }
+        let specks = Mask::new(ink.width(), ink.height(), false);
+        Self {
+            levels,
+            ink,
+            specks,
+            edge,
+        }
     }
 
     /// Returns the stroke mask of a level above 0.
@@ -52,14 +63,23 @@ impl HalfCanvas {
     /// Estimates how far the ink spreads over the edge of the strokes, in pixels of this canvas. The result is negative
     /// if dry ink leaves the edge of the strokes bare. See [`InkEdge::mean_near`].
     pub(super) fn ink_spread(&self, level: u16) -> f64 {
+        let levels = self.levels.data();
+        InkEdge::mean_near(&mut self.distances_at_edges(|at| levels[at] >= level, &self.edge))
+    }
+
+    /// Returns the distance to `edge` at each edge of a mask, in pixels. `is_set` returns whether the mask is set at an
+    /// index of the canvas. Edges beside pixels without data are left out.
+    pub(super) fn distances_at_edges(
+        &self,
+        is_set: impl Fn(usize) -> bool,
+        edge: &InkEdge,
+    ) -> Vec<f32> {
         let (width, height) = (self.levels.width(), self.levels.height());
         let levels = self.levels.data();
         let mut distances = Vec::new();
         let mut add = |one: usize, other: usize| {
-            let is_edge = levels[one].min(levels[other]) > 0
-                && (levels[one] >= level) != (levels[other] >= level);
-            if is_edge {
-                distances.push(self.edge.at(one).midpoint(self.edge.at(other)));
+            if levels[one].min(levels[other]) > 0 && is_set(one) != is_set(other) {
+                distances.push(edge.at(one).midpoint(edge.at(other)));
             }
         };
         for at in 0..width * height {
@@ -70,8 +90,23 @@ impl HalfCanvas {
                 add(at, at + width);
             }
         }
-        InkEdge::mean_near(&mut distances)
+        distances
     }
+}
+
+/// Returns the canvas pixels in which the centre of at least one set pixel of `mask` lies.
+fn scattered(mask: &Mask, canvas_from_mask: &Affine2, side: usize) -> Mask {
+    let mut canvas = Mask::new(side, side, false);
+    for y in 0..mask.height() {
+        for x in (0..mask.width()).filter(|x| mask.at(*x, y)) {
+            let [u, v] = canvas_from_mask.apply([x as f64, y as f64]).map(f64::round);
+            let is_inside = |at: f64| (0.0..side as f64).contains(&at);
+            if is_inside(u) && is_inside(v) {
+                canvas.set(u as usize, v as usize, true);
+            }
+        }
+    }
+    canvas
 }
 
 #[cfg(test)]

@@ -32,6 +32,11 @@ impl InkEdge {
         self.0.data()[index]
     }
 
+    /// Returns the distance of each pixel.
+    pub(super) const fn grid(&self) -> &Grid<f32> {
+        &self.0
+    }
+
     /// Returns all distances.
     pub(super) fn distances(&self) -> &[f32] {
         self.0.data()

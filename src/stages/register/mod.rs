@@ -14,6 +14,7 @@ mod pose_search;
 mod refine;
 mod scoring;
 mod soft_thresholds;
+mod unmatched;
 
 pub use confidence::ConfidenceInputs;
 pub use params::{RegisterError, RegisterParams};
@@ -21,16 +22,21 @@ pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 
 use super::normalize::{Normalized, relative_depths, stroke_growth};
-use crate::domain::PoseFeatures;
+use crate::domain::{PoseFeatures, ThresholdChoice};
 use crate::raster::DepthMap;
 use half_canvas::HalfCanvas;
+use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 12;
+pub const REVISION: u32 = 13;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
+
+/// A pair is refused if its confidence, with the strokes that have no partner, is below this share of `min_confidence`.
+/// The share is small, because damaged blocks and dry prints of the right character have such strokes too.
+const UNLIKELY: f64 = 0.06;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
@@ -82,6 +88,8 @@ pub fn register(
         normalized.outcome.canvas_px,
     );
     let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    let features = with_unmatched(refined.features, &canvas, &thresholds);
+    require_character(&features, params)?;
     let alignments: Vec<Alignment> = thresholds
         .iter()
         .map(|choice| Alignment {
@@ -103,9 +111,41 @@ pub fn register(
     )?;
     let growth = |level| stroke_growth(depth, &relief, level);
     registered.confidence_inputs =
-        confidence::set_confidence(&mut registered.outcome.metrics, &refined.features, growth);
-    registered.outcome.features = Some(refined.features);
+        confidence::set_confidence(&mut registered.outcome.metrics, &features, growth);
+    registered.outcome.features = Some(features);
     Ok(registered)
+}
+
+/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character.
+fn require_character(
+    features: &PoseFeatures,
+    params: &RegisterParams,
+) -> Result<(), RegisterError> {
+    let confidence = confidence::of_pose(features) * confidence::of_character(features);
+    if confidence < UNLIKELY * params.min_confidence {
+        return Err(RegisterError::NoMatch {
+            confidence,
+            needs: params.min_confidence,
+        });
+    }
+    Ok(())
+}
+
+/// Adds the strokes without a partner to the evidence for the pose.
+fn with_unmatched(
+    features: PoseFeatures,
+    canvas: &HalfCanvas,
+    thresholds: &[ThresholdChoice],
+) -> PoseFeatures {
+    let levels = || thresholds.iter().map(|choice| choice.level);
+    let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
+    let unmatched = Unmatched::of(canvas, range);
+    PoseFeatures {
+        tops_alone: unmatched.tops_alone,
+        ink_alone: unmatched.ink_alone,
+        edge_scatter: unmatched.edge_scatter,
+        ..features
+    }
 }
 
 /// Refuses pairs that are mirrored or whose pose is too unlikely.

@@ -164,6 +164,10 @@ impl CompetingPoses {
             other_angle,
             mirrored,
             spread,
+            // Measured when the thresholds are known.
+            tops_alone: 0.0,
+            ink_alone: 0.0,
+            edge_scatter: 0.0,
         }
     }
 }

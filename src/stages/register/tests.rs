@@ -1,7 +1,7 @@
 //! The four stages recover known alignments.
 
-use super::RegisterError;
-use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
+use super::{RegisterError, RegisterParams, require_character, require_match};
+use crate::domain::{MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
 use crate::stages::testing::{
@@ -195,4 +195,37 @@ fn a_character_among_neighbours_in_the_print_is_aligned() {
         // The neighbours are no ink on the canvas.
         assert!(metric.scores.iou > 0.6, "{:?}", metric.scores);
     }
+}
+
+#[test]
+fn a_pair_with_strokes_elsewhere_is_refused() {
+    let params = settings().register;
+    let alike = PoseFeatures {
+        correlation: 0.6,
+        tops_covered: 0.7,
+        ink_covered: 0.7,
+        other_angle: 0.6,
+        mirrored: 0.6,
+        spread: 0.0,
+        tops_alone: 0.0,
+        ink_alone: 0.0,
+        edge_scatter: 0.1,
+    };
+    assert_eq!(require_match(&alike, &params), Ok(()));
+    assert_eq!(require_character(&alike, &params), Ok(()));
+    let other = PoseFeatures {
+        tops_alone: 3.0,
+        ink_alone: 3.0,
+        ..alike
+    };
+    let refused = require_character(&other, &params);
+    assert!(
+        matches!(refused, Err(RegisterError::NoMatch { .. })),
+        "{refused:?}"
+    );
+    let any = RegisterParams {
+        min_confidence: 0.0,
+        ..params
+    };
+    assert_eq!(require_character(&other, &any), Ok(()));
 }

@@ -1,0 +1,163 @@
+//! Finds strokes of one image that have no partner in the other, at the final pose.
+//!
+//! Missing ink or missing wood alone is common: ink is dry, and wood breaks off. A print of a similar character differs
+//! in both ways: it has a stroke that the relief lacks, and lacks one that the relief has.
+
+use super::half_canvas::HalfCanvas;
+use super::ink_edge::InkEdge;
+use crate::raster::Mask;
+use crate::stages::components::ConnectedComponents;
+
+/// Distance from the strokes of the other image, as a share of the stroke width, from which a pixel has no partner.
+/// Smaller distances are due to the spread of ink and to local misalignment.
+const TOLERANCE: f64 = 0.3;
+/// Least tolerance in pixels of the half canvas.
+const TOLERANCE_PX: f64 = 1.5;
+/// Edges that deviate by at least this share of the stroke width do not count for the scatter.
+const NEAR: f64 = 0.5;
+/// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
+/// lie there.
+const BORDER_PX: i64 = 2;
+
+/// Strokes without a partner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unmatched {
+    /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
+    pub(super) tops_alone: f64,
+    /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
+    pub(super) ink_alone: f64,
+    /// Mean deviation of the ink's edge from the edge of the strokes, after the spread of the ink, as a share of the stroke
+    /// width.
+    pub(super) edge_scatter: f64,
+}
+
+impl Unmatched {
+    /// Measures the strokes without a partner. `levels` are the highest and the lowest threshold of all metrics: only
+    /// wood above the highest one surely prints, and only ink outside the lowest one surely lies on no wood.
+    pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2]) -> Self {
+        let wood = InkEdge::of(&canvas.mask(lowest));
+        let width = stroke_width(canvas);
+        let tolerance = (TOLERANCE * width).max(TOLERANCE_PX) as f32;
+        let is_far = |distance: &f32| *distance < -tolerance;
+        let unknown = canvas.levels.map(|level| *level == 0);
+        let squares = |alone: &Mask| {
+            let pieces = ConnectedComponents::label(alone);
+            pieces.largest_apart_from(&unknown, BORDER_PX) as f64 / (width * width)
+        };
+        // A speck on a stroke is a trace of dry ink.
+        let traces = InkEdge::of(
+            &canvas
+                .ink
+                .zip_map(&canvas.specks, |ink, speck| ink || speck),
+        );
+        let tops = traces.grid().zip_map(&canvas.levels, |distance, level| {
+            is_far(&distance) && level >= highest
+        });
+        let ink = wood
+            .grid()
+            .zip_map(&canvas.ink, |distance, ink| is_far(&distance) && ink);
+        let mut edge = canvas.distances_at_edges(|at| canvas.ink.data()[at], &wood);
+        Self {
+            tops_alone: squares(&tops),
+            ink_alone: squares(&ink),
+            edge_scatter: mean_deviation(&mut edge, NEAR * width) / width,
+        }
+    }
+}
+
+/// Returns the mean width of the ink's strokes in pixels, at least 1. The mean distance to the edge of a stroke is a
+/// quarter of its width.
+fn stroke_width(canvas: &HalfCanvas) -> f64 {
+    let inside = canvas.edge.distances().iter().filter(|d| **d > 0.0);
+    let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), d| {
+        (sum + f64::from(*d), count + 1)
+    });
+    (4.0 * sum / f64::from(count.max(1))).max(1.0)
+}
+
+/// Returns the mean of the absolute deviations from the median, of the values that deviate by less than `most`. Returns
+/// 0 if there are no values.
+fn mean_deviation(values: &mut [f32], most: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let half = values.len() / 2;
+    let median = *values.select_nth_unstable_by(half, f32::total_cmp).1;
+    let deviations = values.iter().map(|value| f64::from((value - median).abs()));
+    let (sum, count) = deviations
+        .filter(|deviation| *deviation < most)
+        .fold((0.0, 0_u32), |(sum, count), d| (sum + d, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Unmatched, mean_deviation};
+    use crate::raster::{Grid, Mask};
+    use crate::stages::register::half_canvas::HalfCanvas;
+
+    const SIDE: usize = 96;
+    const TOP: u16 = 1000;
+
+    /// Returns the strokes of two characters of three bars, 8 px wide. The bars of the other character may be shorter.
+    fn unmatched(wood: [bool; 3], ink: [bool; 3], shift: usize) -> Unmatched {
+        let on_bar = |bars: [bool; 3], x: usize, y: usize| {
+            let bar = (y / 8)
+                .checked_sub(2)
+                .filter(|row| row % 3 == 0)
+                .map(|row| row / 3);
+            (16..80).contains(&x) && bar.is_some_and(|bar| bar < 3 && bars[bar])
+        };
+        let level = |x, y| if on_bar(wood, x, y) { TOP } else { 1 };
+        let canvas = HalfCanvas::of(
+            Grid::from_fn(SIDE, SIDE, level),
+            Mask::from_fn(SIDE, SIDE, |x, y| on_bar(ink, x, y + shift)),
+        );
+        Unmatched::of(&canvas, [TOP, TOP])
+    }
+
+    #[test]
+    fn strokes_without_a_partner_are_measured_in_stroke_widths() {
+        let all = [true; 3];
+        let same = unmatched(all, all, 0);
+        assert_eq!((same.tops_alone, same.ink_alone), (0.0, 0.0));
+        let missing = [true, false, true];
+        // A bar of 64 x 8 pixels at a stroke width of about 8 pixels.
+        let bare = unmatched(all, missing, 0);
+        assert!((6.0..9.0).contains(&bare.tops_alone), "{bare:?}");
+        assert_eq!(bare.ink_alone, 0.0);
+        let lost = unmatched(missing, all, 0);
+        assert!((6.0..9.0).contains(&lost.ink_alone), "{lost:?}");
+        assert_eq!(lost.tops_alone, 0.0);
+    }
+
+    #[test]
+    fn strokes_with_traces_of_ink_are_not_alone() {
+        let level = |x: usize, y: usize| {
+            let across = (40..48).contains(&y) && (16..80).contains(&x);
+            let down = y < 20 && (40..48).contains(&x);
+            if across || down { TOP } else { 1 }
+        };
+        let ink = Mask::from_fn(SIDE, SIDE, |x, y| y < 20 && level(x, y) == TOP);
+        let mut canvas = HalfCanvas::of(Grid::from_fn(SIDE, SIDE, level), ink);
+        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops_alone > 5.0);
+        canvas.specks = Mask::from_fn(SIDE, SIDE, |x, y| x % 4 == 0 && y % 3 == 0);
+        assert!(Unmatched::of(&canvas, [TOP, TOP]).tops_alone < 0.2);
+    }
+
+    #[test]
+    fn small_shifts_leave_no_strokes_alone() {
+        let shifted = unmatched([true; 3], [true; 3], 2);
+        assert_eq!((shifted.tops_alone, shifted.ink_alone), (0.0, 0.0));
+        assert!(shifted.edge_scatter > 0.15, "{shifted:?}");
+        assert!(unmatched([true; 3], [true; 3], 0).edge_scatter < 0.02);
+    }
+
+    #[test]
+    fn mean_deviation_leaves_out_far_values() {
+        let values = &mut [4.0, 1.0, 2.0, 9.0, 3.0];
+        assert_eq!(mean_deviation(values, 10.0), 2.0);
+        assert_eq!(mean_deviation(values, 3.0), 1.0);
+        assert_eq!(mean_deviation(&mut [], 3.0), 0.0);
+    }
+}
