@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::glyph::Glyphs;
+use super::kind::Crop;
 use super::noise::Noise;
 use super::polygon::BoundsMm;
 use super::scalar_field::{SampleFrame, ScalarField};
@@ -13,6 +14,10 @@ use crate::raster::Grid;
 const MARGIN_MM: f64 = 2.2;
 /// Sample spacing, mm; finer than the densest scan.
 const STEP_MM: f64 = 0.035;
+/// The same for scenes that show 3 x 3 characters.
+const WIDE_STEP_MM: f64 = 0.05;
+/// Margin of crops that show 3 x 3 characters, as a share of the character's size.
+pub(super) const WIDE_MARGIN: f64 = 1.1;
 /// Minimum gap between the character and its neighbours, mm.
 const CLEARANCE_MM: f64 = 0.35;
 
@@ -29,10 +34,21 @@ pub(super) struct Artwork {
 
 impl Artwork {
     /// Draws a character of the font, with strokes as thick as those on woodblocks.
-    pub(super) fn of_glyph(glyphs: &Glyphs, character: char, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn of_glyph(
+        glyphs: &Glyphs,
+        character: char,
+        crop: Crop,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let size_mm = rng.random_range(8.0..10.2);
         let weight_mm = draw_stroke_weight(size_mm, rng);
-        let frame = SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
+        let frame = match crop {
+            Crop::Character => SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM),
+            Crop::WideMesh | Crop::WidePrint => {
+                let half_mm = size_mm * (0.5 + WIDE_MARGIN) + MARGIN_MM;
+                SampleFrame::covering(half_mm, WIDE_STEP_MM)
+            }
+        };
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
         let outline_mm = size_mm - 2.0 * weight_mm;
         glyphs.ink(character, frame, [0.0, 0.0], outline_mm, &mut coverage);
@@ -75,14 +91,26 @@ impl Artwork {
     }
 
     /// Draws the neighbouring characters and the column rules. Returns the signed distance to their outlines in mm.
-    /// Each neighbour and each rule is present with a fixed probability.
-    pub(super) fn draw_neighbours(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> ScalarField {
+    /// Each neighbour and each rule is present with a fixed probability; wide crops show all eight neighbours.
+    pub(super) fn draw_neighbours(
+        &self,
+        glyphs: &Glyphs,
+        crop: Crop,
+        rng: &mut ChaCha8Rng,
+    ) -> ScalarField {
         let frame = self.strokes.frame;
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
         let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
         let column = self.size_mm * rng.random_range(1.04..1.18) + 0.4;
-        for offset in [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]] {
-            if rng.random_bool(0.75) {
+        let beside = [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]];
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+        let corners = corners.map(|[across, down]| [across * column, down * pitch]);
+        let (offsets, probability) = match crop {
+            Crop::Character => (beside.to_vec(), 0.75),
+            Crop::WideMesh | Crop::WidePrint => ([beside, corners].concat(), 1.0),
+        };
+        for offset in offsets {
+            if rng.random_bool(probability) {
                 let characters = glyphs.characters();
                 let character = characters[rng.random_range(0..characters.len())];
                 let size = self.size_mm * rng.random_range(0.88..1.0);

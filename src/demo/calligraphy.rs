@@ -9,8 +9,10 @@ use image::{GrayImage, ImageError};
 use rand::RngExt;
 
 use super::artwork::Artwork;
+use super::conditions::Conditions;
 use super::damage::Damage;
-use super::pair::{DemoPair, Printed, finish_pair};
+use super::glyph::Glyphs;
+use super::pair::{CarvedBlock, DemoPair, Printed, finish_pair};
 use super::rendered_print::PrintFrame;
 use super::scalar_field::bilinear;
 use super::scene::{Scene, pair_id, pair_rng};
@@ -47,9 +49,14 @@ static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = cells! {
 ///
 /// # Errors
 /// Returns an error if an embedded image cannot be decoded.
-pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoPair, ImageError> {
+pub(super) fn pair(
+    glyphs: &Glyphs,
+    seed: u64,
+    index: u64,
+    vertices: Option<u32>,
+) -> Result<DemoPair, ImageError> {
     let photographed = &CELLS[(index % REAL_PAIRS) as usize];
-    let mut rng = pair_rng(seed, Tier::Real, index);
+    let mut rng = pair_rng(seed, Tier::Real, index, 0);
     let clean = image::load_from_memory(photographed.clean)?.to_luma8();
     let photograph = image::load_from_memory(photographed.photograph)?;
     let size_mm = rng.random_range(8.0..10.2);
@@ -72,8 +79,12 @@ pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoP
         block_neighbours: no_neighbours.clone(),
         print_neighbours: no_neighbours,
         damage: Damage::default(),
+        conditions: Conditions::default(),
     };
-    Ok(finish_pair(&scene, printed, vertices, &mut rng))
+    let block = CarvedBlock::draw(&scene, &mut rng);
+    Ok(finish_pair(
+        glyphs, &scene, &block, printed, vertices, &mut rng,
+    ))
 }
 
 /// Returns a map from mm to mask pixels. The origin maps to the ink's centre, `size_mm` to the ink's longest side.

@@ -15,17 +15,28 @@ use super::scene::Scene;
 /// strokes. Height zero is the least-squares plane of the stroke tops.
 pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
     let frame = strokes.frame;
-    let knife = Knife::draw(frame, rng);
+    let knife = Knife::draw(scene.conditions.depth, frame, rng);
+    // A shallow block was worn less: its tops are still above its floor.
+    let worn_share = scene.conditions.depth.clamp(0.5, 1.0);
     let wear = Wear::draw(rng);
     let cut = ScalarField::from_fn(frame, |point, x, y| {
         let inside = strokes.at(x, y).max(scene.block_neighbours.at(x, y));
         if inside > 0.0 {
-            -wear.at(point, inside)
+            -worn_share * wear.at(point, inside)
         } else {
-            -wear.at(point, 0.0) - knife.depth_mm(point, -inside, x, y)
+            -worn_share * wear.at(point, 0.0) - knife.depth_mm(point, -inside, x, y)
         }
     });
     let rounded = cut.blurred(rng.random_range(0.03..0.05));
+    let rounded = match &scene.conditions.weathering {
+        None => rounded,
+        Some(weathering) => {
+            let all = ScalarField::from_fn(frame, |_, x, y| {
+                strokes.at(x, y).max(scene.block_neighbours.at(x, y))
+            });
+            weathering.applied(&rounded, &all, knife.scale * knife.depth_mm)
+        }
+    };
     let bend = Bend::draw(scene.tier.bend_mm(), strokes, rng);
     let bent = ScalarField::from_fn(frame, |point, x, y| {
         rounded.at(x, y) + bend.at(point) - crack_depth(&scene.damage, point)
@@ -35,6 +46,8 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
 
 /// Shape of the carved background.
 struct Knife {
+    /// Factor of all depths and of the distances from the strokes that they need.
+    scale: f64,
     slope: f64,
     lean: Noise,
     depth_mm: f64,
@@ -44,8 +57,9 @@ struct Knife {
 }
 
 impl Knife {
-    fn draw(frame: SampleFrame, rng: &mut ChaCha8Rng) -> Self {
+    fn draw(scale: f64, frame: SampleFrame, rng: &mut ChaCha8Rng) -> Self {
         Self {
+            scale,
             slope: rng.random_range(1.3..2.6),
             lean: Noise::draw(rng),
             depth_mm: rng.random_range(1.0..1.4),
@@ -58,19 +72,19 @@ impl Knife {
     /// Returns the depth below the stroke tops, in mm. `outside` is the distance to the nearest stroke, in mm. The
     /// walls slope down to a rough floor. Two walls that meet above the floor form a V.
     fn depth_mm(&self, [u, v]: [f64; 2], outside: f64, x: usize, y: usize) -> f64 {
-        let wall = outside * self.slope * (1.0 + 0.3 * self.lean.at(u / 1.6, v / 1.6));
+        let wall = outside / self.scale * self.slope * (1.0 + 0.3 * self.lean.at(u / 1.6, v / 1.6));
         let floor = self.depth_mm
             + 0.12 * self.unevenness.at(u / 2.0, v / 2.0)
             + 0.04 * self.tool_marks.two_octaves(u / 0.3, v / 0.3)
             + self.gouges.at(x, y);
         // Smooth minimum of wall and floor with a rounding of 0.2 mm.
         let gap = ((wall - floor) / 0.2).clamp(-1.0, 1.0);
-        if wall <= floor {
+        let depth = if wall <= floor {
             wall - 0.05 * (1.0 + gap).powi(2)
         } else {
             floor - 0.05 * (1.0 - gap).powi(2)
-        }
-        .max(0.0)
+        };
+        self.scale * depth.max(0.0)
     }
 }
 

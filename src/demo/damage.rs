@@ -5,11 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
 use super::ellipse::{Axis, Ellipse};
+use super::kind::Bounds;
 use super::noise::Noise;
 use super::scalar_field::ScalarField;
 
 /// Minimum and maximum share of the stroke area lost on a damaged block.
-const LOST_SHARE: [f64; 2] = [0.05, 0.20];
+const LOST_SHARE: Bounds = [0.05, 0.20];
 
 /// Damage to one block.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +36,12 @@ pub(super) struct Crack {
 impl Damage {
     /// Draws the damage of a block of the `hard` tier.
     pub(super) fn draw(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
-        let lost = Some(draw_lost_regions(artwork, rng));
+        Self::draw_with(LOST_SHARE, artwork, rng)
+    }
+
+    /// Draws the damage of a block that lost a share of its stroke area between two bounds.
+    pub(super) fn draw_with(share: Bounds, artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
+        let lost = Some(draw_lost_regions(share, artwork, rng));
         let cracks = (0..rng.random_range(0..3_u32))
             .map(|_| Crack::draw(rng))
             .collect();
@@ -81,14 +87,14 @@ impl Crack {
 }
 
 /// Draws ragged blobs over the strokes until a random share of the stroke area is lost.
-fn draw_lost_regions(artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
+fn draw_lost_regions(share: Bounds, artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;
     let ink: Vec<(usize, usize)> = (0..frame.side * frame.side)
         .map(|i| (i % frame.side, i / frame.side))
         .filter(|(x, y)| strokes.at(*x, *y) > 0.0)
         .collect();
-    let target = rng.random_range(LOST_SHARE[0]..LOST_SHARE[1] - 0.04);
+    let target = rng.random_range(share[0]..share[1] - 0.04);
     let edge_noise = Noise::draw(rng);
     let mut lost = ScalarField::from_fn(frame, |_, _, _| -9.0);
     for _ in 0..200 {
@@ -101,7 +107,7 @@ fn draw_lost_regions(artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
             let ragged_mm = 0.15 * edge_noise.two_octaves(u / 0.5, v / 0.5);
             lost.at(x, y).max(blob.inside_mm([u, v]) + ragged_mm)
         });
-        if lost_share(&with_blob, &ink) <= LOST_SHARE[1] {
+        if lost_share(&with_blob, &ink) <= share[1] {
             lost = with_blob;
         }
     }
@@ -132,13 +138,14 @@ mod tests {
     use super::Damage;
     use crate::demo::artwork::Artwork;
     use crate::demo::glyph::Glyphs;
+    use crate::demo::kind::Crop;
 
     #[test]
     fn between_a_twentieth_and_a_fifth_of_the_strokes_is_lost() {
         let glyphs = Glyphs::embedded();
         for seed in 0..4 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let artwork = Artwork::of_glyph(&glyphs, '國', &mut rng);
+            let artwork = Artwork::of_glyph(&glyphs, '國', Crop::Character, &mut rng);
             let damage = Damage::draw(&artwork, &mut rng);
             let area = |field: &crate::demo::scalar_field::ScalarField| {
                 field.values.data().iter().filter(|d| **d > 0.0).count() as f64

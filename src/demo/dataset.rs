@@ -175,12 +175,12 @@ fn write_pair(
     pairs: &PairGenerator,
     index: u64,
 ) -> Result<(ManifestLine, Vec<u8>), DatasetError> {
-    let tier = pairs.tier();
+    let (tier, tier_index) = pairs.tier().tier_and_index(index);
     let pair = pairs.pair(index).map_err(|source| DatasetError::Image {
-        id: pair_id(tier, index),
+        id: pair_id(tier, tier_index),
         source,
     })?;
-    let manifest_line = manifest_line(&pair, tier, index);
+    let manifest_line = manifest_line(&pair, tier, tier_index);
     write(
         &dir.join(&manifest_line.mesh),
         &pair.mesh_format.encode(&pair.mesh),

@@ -23,6 +23,12 @@ impl Axis {
         let [a, b] = self.0;
         [u * a + v * b, v * a - u * b]
     }
+
+    /// Returns the point with these coordinates along and across the axis.
+    pub(super) fn point(self, [along, across]: [f64; 2]) -> [f64; 2] {
+        let [a, b] = self.0;
+        [along * a - across * b, along * b + across * a]
+    }
 }
 
 /// An ellipse with half axes in mm.

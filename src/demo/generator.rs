@@ -42,11 +42,10 @@ impl PairGenerator {
     /// # Errors
     /// Returns an error if an image cannot be encoded, or an embedded image cannot be decoded.
     pub fn pair(&self, index: u64) -> Result<DemoPair, ImageError> {
-        match self.tier {
-            Tier::Real => calligraphy::pair(self.seed, index, self.vertices),
-            Tier::Upright | Tier::Pose | Tier::Hard => {
-                drawn_pair(&self.glyphs, self.tier, self.seed, index, self.vertices)
-            }
+        let (kind, index) = self.tier.tier_and_index(index);
+        if kind == Tier::Real {
+            return calligraphy::pair(&self.glyphs, self.seed, index, self.vertices);
         }
+        drawn_pair(&self.glyphs, kind, self.seed, index, self.vertices)
     }
 }

@@ -3,6 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::conditions::InkAmount;
 use super::ellipse::{Axis, Ellipse};
 use super::noise::{Noise, lerp, smoothstep};
 use super::scalar_field::ScalarField;
@@ -31,6 +32,8 @@ pub(super) struct Inking {
     bristles: Noise,
     gaps: Vec<Ellipse>,
     specks: Vec<Ellipse>,
+    /// Amount of ink of the kinds that have their own rule.
+    amount: Option<InkAmount>,
 }
 
 impl Inking {
@@ -47,7 +50,7 @@ impl Inking {
             .collect();
         let speck_count = rng.random_range(4..if tier.is_damaged() { 45 } else { 22 });
         let specks = (0..speck_count).map(|_| draw_speck(strokes, rng)).collect();
-        Self {
+        let drawn = Self {
             printed: fill_corners(&union),
             spread_mm: match load {
                 InkLoad::Normal => rng.random_range(0.0..0.05),
@@ -71,6 +74,16 @@ impl Inking {
             bristles: Noise::draw(rng),
             gaps,
             specks,
+            amount: scene.conditions.ink,
+        };
+        match drawn.amount {
+            None => drawn,
+            Some(amount) => Self {
+                spread_mm: amount.spread_mm,
+                strength: amount.strength,
+                dryness: amount.dryness,
+                ..drawn
+            },
         }
     }
 
@@ -88,7 +101,12 @@ impl Inking {
             .iter()
             .map(|spot| cover(inside_spot_mm(spot, point)));
         let blotch = 1.0 - 0.12 * (1.0 + self.blotches.two_octaves(u / 0.7, v / 0.7)).max(0.0);
-        self.strength * (stroke * blotch.min(1.0)).max(0.8 * speck.fold(0.0, f64::max))
+        let ink = self.strength * (stroke * blotch.min(1.0)).max(0.8 * speck.fold(0.0, f64::max));
+        self.amount.map_or(ink, |amount| {
+            let contact = smoothstep(-0.9, 0.5, amount.contact.two_octaves(u / 3.2, v / 3.2));
+            let smeared = smoothstep(0.1, 0.9, amount.smears.two_octaves(u / 1.7, v / 1.7));
+            (ink * lerp(1.0 - amount.uneven, 1.0, contact)).max(amount.smear * smeared)
+        })
     }
 
     /// Returns the share of ink that is missing inside a stroke because of dry patches and gaps.

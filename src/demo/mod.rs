@@ -1,21 +1,27 @@
 //! The built-in dataset: meshes of carved characters, images of their prints, and the ground truth.
 //!
-//! `scene` draws the strokes (`artwork`) and `damage` removes parts of them. `carving` computes the carved surface.
-//! `scanner` and `scan_pose` turn the surface into a mesh. `inking`, `print_sheet`, `rendered_print` and `print_format`
-//! make the print. `truth_line` records the true alignment. `generator` makes pairs in memory, from a seed, and
+//! `tier` names the kinds of pairs, `kind` has their ranges, and `conditions` draws from them. `scene` draws the strokes
+//! (`artwork`) and `damage` removes parts of them. `carving` and `weathering` compute the carved surface. `scanner`,
+//! `block_body`, `debris` and `scan_pose` turn the surface into a mesh. `inking`, `print_sheet`, `paper_geometry`,
+//! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment. `generator` makes pairs in memory, from a seed, and
 //! `dataset` writes them to disk.
 
 mod artwork;
+mod block_body;
 mod calligraphy;
 mod carving;
+mod conditions;
 mod damage;
 mod dataset;
+mod debris;
 mod ellipse;
 mod generator;
 mod glyph;
 mod inking;
+mod kind;
 mod noise;
 mod pair;
+mod paper_geometry;
 mod polygon;
 mod print_format;
 mod print_sheet;
@@ -24,8 +30,10 @@ mod scalar_field;
 mod scan_pose;
 mod scanner;
 mod scene;
+mod solvable;
 mod tier;
 mod truth_line;
+mod weathering;
 
 pub use dataset::{DatasetError, DatasetFiles, DemoOptions, find_dataset, write_dataset};
 pub use generator::PairGenerator;

@@ -3,10 +3,14 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::artwork::WIDE_MARGIN;
 use super::inking::Inking;
+use super::kind::Crop;
 use super::noise::{Noise, lerp};
+use super::paper_geometry::PaperGeometry;
 use super::polygon::Polygon;
 use super::print_sheet::PrintSheet;
+use super::scalar_field::ScalarField;
 use super::scene::Scene;
 use crate::domain::Affine2;
 use crate::raster::Grid;
@@ -18,10 +22,12 @@ pub(super) struct PrintFrame {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Maps (u, v) in mm to pixels.
+    /// Maps (u, v) in mm to pixels. With a deformed paper, the best affine approximation over the strokes.
     pub print_from_uv: Affine2,
     /// Maps pixels to (u, v) in mm.
     pub uv_from_print: Affine2,
+    /// The deformed paper, and the map from its image plane in mm to pixels.
+    deformed: Option<(PaperGeometry, Affine2)>,
 }
 
 impl PrintFrame {
@@ -33,18 +39,22 @@ impl PrintFrame {
             height,
             print_from_uv,
             uv_from_print: uv_from_print.expect("a similarity of positive scale has an inverse"),
+            deformed: None,
         }
     }
 
-    /// Draws the size, scale and rotation (up to 4 degrees) of a print of the outline. Its longest side is 100-400 px.
-    pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
+    /// Draws the size, scale and rotation (up to 4 degrees) of a print of the outline. Its longest side is 100-400 px,
+    /// or more if the print shows 3 x 3 characters.
+    pub(super) fn draw(outline: &Polygon, scene: &Scene, rng: &mut ChaCha8Rng) -> Self {
+        let paper = scene.conditions.paper;
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);
         let rotated = Polygon {
             corners: outline
                 .corners
                 .iter()
-                .map(|corner| rotation.apply(*corner))
+                .map(|corner| paper.map_or(*corner, |paper| paper.image_from_uv(*corner)))
+                .map(|corner| rotation.apply(corner))
                 .collect(),
         };
         let bounds = rotated.bounds();
@@ -55,13 +65,26 @@ impl PrintFrame {
         } else {
             100.0 * 4.0_f64.powf(rng.random())
         };
+        let longest_px = match scene.conditions.crop {
+            Crop::Character | Crop::WideMesh => longest_px,
+            Crop::WidePrint => longest_px * (1.0 + 2.0 * WIDE_MARGIN),
+        };
         let border = [0; 4].map(|_: i32| rng.random_range(0.0..0.02) * longest_px);
         let scale = (longest_px - 1.0 - border[0].max(border[1]) - border[2].max(border[3]))
             / size_mm[0].max(size_mm[1]);
         let shift = [0, 1].map(|i| border[i] - scale * bounds.min[i]);
         let [width, height] =
             [0, 1].map(|i| (border[i] + border[i + 2] + scale * size_mm[i]).ceil() as usize + 1);
-        Self::new(width, height, Affine2::similarity(scale, angle, shift))
+        let print_from_image = Affine2::similarity(scale, angle, shift);
+        let Some(paper) = paper else {
+            return Self::new(width, height, print_from_image);
+        };
+        let strokes = &scene.artwork.strokes;
+        let print = |uv| print_from_image.apply(paper.image_from_uv(uv));
+        Self {
+            deformed: Some((paper, print_from_image)),
+            ..Self::new(width, height, best_affine(strokes, print))
+        }
     }
 
     /// Returns the side of a pixel, mm.
@@ -71,8 +94,38 @@ impl PrintFrame {
 
     /// Returns the position of a pixel centre, mm.
     pub(super) fn uv(&self, x: usize, y: usize) -> [f64; 2] {
-        self.uv_from_print.apply([x as f64, y as f64])
+        let pixel = [x as f64, y as f64];
+        let Some((paper, print_from_image)) = self.deformed else {
+            return self.uv_from_print.apply(pixel);
+        };
+        let image_from_print = print_from_image.inverse();
+        let image_from_print =
+            image_from_print.expect("a similarity of positive scale has an inverse");
+        paper.uv_from_image(image_from_print.apply(pixel))
     }
+}
+
+/// Fits an affine map to a map from (u, v) in mm to pixels by least squares over the strokes.
+fn best_affine(strokes: &ScalarField, print: impl Fn([f64; 2]) -> [f64; 2]) -> Affine2 {
+    let mut normal = nalgebra::Matrix3::<f64>::zeros();
+    let mut right = nalgebra::Matrix3x2::<f64>::zeros();
+    let side = strokes.frame.side;
+    for (y, x) in (0..side)
+        .step_by(4)
+        .flat_map(|y| (0..side).step_by(4).map(move |x| (y, x)))
+    {
+        if strokes.at(x, y) > 0.0 {
+            let [u, v] = strokes.frame.position(x, y);
+            let row = nalgebra::Vector3::new(u, v, 1.0);
+            normal += row * row.transpose();
+            right += row * nalgebra::RowVector2::from(print([u, v]));
+        }
+    }
+    let factor = normal.cholesky();
+    let solved = factor
+        .expect("the strokes do not lie on a line")
+        .solve(&right);
+    Affine2([0, 1].map(|i| [0, 1, 2].map(|k| solved[(k, i)])))
 }
 
 /// A rendered print.

@@ -1,25 +1,26 @@
 //! Simulated scanner: turns the part of a surface inside a polygon into an irregular triangle mesh.
 
-use std::collections::{BTreeMap, HashSet};
-
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::block_body::{BlockBody, add_patch};
+use super::conditions::ScanErrors;
+use super::debris::{add_blobs, add_far_spikes};
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
 use super::scalar_field::ScalarField;
 use crate::mesh::Mesh;
 
-/// Height of a scan with walls and base, mm.
-const BODY_MM: f64 = 1.9;
-/// Rows of vertices on a side wall.
-const WALL_ROWS: u32 = 5;
+/// Size of smooth scan errors, mm.
+const RIPPLE_MM: f64 = 0.5;
 
 /// Properties of a simulated scan.
 #[derive(Debug, Clone)]
 pub(super) struct ScanStyle {
-    /// Whether the scan includes side walls and base.
-    pub is_closed: bool,
+    /// What the scan contains besides the carved face.
+    pub body: BlockBody,
+    /// Errors beyond those of every scan.
+    pub errors: ScanErrors,
     /// Approximate number of vertices.
     pub vertices: f64,
     /// Standard deviation of the height noise, mm.
@@ -35,13 +36,24 @@ pub(super) struct ScanStyle {
 impl ScanStyle {
     /// Draws the properties of a scan with about `vertices` vertices. If `vertices` is `None`, their number is drawn as
     /// well: 22,000 to 132,000, with small numbers more likely.
-    pub(super) fn draw(is_damaged_scan: bool, vertices: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(
+        is_damaged_scan: bool,
+        errors: ScanErrors,
+        vertices: Option<u32>,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let is_closed = rng.random_bool(0.125);
+        let body = if is_closed {
+            BlockBody::thin()
+        } else {
+            BlockBody::Open
+        };
         let share: f64 = rng.random_range(0.0..1.0);
         Self {
-            is_closed,
+            body,
+            errors,
             vertices: vertices.map_or_else(|| 22_000.0 * 6.0_f64.powf(share * share), f64::from),
-            noise_mm: rng.random_range(0.005..0.010),
+            noise_mm: errors.noise * rng.random_range(0.005..0.010),
             spikes: rng.random_range(0..if is_damaged_scan { 40 } else { 6 }),
             holes: if is_closed { 0 } else { rng.random_range(0..5) },
             is_inside_out: rng.random_bool(0.15),
@@ -58,11 +70,26 @@ pub(super) fn scan(
     rng: &mut ChaCha8Rng,
 ) -> Mesh {
     let sampled = SampledSurface::sample(surface, outline, style, rng);
-    let mut mesh = sampled.triangles(outline, &holes(surface, style, rng), rng);
-    add_spikes(&mut mesh, style.spikes, rng);
-    if style.is_closed {
-        close_body(&mut mesh, style.noise_mm, rng);
+    let small = holes(surface, style, rng);
+    let large = large_holes(outline, style.errors.holes, rng);
+    let triangles = sampled.triangles(outline, &small, rng);
+    let is_seen = |triangle: &&[usize; 3]| {
+        large.is_empty() || triangle.iter().all(|i| !sampled.is_in_any(*i, &large))
+    };
+    let seen: Vec<[usize; 3]> = triangles.iter().filter(is_seen).copied().collect();
+    let mut mesh = MeshOfPoints::new(&sampled.points);
+    mesh.add(&seen);
+    add_spikes(&mut mesh.mesh, style.spikes, rng);
+    add_far_spikes(&mut mesh.mesh, style.errors.spikes, rng);
+    let mut mesh = style
+        .body
+        .complete(mesh, &triangles, outline, style.noise_mm, rng);
+    if let BlockBody::SeenThroughHoles { depth_mm } = style.body {
+        for hole in &large {
+            add_patch(&mut mesh, hole.centre, hole.radius_mm, depth_mm, rng);
+        }
     }
+    add_blobs(&mut mesh, style.errors.blobs, outline, rng);
     if style.is_inside_out {
         for [_, b, c] in mesh.triangles.iter_mut() {
             std::mem::swap(b, c);
@@ -87,11 +114,13 @@ impl SampledSurface {
         let bounds = outline.bounds();
         let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
         // The polygon fills about 84 % of its bounding box. A closed scan has a base, which uses half of the vertices.
-        let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
+        let wanted = style.vertices * if style.body.has_bottom() { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();
         let columns = (width / spacing) as usize + 9;
         let rows = (height / spacing) as usize + 9;
         let warp = [Noise::draw(rng), Noise::draw(rng)];
+        let ripple_mm = style.errors.ripple_mm;
+        let ripple = (ripple_mm > 0.0).then(|| Noise::draw(rng));
         let mut points = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             for column in 0..columns {
@@ -102,14 +131,28 @@ impl SampledSurface {
                 });
                 let (u, v) = (u + shift[0], v + shift[1]);
                 let z = surface.value([u, v]) + style.noise_mm * normal(rng);
+                let z = ripple.map_or(z, |noise| {
+                    z + ripple_mm * noise.at(u / RIPPLE_MM, v / RIPPLE_MM)
+                });
                 points.push([-u, -v, z]);
             }
         }
         Self { columns, points }
     }
 
-    /// Triangulates the points inside the outline and outside the holes. Drops the points that no triangle uses.
-    fn triangles(&self, outline: &Polygon, holes: &[ScanHole], rng: &mut ChaCha8Rng) -> Mesh {
+    /// Returns whether a point lies in any of the holes.
+    fn is_in_any(&self, index: usize, holes: &[ScanHole]) -> bool {
+        let [x, y, _] = self.points[index];
+        holes.iter().any(|hole| hole.contains([-x, -y]))
+    }
+
+    /// Triangulates the points inside the outline and outside the holes.
+    fn triangles(
+        &self,
+        outline: &Polygon,
+        holes: &[ScanHole],
+        rng: &mut ChaCha8Rng,
+    ) -> Vec<[usize; 3]> {
         let is_visible: Vec<bool> = self
             .points
             .iter()
@@ -132,25 +175,43 @@ impl SampledSurface {
                 kept.extend(halves.into_iter().filter(visible));
             }
         }
-        mesh_of(&self.points, &kept)
+        kept
     }
 }
 
-/// Returns a mesh of the triangles. Its vertices are the points that the triangles use, in the order of first use.
-fn mesh_of(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Mesh {
-    let mut index = vec![u32::MAX; points.len()];
-    let mut mesh = Mesh::default();
-    for triangle in triangles {
-        let corners = triangle.map(|corner| {
-            if index[corner] == u32::MAX {
-                index[corner] = mesh.vertices.len() as u32;
-                mesh.vertices.push(points[corner]);
-            }
-            index[corner]
-        });
-        mesh.triangles.push(corners);
+/// A mesh of points that enter it when the first triangle uses them.
+pub(super) struct MeshOfPoints<'a> {
+    points: &'a [[f64; 3]],
+    index: Vec<u32>,
+    /// The mesh.
+    pub mesh: Mesh,
+}
+
+impl<'a> MeshOfPoints<'a> {
+    fn new(points: &'a [[f64; 3]]) -> Self {
+        Self {
+            points,
+            index: vec![u32::MAX; points.len()],
+            mesh: Mesh::default(),
+        }
     }
-    mesh
+
+    /// Adds triangles.
+    fn add(&mut self, triangles: &[[usize; 3]]) {
+        for triangle in triangles {
+            let corners = triangle.map(|corner| self.vertex(corner));
+            self.mesh.triangles.push(corners);
+        }
+    }
+
+    /// Returns the vertex of a point, which is added if the mesh does not have it yet.
+    pub(super) fn vertex(&mut self, point: usize) -> u32 {
+        if self.index[point] == u32::MAX {
+            self.index[point] = self.mesh.vertices.len() as u32;
+            self.mesh.vertices.push(self.points[point]);
+        }
+        self.index[point]
+    }
 }
 
 /// A circular region without data.
@@ -178,6 +239,22 @@ fn holes(surface: &ScalarField, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<
         .collect()
 }
 
+/// Draws large holes anywhere inside the outline.
+fn large_holes(outline: &Polygon, count: u32, rng: &mut ChaCha8Rng) -> Vec<ScanHole> {
+    let bounds = outline.bounds();
+    let hole = |rng: &mut ChaCha8Rng| {
+        let radius_mm = rng.random_range(0.2..0.75);
+        let centre = [0, 1].map(|i| rng.random_range(bounds.min[i]..bounds.max[i]));
+        let is_inside = [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]]
+            .iter()
+            .all(|way| outline.contains([0, 1].map(|i| centre[i] + 1.4 * radius_mm * way[i])));
+        is_inside.then_some(ScanHole { centre, radius_mm })
+    };
+    (0..count)
+        .filter_map(|_| (0..50).find_map(|_| hole(rng)))
+        .collect()
+}
+
 fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
     for _ in 0..spikes {
         if mesh.vertices.is_empty() {
@@ -190,77 +267,14 @@ fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Adds side walls and a base.
-fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
-    let top = mesh.triangles.clone();
-    let boundary = boundary_edges(&top);
-    let base_start = mesh.vertices.len() as u32;
-    let base: Vec<[f64; 3]> = mesh
-        .vertices
-        .iter()
-        .map(|[x, y, _]| [x, y, -BODY_MM + noise_mm * normal(rng)])
-        .collect();
-    mesh.vertices.extend(base);
-    let under = top
-        .iter()
-        .map(|[a, b, c]| [a, c, b].map(|corner| corner + base_start));
-    mesh.triangles.extend(under);
-    let mut columns: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for (a, b) in boundary {
-        let [from, to] = [a, b].map(|corner| {
-            let column = columns.entry(corner);
-            let make = || wall_column(corner, base_start, mesh, noise_mm, rng);
-            column.or_insert_with(make).clone()
-        });
-        for row in 0..from.len() - 1 {
-            let (p, q, r, s) = (from[row], to[row], to[row + 1], from[row + 1]);
-            mesh.triangles.extend([[q, p, s], [q, s, r]]);
-        }
-    }
-}
-
-/// Returns the edges that belong to only one triangle. Their direction and order are as in `triangles`.
-fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
-    let edges = || {
-        triangles
-            .iter()
-            .flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)])
-    };
-    let directed: HashSet<(u32, u32)> = edges().collect();
-    edges()
-        .filter(|(a, b)| !directed.contains(&(*b, *a)))
-        .collect()
-}
-
-/// Adds the wall vertices below a boundary vertex. Returns the column of vertices from the boundary down to the base.
-fn wall_column(
-    boundary: u32,
-    base_start: u32,
-    mesh: &mut Mesh,
-    noise_mm: f64,
-    rng: &mut ChaCha8Rng,
-) -> Vec<u32> {
-    let [x, y, z] = mesh.vertices.at(boundary as usize);
-    let mut column = vec![boundary];
-    for row in 1..WALL_ROWS {
-        let share = f64::from(row) / f64::from(WALL_ROWS);
-        column.push(mesh.vertices.len() as u32);
-        mesh.vertices.push([
-            x + noise_mm * normal(rng),
-            y + noise_mm * normal(rng),
-            z + (-BODY_MM - z) * share,
-        ]);
-    }
-    column.push(boundary + base_start);
-    column
-}
-
 #[cfg(test)]
 mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{ScanStyle, boundary_edges, scan};
+    use super::{ScanStyle, scan};
+    use crate::demo::block_body::{BlockBody, boundary_edges};
+    use crate::demo::conditions::Conditions;
     use crate::demo::polygon::{BoundsMm, Polygon};
     use crate::demo::scalar_field::{SampleFrame, ScalarField};
     use crate::mesh::Mesh;
@@ -277,9 +291,10 @@ mod tests {
         scan(&surface, &outline, style, &mut rng)
     }
 
-    fn style(is_closed: bool) -> ScanStyle {
+    fn style(body: BlockBody) -> ScanStyle {
         ScanStyle {
-            is_closed,
+            body,
+            errors: Conditions::default().scan,
             vertices: 5000.0,
             noise_mm: 0.002,
             spikes: 0,
@@ -303,14 +318,14 @@ mod tests {
 
     #[test]
     fn closed_scan_has_no_boundary_and_a_positive_volume() {
-        let mesh = bump(&style(true));
+        let mesh = bump(&style(BlockBody::thin()));
         assert!(boundary_edges(&mesh.triangles).is_empty());
         assert!(volume(&mesh) > 0.0);
     }
 
     #[test]
     fn open_scan_has_about_the_requested_vertices_and_faces_outward() {
-        let mesh = bump(&style(false));
+        let mesh = bump(&style(BlockBody::Open));
         assert!(
             (4000..6000).contains(&mesh.vertices.len()),
             "{}",

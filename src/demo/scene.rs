@@ -1,9 +1,12 @@
 //! The subject of a pair: a character, its neighbours and the damage of the block.
 
+use std::fmt::Write as _;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
+use super::conditions::Conditions;
 use super::damage::Damage;
 use super::glyph::Glyphs;
 use super::scalar_field::ScalarField;
@@ -26,11 +29,16 @@ pub(super) struct Scene {
     pub print_neighbours: ScalarField,
     /// Damage of the block after printing.
     pub damage: Damage,
+    /// Conditions of carving, scan, print and crop.
+    pub conditions: Conditions,
 }
 
-/// Creates the random generator of one pair from seed, tier and index.
-pub(super) fn pair_rng(seed: u64, tier: Tier, index: u64) -> ChaCha8Rng {
-    let name = format!("mocban demo {tier} {seed} {index}");
+/// Creates the random generator of an attempt to draw a pair, from seed, tier and index. The first attempt is 0.
+pub(super) fn pair_rng(seed: u64, tier: Tier, index: u64, attempt: u32) -> ChaCha8Rng {
+    let mut name = format!("mocban demo {tier} {seed} {index}");
+    if attempt > 0 {
+        let _ = write!(name, " {attempt}");
+    }
     ChaCha8Rng::from_seed(*ContentHash::of(name.as_bytes()).as_bytes())
 }
 
@@ -40,26 +48,43 @@ pub(super) fn pair_id(tier: Tier, index: u64) -> String {
 }
 
 impl Scene {
-    /// Draws a character of the font with neighbours and, in the `hard` tier, damage.
+    /// Draws a random character of the font with neighbours, and the conditions and damage of the tier.
     pub(super) fn draw(glyphs: &Glyphs, tier: Tier, index: u64, rng: &mut ChaCha8Rng) -> Self {
+        let id = pair_id(tier, index);
+        let conditions = Conditions::draw(tier.kind(), rng);
+        Self::draw_with(glyphs, tier, id, conditions, rng)
+    }
+
+    /// Draws a random character of the font with neighbours and the damage of the tier under given conditions.
+    pub(super) fn draw_with(
+        glyphs: &Glyphs,
+        tier: Tier,
+        id: String,
+        conditions: Conditions,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let characters = glyphs.characters();
         let character = characters[rng.random_range(0..characters.len())];
-        let artwork = Artwork::of_glyph(glyphs, character, rng);
-        let block_neighbours = artwork.draw_neighbours(glyphs, rng);
+        let crop = conditions.crop;
+        let artwork = Artwork::of_glyph(glyphs, character, crop, rng);
+        let block_neighbours = artwork.draw_neighbours(glyphs, crop, rng);
         let (print_neighbours, damage) = if tier.is_damaged() {
-            let other = artwork.draw_neighbours(glyphs, rng);
+            let other = artwork.draw_neighbours(glyphs, crop, rng);
             (other, Damage::draw(&artwork, rng))
         } else {
-            (block_neighbours.clone(), Damage::default())
+            let lost = conditions.lost;
+            let damage = lost.map(|share| Damage::draw_with(share, &artwork, rng));
+            (block_neighbours.clone(), damage.unwrap_or_default())
         };
         Self {
-            id: pair_id(tier, index),
+            id,
             tier,
             character,
             artwork,
             block_neighbours,
             print_neighbours,
             damage,
+            conditions,
         }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::kind::{self, Kind};
 use crate::domain::enum_names;
 
 /// Number of pairs of the `real` tier.
@@ -11,7 +12,7 @@ pub(super) const REAL_PAIRS: u64 = 20;
 
 /// Difficulty of the built-in dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Tier {
     /// Scans in mm, rotated by at most 15 degrees against the print and tilted by at most 10 degrees.
     Upright,
@@ -22,10 +23,58 @@ pub enum Tier {
     Hard,
     /// The prints are twenty photographs of characters. The reliefs are carved from clean masks and have any pose.
     Real,
+    /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed paper.
+    Field,
+    /// Stroke tops worn down in patches and rounded at their edges.
+    Worn,
+    /// Shallow carving.
+    Shallow,
+    /// Dirt in the valleys.
+    Filled,
+    /// Scans smoothed by their software.
+    Smoothed,
+    /// Scans with strong noise and ripples.
+    Noisy,
+    /// A block or foot deeper than wide.
+    Thick,
+    /// Another character on the back of the block.
+    DoubleFaced,
+    /// A block on a table that was scanned with it.
+    Table,
+    /// Far outlier vertices and floating pieces.
+    Debris,
+    /// Large holes, through which the bottom or a surface behind the block shows.
+    Holes,
+    /// Too little ink.
+    Dry,
+    /// Too much ink.
+    Heavy,
+    /// A photograph of the print, taken at an angle.
+    Photo,
+    /// Paper that dried in waves.
+    Wavy,
+    /// Paper that shrank more along one axis than along the other.
+    Shrunk,
+    /// A large part of the strokes lost after printing.
+    Lost,
+    /// A mesh with all eight neighbours of the character; the print shows only the character.
+    GridMesh,
+    /// A print with all eight neighbours of the character; the mesh shows only the character.
+    GridPrint,
+    /// Several of these at once, each milder.
+    Mixed,
+    /// All other tiers in turn.
+    All,
 }
 
 enum_names! { pub Tier, "a tier":
     Upright = "upright", Pose = "pose", Hard = "hard", Real = "real",
+    Field = "field", Worn = "worn", Shallow = "shallow", Filled = "filled",
+    Smoothed = "smoothed", Noisy = "noisy", Thick = "thick", DoubleFaced = "double-faced",
+    Table = "table", Debris = "debris", Holes = "holes", Dry = "dry",
+    Heavy = "heavy", Photo = "photo", Wavy = "wavy", Shrunk = "shrunk",
+    Lost = "lost", GridMesh = "grid-mesh", GridPrint = "grid-print", Mixed = "mixed",
+    All = "all",
 }
 
 impl Tier {
@@ -34,12 +83,50 @@ impl Tier {
         (self == Self::Real).then_some(REAL_PAIRS)
     }
 
+    /// Returns the tier and the index within that tier of the pair with the given index. They differ from `self` and
+    /// `index` only in `All`.
+    pub(super) fn tier_and_index(self, index: u64) -> (Self, u64) {
+        if self != Self::All {
+            return (self, index);
+        }
+        let turns = Self::ALL.len() as u64 - 1;
+        (Self::ALL[(index % turns) as usize], index / turns)
+    }
+
+    /// Returns the ranges of the conditions, or `None` for the first four tiers, which have their own rules.
+    pub(super) const fn kind(self) -> Option<&'static Kind> {
+        Some(match self {
+            Self::Upright | Self::Pose | Self::Hard | Self::Real | Self::All => return None,
+            Self::Field => &kind::FIELD,
+            Self::Worn => &kind::WORN,
+            Self::Shallow => &kind::SHALLOW,
+            Self::Filled => &kind::FILLED,
+            Self::Smoothed => &kind::SMOOTHED,
+            Self::Noisy => &kind::NOISY,
+            Self::Thick => &kind::THICK,
+            Self::DoubleFaced => &kind::DOUBLE_FACED,
+            Self::Table => &kind::TABLE,
+            Self::Debris => &kind::DEBRIS,
+            Self::Holes => &kind::HOLES,
+            Self::Dry => &kind::DRY,
+            Self::Heavy => &kind::HEAVY,
+            Self::Photo => &kind::PHOTO,
+            Self::Wavy => &kind::WAVY,
+            Self::Shrunk => &kind::SHRUNK,
+            Self::Lost => &kind::LOST,
+            Self::GridMesh => &kind::GRID_MESH,
+            Self::GridPrint => &kind::GRID_PRINT,
+            Self::Mixed => &kind::MIXED,
+        })
+    }
+
     /// Returns the range of the bend's sagitta over the character, mm.
     pub(super) const fn bend_mm(self) -> Range<f64> {
         match self {
             Self::Upright => 0.0..0.03,
-            Self::Pose | Self::Real => 0.0..0.06,
             Self::Hard => 0.2..0.8,
+            Self::Field | Self::Mixed => 0.0..0.25,
+            _ => 0.0..0.06,
         }
     }
 
@@ -51,5 +138,19 @@ impl Tier {
     /// Returns whether the scan has an arbitrary orientation and unit.
     pub(super) fn is_any_pose(self) -> bool {
         self != Self::Upright
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Tier;
+
+    #[test]
+    fn all_takes_every_other_tier_in_turn() {
+        let last = Tier::ALL.len() as u64 - 2;
+        assert_eq!(Tier::All.tier_and_index(0), (Tier::Upright, 0));
+        assert_eq!(Tier::All.tier_and_index(last), (Tier::Mixed, 0));
+        assert_eq!(Tier::All.tier_and_index(last + 2), (Tier::Pose, 1));
+        assert_eq!(Tier::Worn.tier_and_index(7), (Tier::Worn, 7));
     }
 }

@@ -1,0 +1,141 @@
+//! Conditions of one pair, drawn from the ranges of its kind.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::kind::{Base, Bounds, Crop, Kind};
+use super::noise::Noise;
+use super::paper_geometry::PaperGeometry;
+use super::weathering::Weathering;
+
+/// Conditions that differ from those of the first four tiers.
+#[derive(Debug, Clone)]
+pub(super) struct Conditions {
+    /// Factor of the carved depth.
+    pub depth: f64,
+    /// Wear and dirt, if any.
+    pub weathering: Option<Weathering>,
+    /// Minimum and maximum share of the stroke area that is lost, if any is.
+    pub lost: Option<Bounds>,
+    /// Errors of the scan.
+    pub scan: ScanErrors,
+    /// What the scan contains besides the carved face.
+    pub base: Base,
+    /// Thickness of the block as a share of the character's size.
+    pub thickness: f64,
+    /// Amount of ink. `None` if the tier's own rule applies.
+    pub ink: Option<InkAmount>,
+    /// Deformation of the paper and position of the camera.
+    pub paper: Option<PaperGeometry>,
+    /// Which of mesh and print shows the neighbours.
+    pub crop: Crop,
+}
+
+/// Errors of a scan beyond those of every scan.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScanErrors {
+    /// Factor of the height noise.
+    pub noise: f64,
+    /// Smooth error: amplitude in mm.
+    pub ripple_mm: f64,
+    /// Standard deviation of the smoothing, mm.
+    pub smoothing_mm: f64,
+    /// Number of large holes.
+    pub holes: u32,
+    /// Number of far outlier vertices.
+    pub spikes: u32,
+    /// Number of floating pieces.
+    pub blobs: u32,
+}
+
+/// Amount of ink and its distribution.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct InkAmount {
+    /// Distance of the ink's edge from the edge of the printing surface, mm.
+    pub spread_mm: f64,
+    /// Ink density, 0..=1.
+    pub strength: f64,
+    /// Degree of dryness.
+    pub dryness: f64,
+    /// Largest share of missing ink.
+    pub uneven: f64,
+    /// Where the contact was poor.
+    pub contact: Noise,
+    /// Density of smeared ink.
+    pub smear: f64,
+    /// Where ink is smeared.
+    pub smears: Noise,
+}
+
+impl Default for Conditions {
+    /// Returns the conditions that change nothing.
+    fn default() -> Self {
+        Self {
+            depth: 1.0,
+            weathering: None,
+            lost: None,
+            scan: ScanErrors {
+                noise: 1.0,
+                ripple_mm: 0.0,
+                smoothing_mm: 0.0,
+                holes: 0,
+                spikes: 0,
+                blobs: 0,
+            },
+            base: Base::Ordinary,
+            thickness: 0.0,
+            ink: None,
+            paper: None,
+            crop: Crop::Character,
+        }
+    }
+}
+
+impl Conditions {
+    /// Draws the conditions of a kind. Draws nothing if there is no kind.
+    pub(super) fn draw(kind: Option<&Kind>, rng: &mut ChaCha8Rng) -> Self {
+        let Some(kind) = kind else {
+            return Self::default();
+        };
+        Self {
+            depth: within(kind.depth, rng),
+            weathering: Weathering::draw(kind, rng),
+            lost: (kind.lost[1] > 0.0).then_some(kind.lost),
+            scan: ScanErrors {
+                noise: within(kind.noise, rng),
+                ripple_mm: within(kind.ripple_mm, rng),
+                smoothing_mm: within(kind.smoothing_mm, rng),
+                holes: number_within(kind.holes, rng),
+                spikes: number_within(kind.spikes, rng),
+                blobs: number_within(kind.blobs, rng),
+            },
+            base: *one_of(kind.bases, rng),
+            thickness: within(kind.thickness, rng),
+            ink: Some(InkAmount {
+                spread_mm: within(kind.spread_mm, rng),
+                strength: within(kind.strength, rng),
+                dryness: within(kind.dryness, rng),
+                uneven: within(kind.uneven, rng),
+                contact: Noise::draw(rng),
+                smear: within(kind.smear, rng),
+                smears: Noise::draw(rng),
+            }),
+            paper: PaperGeometry::draw(kind, rng),
+            crop: kind.crop,
+        }
+    }
+}
+
+/// Draws a number from a range.
+pub(super) fn within([low, high]: Bounds, rng: &mut ChaCha8Rng) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+/// Draws a whole number from a range that includes both ends.
+fn number_within([low, high]: Bounds, rng: &mut ChaCha8Rng) -> u32 {
+    (low + (high - low + 1.0) * rng.random::<f64>()) as u32
+}
+
+fn one_of<'a, T>(choices: &'a [T], rng: &mut ChaCha8Rng) -> &'a T {
+    &choices[rng.random_range(0..choices.len())]
+}

@@ -1,0 +1,269 @@
+//! Kinds of pairs: each is a set of ranges of the same physical quantities.
+
+/// Minimum and maximum of a quantity that is drawn uniformly.
+pub(super) type Bounds = [f64; 2];
+
+/// What a scan contains besides the carved face.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Base {
+    /// Nothing, or in one of eight scans thin side walls and a flat base.
+    Ordinary,
+    /// Side walls and a rough bottom.
+    Foot,
+    /// Side walls and a second carved face with another character.
+    SecondFace,
+    /// Side walls and the table on which the block lies.
+    Table,
+    /// Parts of a surface behind the block, seen through the holes of the scan.
+    SeenThroughHoles,
+}
+
+/// Which of mesh and print shows the neighbouring characters as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Crop {
+    /// Neither: both are cut around the character.
+    Character,
+    /// The mesh shows 3 x 3 characters, the print one.
+    WideMesh,
+    /// The print shows 3 x 3 characters, the mesh one.
+    WidePrint,
+}
+
+/// Ranges from which the conditions of a pair are drawn.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kind {
+    /// Carved depth as a share of an ordinary block's, which is 1.0 to 1.4 mm.
+    pub depth: Bounds,
+    /// Height that wear removes from the stroke tops in patches, mm.
+    pub abrasion_mm: Bounds,
+    /// Height that wear removes from the stroke edges, mm.
+    pub rounding_mm: Bounds,
+    /// Share of the carved depth that is filled with dirt.
+    pub fill: Bounds,
+    /// Share of the stroke area that broke off after printing.
+    pub lost: Bounds,
+    /// Factor of the height noise of an ordinary scan.
+    pub noise: Bounds,
+    /// Amplitude of smooth scan errors with features of half a millimetre, mm.
+    pub ripple_mm: Bounds,
+    /// Standard deviation of the Gaussian by which the scan is smoothed, mm.
+    pub smoothing_mm: Bounds,
+    /// Number of large holes of the scan.
+    pub holes: Bounds,
+    /// Number of far outlier vertices.
+    pub spikes: Bounds,
+    /// Number of floating pieces.
+    pub blobs: Bounds,
+    /// What the scan contains besides the carved face; each is as likely as the others.
+    pub bases: &'static [Base],
+    /// Thickness of the block as a share of the character's size.
+    pub thickness: Bounds,
+    /// Distance by which the ink spreads beyond the printing surface, mm; may be negative.
+    pub spread_mm: Bounds,
+    /// Density of the ink.
+    pub strength: Bounds,
+    /// Degree to which the ink misses the wood in dry patches.
+    pub dryness: Bounds,
+    /// Share of the ink that is missing where the paper had the least contact.
+    pub uneven: Bounds,
+    /// Density of ink smeared on the carved background.
+    pub smear: Bounds,
+    /// Angle between the camera's axis and the paper's normal, degrees.
+    pub tilt_deg: Bounds,
+    /// Amplitude of the smooth warp of the paper, mm.
+    pub warp_mm: Bounds,
+    /// Share by which the paper shrank along one axis.
+    pub shrink: Bounds,
+    /// Which of mesh and print shows the neighbours.
+    pub crop: Crop,
+}
+
+/// A clean block, an ordinary scan and a good print.
+const ORDINARY: Kind = Kind {
+    depth: [0.9, 1.1],
+    abrasion_mm: [0.0, 0.0],
+    rounding_mm: [0.0, 0.0],
+    fill: [0.0, 0.0],
+    lost: [0.0, 0.0],
+    noise: [1.0, 1.0],
+    ripple_mm: [0.0, 0.0],
+    smoothing_mm: [0.0, 0.0],
+    holes: [0.0, 0.0],
+    spikes: [0.0, 0.0],
+    blobs: [0.0, 0.0],
+    bases: &[Base::Ordinary],
+    thickness: [0.3, 1.0],
+    spread_mm: [-0.01, 0.06],
+    strength: [0.75, 0.97],
+    dryness: [0.0, 0.7],
+    uneven: [0.0, 0.15],
+    smear: [0.0, 0.0],
+    tilt_deg: [0.0, 0.0],
+    warp_mm: [0.0, 0.0],
+    shrink: [0.0, 0.0],
+    crop: Crop::Character,
+};
+
+/// A moderate mix of wear, dirt, scan errors, uneven ink and deformed paper.
+pub(super) const FIELD: Kind = Kind {
+    depth: [0.55, 1.15],
+    abrasion_mm: [0.0, 0.16],
+    rounding_mm: [0.0, 0.14],
+    fill: [0.0, 0.45],
+    lost: [0.0, 0.08],
+    noise: [1.0, 3.0],
+    ripple_mm: [0.0, 0.02],
+    smoothing_mm: [0.0, 0.07],
+    holes: [0.0, 2.0],
+    spikes: [0.0, 12.0],
+    spread_mm: [-0.05, 0.11],
+    strength: [0.55, 0.97],
+    dryness: [0.0, 1.0],
+    uneven: [0.0, 0.5],
+    smear: [0.0, 0.12],
+    warp_mm: [0.0, 0.08],
+    shrink: [0.0, 0.015],
+    ..ORDINARY
+};
+
+/// Stroke tops worn down in patches and rounded at their edges.
+pub(super) const WORN: Kind = Kind {
+    abrasion_mm: [0.02, 0.45],
+    rounding_mm: [0.03, 0.40],
+    ..ORDINARY
+};
+
+/// Shallow carving.
+pub(super) const SHALLOW: Kind = Kind {
+    depth: [0.16, 0.55],
+    ..ORDINARY
+};
+
+/// Dirt in the valleys.
+pub(super) const FILLED: Kind = Kind {
+    fill: [0.15, 0.85],
+    ..ORDINARY
+};
+
+/// Smoothed scans.
+pub(super) const SMOOTHED: Kind = Kind {
+    smoothing_mm: [0.04, 0.26],
+    ..ORDINARY
+};
+
+/// Scans with strong noise and ripples.
+pub(super) const NOISY: Kind = Kind {
+    noise: [1.5, 8.0],
+    ripple_mm: [0.0, 0.07],
+    ..ORDINARY
+};
+
+/// A block or foot deeper than it is wide.
+pub(super) const THICK: Kind = Kind {
+    bases: &[Base::Foot],
+    thickness: [1.1, 4.0],
+    ..ORDINARY
+};
+
+/// Both faces carved, with different characters.
+pub(super) const DOUBLE_FACED: Kind = Kind {
+    bases: &[Base::SecondFace],
+    thickness: [0.3, 3.0],
+    ..ORDINARY
+};
+
+/// A block on a table that was scanned with it.
+pub(super) const TABLE: Kind = Kind {
+    bases: &[Base::Table],
+    thickness: [0.2, 2.8],
+    ..ORDINARY
+};
+
+/// Spikes and floating pieces.
+pub(super) const DEBRIS: Kind = Kind {
+    spikes: [0.0, 400.0],
+    blobs: [1.0, 30.0],
+    ..ORDINARY
+};
+
+/// Holes through which the bottom of the block or a surface behind it is seen.
+pub(super) const HOLES: Kind = Kind {
+    holes: [1.0, 12.0],
+    bases: &[Base::SeenThroughHoles, Base::Foot],
+    thickness: [0.3, 3.0],
+    ..ORDINARY
+};
+
+/// Too little ink.
+pub(super) const DRY: Kind = Kind {
+    spread_mm: [-0.12, 0.0],
+    strength: [0.3, 0.85],
+    dryness: [0.5, 1.3],
+    uneven: [0.0, 0.6],
+    ..ORDINARY
+};
+
+/// Too much ink, which fills narrow gaps and smears on the background.
+pub(super) const HEAVY: Kind = Kind {
+    spread_mm: [0.07, 0.25],
+    strength: [0.88, 1.0],
+    dryness: [0.0, 0.2],
+    smear: [0.0, 0.4],
+    ..ORDINARY
+};
+
+/// A photograph of the print, taken at an angle.
+pub(super) const PHOTO: Kind = Kind {
+    tilt_deg: [3.0, 35.0],
+    ..ORDINARY
+};
+
+/// Paper that dried unevenly.
+pub(super) const WAVY: Kind = Kind {
+    warp_mm: [0.05, 0.35],
+    ..ORDINARY
+};
+
+/// Paper that shrank more along one axis than along the other.
+pub(super) const SHRUNK: Kind = Kind {
+    shrink: [0.005, 0.06],
+    ..ORDINARY
+};
+
+/// A large part of the strokes lost.
+pub(super) const LOST: Kind = Kind {
+    lost: [0.15, 0.60],
+    ..ORDINARY
+};
+
+/// 3 x 3 characters in the mesh only.
+pub(super) const GRID_MESH: Kind = Kind {
+    crop: Crop::WideMesh,
+    ..ORDINARY
+};
+
+/// 3 x 3 characters in the print only.
+pub(super) const GRID_PRINT: Kind = Kind {
+    crop: Crop::WidePrint,
+    ..ORDINARY
+};
+
+/// Several of the above at once, each milder than in its own kind.
+pub(super) const MIXED: Kind = Kind {
+    abrasion_mm: [0.0, 0.2],
+    rounding_mm: [0.0, 0.15],
+    fill: [0.0, 0.4],
+    lost: [0.0, 0.2],
+    noise: [1.0, 3.0],
+    holes: [0.0, 3.0],
+    spikes: [0.0, 60.0],
+    blobs: [0.0, 6.0],
+    bases: &[Base::Ordinary, Base::Foot, Base::Table],
+    thickness: [0.3, 2.0],
+    dryness: [0.0, 1.0],
+    uneven: [0.0, 0.4],
+    tilt_deg: [0.0, 18.0],
+    warp_mm: [0.0, 0.12],
+    shrink: [0.0, 0.025],
+    ..ORDINARY
+};

@@ -1,0 +1,93 @@
+//! Deformation of the paper and perspective of the camera: the map from the block's plane to the image plane.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::conditions::within;
+use super::ellipse::Axis;
+use super::kind::Kind;
+use super::noise::Noise;
+
+/// Largest number of steps of the fixed-point iteration that inverts the warp.
+const INVERSION_STEPS: usize = 30;
+/// Size of the warp's features, mm.
+const WARP_SIZE_MM: [f64; 2] = [4.5, 9.0];
+/// Distance of the camera from the paper, mm.
+const CAMERA_MM: [f64; 2] = [70.0, 300.0];
+
+/// A smooth warp, then a shrinkage, then a perspective view. All of them keep the character's centre nearly in place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PaperGeometry {
+    warp_mm: f64,
+    warp_size_mm: f64,
+    warp: [Noise; 2],
+    shrink_axis: Axis,
+    /// Factors along and across the axis.
+    shrink: [f64; 2],
+    tilt_axis: Axis,
+    tilt_rad: f64,
+    camera_mm: f64,
+}
+
+impl PaperGeometry {
+    /// Draws the geometry of a kind. Returns `None` if the kind has flat and undeformed paper.
+    pub(super) fn draw(kind: &Kind, rng: &mut ChaCha8Rng) -> Option<Self> {
+        let most = [kind.warp_mm[1], kind.shrink[1], kind.tilt_deg[1]];
+        most.iter().any(|value| *value > 0.0).then(|| {
+            let shrink = within(kind.shrink, rng);
+            Self {
+                warp_mm: within(kind.warp_mm, rng),
+                warp_size_mm: within(WARP_SIZE_MM, rng),
+                warp: [Noise::draw(rng), Noise::draw(rng)],
+                shrink_axis: Axis::draw_any(rng),
+                shrink: [1.0 - shrink, 1.0 - shrink * rng.random_range(0.0..0.4)],
+                tilt_axis: Axis::at(rng.random_range(0.0..std::f64::consts::TAU)),
+                tilt_rad: within(kind.tilt_deg, rng).to_radians(),
+                camera_mm: within(CAMERA_MM, rng),
+            }
+        })
+    }
+
+    /// Returns where a point of the block's plane appears in the image plane. Both are in mm.
+    pub(super) fn image_from_uv(&self, uv: [f64; 2]) -> [f64; 2] {
+        let shift = self.warp_at(uv);
+        let warped = [uv[0] + shift[0], uv[1] + shift[1]];
+        let [along, across] = self.shrink_axis.along_across(warped);
+        let shrunk = [along * self.shrink[0], across * self.shrink[1]];
+        let [along, across] = self.tilt_axis.along_across(self.shrink_axis.point(shrunk));
+        let (sin, cos) = self.tilt_rad.sin_cos();
+        let scale = self.camera_mm / (self.camera_mm + along * sin);
+        self.tilt_axis.point([along * cos * scale, across * scale])
+    }
+
+    /// Returns which point of the block's plane appears at a point of the image plane.
+    pub(super) fn uv_from_image(&self, image: [f64; 2]) -> [f64; 2] {
+        let [along, across] = self.tilt_axis.along_across(image);
+        let (sin, cos) = self.tilt_rad.sin_cos();
+        let along = along * self.camera_mm / (cos * self.camera_mm - along * sin);
+        let across = across * (self.camera_mm + along * sin) / self.camera_mm;
+        let shrunk = self.tilt_axis.point([along, across]);
+        let [along, across] = self.shrink_axis.along_across(shrunk);
+        let unshrunk = [along / self.shrink[0], across / self.shrink[1]];
+        let warped = self.shrink_axis.point(unshrunk);
+        let mut uv = warped;
+        for _ in 0..INVERSION_STEPS {
+            let shift = self.warp_at(uv);
+            let next = [warped[0] - shift[0], warped[1] - shift[1]];
+            if next == uv {
+                break;
+            }
+            uv = next;
+        }
+        uv
+    }
+
+    fn warp_at(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        if self.warp_mm == 0.0 {
+            return [0.0; 2];
+        }
+        let size = self.warp_size_mm;
+        self.warp
+            .map(|noise| self.warp_mm * noise.at(u / size, v / size))
+    }
+}
