@@ -8,6 +8,7 @@ use mocban::report::stats::quantile;
 use super::accuracy::share;
 use super::case::Case;
 use super::decoy::{Decoy, decoy_pair};
+use super::kinds::SURE;
 use super::markdown::{Table, number};
 use super::method::Method;
 use super::numbers::Numbers;
@@ -21,7 +22,8 @@ const FALSE_ALARMS: f64 = 0.01;
 
 const NOTE: &str = "\
 Rejected by a stage: the pair ended in an error. Rejected: that, or a confidence of the metric below the level under \
-which 1 % of the preset's right pairs of all tiers lie.";
+which 1 % of the preset's right pairs of all tiers lie. The last columns count the decoys that no stage rejected, and those among \
+them with a confidence of at least 0.5.";
 
 /// Result of a decoy.
 pub(super) struct Answer {
@@ -90,6 +92,8 @@ pub(super) fn table(
         "rejected by a stage",
         "level",
         "rejected",
+        "accepted",
+        "accepted at 0.5",
     ];
     let mut table = Table::new("Decoys", &heads);
     for tier in &options.tiers {
@@ -113,7 +117,7 @@ pub(super) fn table(
     table.render(NOTE)
 }
 
-fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
+fn row(answers: &[&Answer], level: Option<f64>) -> [String; 6] {
     let count = |is_rejected: &dyn Fn(&Answer) -> bool| {
         let rejected = answers.iter().filter(|answer| is_rejected(answer)).count();
         share(rejected, answers.len())
@@ -123,11 +127,17 @@ fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
         Err(()) => true,
         Ok(confidence) => confidence.is_some_and(|sure| level.is_some_and(|level| sure < level)),
     });
+    let accepted = answers
+        .iter()
+        .filter_map(|answer| answer.outcome.ok())
+        .map(Option::unwrap_or_default);
     [
         answers.len().to_string(),
         by_stage,
         number(level, 3),
         rejected,
+        accepted.clone().count().to_string(),
+        accepted.filter(|sure| *sure >= SURE).count().to_string(),
     ]
 }
 

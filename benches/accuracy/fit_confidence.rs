@@ -1,12 +1,12 @@
 //! Fits the weights of the confidence model (`stages/register/confidence.rs`) and checks them on other seeds.
 //!
-//! Training examples are alignments of the chosen pairs and of their decoys (another character's print, a mirrored
-//! mesh, an uncarved plate). `register.min_confidence` is 0, so that no alignment is refused for low confidence. The
-//! pose weights predict whether rotation and landmarks are right. The mask weights predict whether the mask is right,
-//! and are fitted only on examples with a right pose. Both are fitted by logistic regression with a ridge penalty on
-//! standardized inputs, using Newton's method (iteratively reweighted least squares).
-
-use std::fmt::Write as _;
+//! Training examples are alignments of the chosen pairs and of their decoys (the print of another character or of a
+//! look-alike, a mirrored mesh, an uncarved plate). `register.min_confidence` is 0, so that no alignment is refused for
+//! low confidence. The pose weights predict whether rotation and landmarks are right. The mask weights predict whether
+//! the mask is right, and are fitted only on examples with a right pose. The character weights predict whether print
+//! and relief show the same character, and are fitted on examples with a right pose and on look-alikes, which the pose
+//! weights leave out. All are fitted by logistic regression with a ridge penalty on standardized inputs, using Newton's
+//! method (iteratively reweighted least squares).
 
 use mocban::report::ground_truth::{
     MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord,
@@ -19,9 +19,9 @@ use nalgebra::{DMatrix, DVector};
 use super::case::Case;
 use super::decoy::Decoy;
 use super::decoys::input;
-use super::markdown::{Table, number};
 use super::method::Method;
 use super::options::Options;
+use super::reliability::{Judged, table};
 use super::run::Run;
 use super::workers::in_order;
 
@@ -29,8 +29,6 @@ use super::workers::in_order;
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;
-/// Bins of the reliability table: upper ends of confidence.
-const BINS: [f64; 7] = [0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0];
 
 const NOTE: &str = "\
 Pairs and decoys of the held-out seeds, one row for each range of confidence: number of results, mean confidence and \
@@ -42,24 +40,59 @@ struct Example {
     inputs: ConfidenceInputs,
     is_pose_right: bool,
     is_mask_right: bool,
+    /// Whether the print shows a character with nearly the same strokes.
+    is_look_alike: bool,
 }
 
-/// Weights of both logistic models.
-struct Weights {
-    pose: Vec<f64>,
-    mask: Vec<f64>,
+/// A logistic model, one factor of the confidence.
+struct Model {
+    /// Name of the constant with the weights, and of the constant with their number.
+    constant: [&'static str; 2],
+    /// Returns the inputs of the model.
+    inputs: fn(&ConfidenceInputs) -> &[f64],
+    /// Returns whether the model is fitted on an example.
+    is_used: fn(&Example) -> bool,
+    /// Returns what the model predicts.
+    label: fn(&Example) -> bool,
 }
+
+/// All factors of the confidence.
+const MODELS: [Model; 3] = [
+    Model {
+        constant: ["POSE", "POSE_INPUTS"],
+        inputs: |inputs| &inputs.pose,
+        is_used: |example| !example.is_look_alike,
+        label: |example| example.is_pose_right,
+    },
+    Model {
+        constant: ["MASK", "MASK_INPUTS"],
+        inputs: |inputs| &inputs.mask,
+        is_used: |example| example.is_pose_right,
+        label: |example| example.is_mask_right,
+    },
+    Model {
+        constant: ["CHARACTER", "CHARACTER_INPUTS"],
+        inputs: |inputs| &inputs.character,
+        is_used: |example| example.is_pose_right || example.is_look_alike,
+        label: |example| !example.is_look_alike,
+    },
+];
+
+/// Weights of all models.
+struct Weights([Vec<f64>; MODELS.len()]);
 
 /// Fits the weights on the chosen pairs. Returns them as Rust code, with a reliability table for the held-out seeds.
 pub(super) fn report(options: &Options, method: &Method) -> anyhow::Result<String> {
     let training = examples(&options.cases(), method, options)?;
     let held_out = examples(&options.held_out_cases(), method, options)?;
     let fitted = fit(&training);
+    let constants = MODELS.iter().zip(&fitted.0);
+    let constants: String = constants
+        .map(|(model, weights)| constant(model.constant, weights))
+        .collect();
     let mut text = format!(
-        "## Confidence weights fitted on {} results\n\n```rust\n{}{}```\n\n",
+        "## Confidence weights fitted on {} results\n\n```rust\n{constants}```\n\n",
         training.len(),
-        constant("POSE", "POSE_INPUTS", &fitted.pose),
-        constant("MASK", "MASK_INPUTS", &fitted.mask),
     );
     text.push_str(&reliability(&held_out, &fitted));
     Ok(text)
@@ -87,6 +120,7 @@ fn examples(cases: &[Case], method: &Method, options: &Options) -> anyhow::Resul
                     inputs: *inputs,
                     is_pose_right: false,
                     is_mask_right: false,
+                    is_look_alike: kind == Decoy::LookAlike,
                 }));
             }
         }
@@ -110,33 +144,24 @@ fn example(inputs: &ConfidenceInputs, errors: &TruthErrors) -> Example {
         inputs: *inputs,
         is_pose_right: errors.angle_deg <= MAX_ANGLE_DEG && errors.tre_pct <= MAX_TRE_PCT,
         is_mask_right: errors.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU),
+        is_look_alike: false,
     }
 }
 
-/// Fits both models.
+/// Fits all models.
 fn fit(examples: &[Example]) -> Weights {
-    let rows =
-        |examples: &[&Example], inputs: fn(&Example) -> Vec<f64>, label: fn(&Example) -> bool| {
-            let x: Vec<Vec<f64>> = examples.iter().map(|e| inputs(e)).collect();
-            let y: Vec<bool> = examples.iter().map(|e| label(e)).collect();
-            logistic_regression(&x, &y)
-        };
-    let all: Vec<&Example> = examples.iter().collect();
-    let with_right_pose: Vec<&Example> = examples.iter().filter(|e| e.is_pose_right).collect();
-    Weights {
-        pose: rows(&all, |e| e.inputs.pose.to_vec(), |e| e.is_pose_right),
-        mask: rows(
-            &with_right_pose,
-            |e| e.inputs.mask.to_vec(),
-            |e| e.is_mask_right,
-        ),
-    }
+    Weights(MODELS.map(|model| {
+        let used: Vec<&Example> = examples.iter().filter(|e| (model.is_used)(e)).collect();
+        let inputs: Vec<&[f64]> = used.iter().map(|e| (model.inputs)(&e.inputs)).collect();
+        let labels: Vec<bool> = used.iter().map(|e| (model.label)(e)).collect();
+        logistic_regression(&inputs, &labels)
+    }))
 }
 
 /// Fits a logistic regression with a ridge penalty. The first input of each row is the constant 1, which is not
 /// penalized.
-fn logistic_regression(inputs: &[Vec<f64>], labels: &[bool]) -> Vec<f64> {
-    let (count, width) = (inputs.len(), inputs.first().map_or(0, Vec::len));
+fn logistic_regression(inputs: &[&[f64]], labels: &[bool]) -> Vec<f64> {
+    let (count, width) = (inputs.len(), inputs.first().map_or(0, |row| row.len()));
     let column = |k: usize| inputs.iter().map(move |row| row[k]);
     let scale: Vec<(f64, f64)> = (0..width)
         .map(|k| {
@@ -179,7 +204,7 @@ fn logistic_regression(inputs: &[Vec<f64>], labels: &[bool]) -> Vec<f64> {
     plain
 }
 
-fn constant(name: &str, length: &str, weights: &[f64]) -> String {
+fn constant([name, length]: [&str; 2], weights: &[f64]) -> String {
     let numbers: Vec<String> = weights.iter().map(|w| format!("{w:.2}")).collect();
     format!(
         "const {name}: [f64; {length}] = [{}];\n",
@@ -189,61 +214,27 @@ fn constant(name: &str, length: &str, weights: &[f64]) -> String {
 
 impl Weights {
     fn confidence(&self, inputs: &ConfidenceInputs) -> f64 {
-        let logistic = |weights: &[f64], inputs: &[f64]| {
-            let sum: f64 = weights.iter().zip(inputs).map(|(w, x)| w * x).sum();
+        let factor = |(model, weights): (&Model, &Vec<f64>)| {
+            let sum: f64 = weights
+                .iter()
+                .zip((model.inputs)(inputs))
+                .map(|(w, x)| w * x)
+                .sum();
             1.0 / (1.0 + (-sum).exp())
         };
-        logistic(&self.pose, &inputs.pose)
-            * logistic(&self.mask, &inputs.mask)
-            * inputs.of_character()
+        MODELS.iter().zip(&self.0).map(factor).product()
     }
 }
 
-/// Returns the reliability table and the mean log loss, for the built-in and for the fitted weights.
+/// Returns the reliability table for the built-in and for the fitted weights.
 fn reliability(examples: &[Example], fitted: &Weights) -> String {
-    let is_right = |e: &Example| e.is_pose_right && e.is_mask_right;
-    let columns: [Vec<(f64, bool)>; 2] = [
-        examples
-            .iter()
-            .map(|e| (e.inputs.confidence(), is_right(e)))
-            .collect(),
-        examples
-            .iter()
-            .map(|e| (fitted.confidence(&e.inputs), is_right(e)))
-            .collect(),
+    let column = |confidence: &dyn Fn(&ConfidenceInputs) -> f64| -> Vec<Judged> {
+        let judged = |e: &Example| (confidence(&e.inputs), e.is_pose_right && e.is_mask_right);
+        examples.iter().map(judged).collect()
+    };
+    let columns = [
+        ("built-in", column(&ConfidenceInputs::confidence)),
+        ("fitted", column(&|inputs| fitted.confidence(inputs))),
     ];
-    let heads = [
-        "confidence up to",
-        "built-in n",
-        "mean",
-        "right",
-        "fitted n",
-        "mean",
-        "right",
-    ];
-    let mut table = Table::new("Reliability on held-out seeds", &heads);
-    let mut from = 0.0;
-    for to in BINS {
-        let mut cells = vec![to.to_string()];
-        for column in &columns {
-            let inside = |c: f64| (c >= from || from == 0.0) && (c < to || to == 1.0);
-            let bin: Vec<_> = column.iter().filter(|(c, _)| inside(*c)).collect();
-            let mean = |value: &dyn Fn(&(f64, bool)) -> f64| {
-                (!bin.is_empty())
-                    .then(|| bin.iter().map(|e| value(e)).sum::<f64>() / bin.len() as f64)
-            };
-            cells.push(bin.len().to_string());
-            cells.push(number(mean(&|e| e.0), 3));
-            cells.push(number(mean(&|e| f64::from(u8::from(e.1))), 3));
-        }
-        table.push(cells);
-        from = to;
-    }
-    let mut text = table.render(NOTE);
-    for (name, column) in ["built-in", "fitted"].iter().zip(&columns) {
-        let loss = |(c, right): &(f64, bool)| -(if *right { *c } else { 1.0 - c }).max(1e-9).ln();
-        let mean = column.iter().map(loss).sum::<f64>() / column.len().max(1) as f64;
-        let _ = writeln!(text, "\nMean log loss, {name}: {mean:.4}");
-    }
-    text
+    table("Reliability on held-out seeds", &columns, NOTE)
 }

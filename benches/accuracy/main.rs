@@ -5,6 +5,7 @@
 //! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default,paper
 //! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
 //! cargo bench --bench accuracy -- --decoys
+//! cargo bench --bench accuracy -- --tiers all --pairs 20
 //! cargo bench --bench accuracy -- --fit-confidence --seeds 11,12 --held-out-seeds 13
 //! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
@@ -20,11 +21,13 @@ mod certainty;
 mod decoy;
 mod decoys;
 mod fit_confidence;
+mod kinds;
 mod lines;
 mod markdown;
 mod method;
 mod numbers;
 mod options;
+mod reliability;
 mod run;
 mod sheet;
 mod speed;
@@ -39,7 +42,7 @@ use clap::Parser as _;
 use options::Options;
 
 fn main() -> anyhow::Result<()> {
-    let options = Options::parse();
+    let options = Options::parse().with_every_tier();
     let (methods, cases) = (options.methods()?, options.cases());
     if options.fit_confidence {
         let texts = methods
@@ -54,6 +57,10 @@ fn main() -> anyhow::Result<()> {
         speed::table(&options.tiers, &methods, &trials),
     ];
     tables.extend(certainty::table(&options.tiers, &methods, &trials));
+    tables.extend([
+        kinds::table(&options.tiers, &methods, &trials, options.metric),
+        reliability::tables(&methods, &trials),
+    ]);
     if options.decoys {
         let answers = decoys::all(&cases, &methods, &options)?;
         tables.push(decoys::table(&options, &methods, &trials, &answers));

@@ -18,7 +18,7 @@ const PAIRS: u64 = 60;
 #[derive(Debug, Parser)]
 #[command(name = "accuracy")]
 pub(super) struct Options {
-    /// Kinds of pairs
+    /// Kinds of pairs; `all` is every kind
     #[arg(long, value_delimiter = ',', default_value = "upright,pose,hard,real")]
     pub(super) tiers: Vec<Tier>,
     /// Pairs of each tier and seed; the real tier has 20 [default: 60, and 1 under `cargo test`]
@@ -46,7 +46,7 @@ pub(super) struct Options {
     #[arg(long)]
     pub(super) decoys: bool,
     /// Fit the weights of the confidence model on these pairs and their decoys, and print nothing else
-    #[arg(long)]
+    #[arg(long, visible_alias = "fit")]
     pub(super) fit_confidence: bool,
     /// Seeds of the pairs on which fitted weights are checked
     #[arg(
@@ -71,6 +71,17 @@ pub(super) struct Options {
 }
 
 impl Options {
+    /// Replaces the tier `all` by every other tier.
+    pub(super) fn with_every_tier(mut self) -> Self {
+        if self.tiers.contains(&Tier::All) {
+            self.tiers = Tier::ALL
+                .into_iter()
+                .filter(|tier| *tier != Tier::All)
+                .collect();
+        }
+        self
+    }
+
     /// Returns the presets with the overridden settings.
     pub(super) fn methods(&self) -> anyhow::Result<Vec<Method>> {
         let load = |preset: &Preset| Method::load(*preset, &self.sets);

@@ -33,7 +33,7 @@ pub(super) struct DemoArgs {
     /// Seed of the dataset; the same seed gives the same bytes
     #[arg(long, value_name = "S", default_value = "1")]
     pub(super) seed: u64,
-    /// Difficulty: upright, pose, hard, real, all, or a kind such as worn, dry or table (docs/demo.md lists them)
+    /// Kind of pairs: upright, pose, hard, real, all, or another of docs/demo.md
     #[arg(long, default_value = "upright")]
     pub(super) tier: Tier,
     /// Create and import the dataset without running it

@@ -291,7 +291,7 @@ fn rows(depth_mm: f64) -> u32 {
 fn drop_unused(mesh: &mut Mesh) {
     let mut kept = Mesh::default();
     let mut index = vec![u32::MAX; mesh.vertices.len()];
-    for triangle in mesh.triangles.iter() {
+    for triangle in &mesh.triangles {
         let corners = triangle.map(|corner| {
             let new = &mut index[corner as usize];
             if *new == u32::MAX {

@@ -46,6 +46,20 @@ impl PairGenerator {
         if kind == Tier::Real {
             return calligraphy::pair(&self.glyphs, self.seed, index, self.vertices);
         }
-        drawn_pair(&self.glyphs, kind, self.seed, index, self.vertices)
+        self.drawn(kind, index, self.glyphs.characters())
+    }
+
+    /// Makes a pair of a given character of the font. In the `real` tier, the print is drawn instead of photographed.
+    ///
+    /// # Errors
+    /// Returns an error if an image cannot be encoded.
+    pub fn pair_of(&self, character: char, index: u64) -> Result<DemoPair, ImageError> {
+        let (kind, index) = self.tier.tier_and_index(index);
+        self.drawn(kind, index, &[character])
+    }
+
+    fn drawn(&self, kind: Tier, index: u64, characters: &[char]) -> Result<DemoPair, ImageError> {
+        let glyphs = &self.glyphs;
+        drawn_pair(glyphs, characters, kind, self.seed, index, self.vertices)
     }
 }

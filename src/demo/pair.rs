@@ -61,12 +61,14 @@ pub(super) struct Printed {
     pub extension: &'static str,
 }
 
-/// Makes a pair of a tier other than `real`: the character comes from the font.
+/// Makes a pair of a tier other than `real`: the character is one of `characters`, which are in the font. A pair of a
+/// kind that has no right answer is drawn again.
 ///
 /// # Errors
 /// Returns an error if the print cannot be encoded.
 pub(super) fn drawn_pair(
     glyphs: &Glyphs,
+    characters: &[char],
     tier: Tier,
     seed: u64,
     index: u64,
@@ -75,7 +77,7 @@ pub(super) fn drawn_pair(
     let mut attempt = 0;
     loop {
         let mut rng = pair_rng(seed, tier, index, attempt);
-        let scene = Scene::draw(glyphs, tier, index, &mut rng);
+        let scene = Scene::draw(glyphs, characters, tier, index, &mut rng);
         if let Some(printed) = print(&scene, &mut rng)? {
             let block = CarvedBlock::draw(&scene, &mut rng);
             let tops = block.truth(&scene).tops_mask(&printed.frame);
@@ -187,6 +189,7 @@ fn draw_body(glyphs: &Glyphs, scene: &Scene, rng: &mut ChaCha8Rng) -> BlockBody 
         Base::SecondFace => {
             let back = Scene::draw_with(
                 glyphs,
+                glyphs.characters(),
                 scene.tier,
                 scene.id.clone(),
                 Conditions::default(),

@@ -48,22 +48,28 @@ pub(super) fn pair_id(tier: Tier, index: u64) -> String {
 }
 
 impl Scene {
-    /// Draws a random character of the font with neighbours, and the conditions and damage of the tier.
-    pub(super) fn draw(glyphs: &Glyphs, tier: Tier, index: u64, rng: &mut ChaCha8Rng) -> Self {
+    /// Draws one of the characters with neighbours, and the conditions and damage of the tier.
+    pub(super) fn draw(
+        glyphs: &Glyphs,
+        characters: &[char],
+        tier: Tier,
+        index: u64,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let id = pair_id(tier, index);
         let conditions = Conditions::draw(tier.kind(), rng);
-        Self::draw_with(glyphs, tier, id, conditions, rng)
+        Self::draw_with(glyphs, characters, tier, id, conditions, rng)
     }
 
-    /// Draws a random character of the font with neighbours and the damage of the tier under given conditions.
+    /// Draws one of the characters with neighbours and the damage of the tier under given conditions.
     pub(super) fn draw_with(
         glyphs: &Glyphs,
+        characters: &[char],
         tier: Tier,
         id: String,
         conditions: Conditions,
         rng: &mut ChaCha8Rng,
     ) -> Self {
-        let characters = glyphs.characters();
         let character = characters[rng.random_range(0..characters.len())];
         let crop = conditions.crop;
         let artwork = Artwork::of_glyph(glyphs, character, crop, rng);

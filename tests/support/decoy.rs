@@ -11,11 +11,37 @@ const PLATE_NOISE: f64 = 0.0016;
 /// Depth, as a share of the character's height, below which the vertices of a closed scan belong to its base or walls.
 const BASE_DEPTH: f64 = 0.165;
 
+/// Characters of the demo's font that differ by one stroke or by the length of a stroke.
+const LOOK_ALIKES: [[char; 2]; 20] = [
+    ['申', '甲'],
+    ['太', '大'],
+    ['土', '士'],
+    ['日', '曰'],
+    ['天', '夫'],
+    ['木', '本'],
+    ['王', '玉'],
+    ['己', '已'],
+    ['人', '入'],
+    ['田', '由'],
+    ['由', '甲'],
+    ['白', '自'],
+    ['水', '永'],
+    ['問', '間'],
+    ['待', '侍'],
+    ['石', '右'],
+    ['主', '王'],
+    ['夫', '失'],
+    ['旦', '且'],
+    ['史', '吏'],
+];
+
 /// A kind of pair without a correct alignment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Decoy {
     /// The print of another character.
     WrongPrint,
+    /// The print of another character with nearly the same strokes. The mesh shows a character that has such a partner.
+    LookAlike,
     /// A mesh that is not in mirror writing, with outward faces.
     Mirrored,
     /// A flat plate with scanner noise instead of the carved block.
@@ -24,12 +50,18 @@ pub(crate) enum Decoy {
 
 impl Decoy {
     /// All kinds.
-    pub(crate) const ALL: [Self; 3] = [Self::WrongPrint, Self::Mirrored, Self::Uncarved];
+    pub(crate) const ALL: [Self; 4] = [
+        Self::WrongPrint,
+        Self::LookAlike,
+        Self::Mirrored,
+        Self::Uncarved,
+    ];
 
     /// Returns the name used in tables.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::WrongPrint => "wrong print",
+            Self::LookAlike => "look-alike print",
             Self::Mirrored => "mirrored mesh",
             Self::Uncarved => "uncarved mesh",
         }
@@ -56,6 +88,7 @@ pub(crate) fn decoy_pair(
 ) -> Result<DecoyPair, ImageError> {
     let pair = pairs.pair(index)?;
     Ok(match kind {
+        Decoy::LookAlike => look_alike(pairs, index)?,
         Decoy::WrongPrint => DecoyPair {
             print: print_of_another_character(pairs, &pair.character, index)?,
             mesh: pair.mesh,
@@ -68,6 +101,19 @@ pub(crate) fn decoy_pair(
             mesh: flattened(&pair, index),
             print: pair.print,
         },
+    })
+}
+
+/// Makes the mesh of a character and the print of its look-alike. Every second turn exchanges the two characters.
+fn look_alike(pairs: &PairGenerator, index: u64) -> Result<DecoyPair, ImageError> {
+    let count = LOOK_ALIKES.len() as u64;
+    let [mut carved, mut printed] = LOOK_ALIKES[(index % count) as usize];
+    if index / count % 2 == 1 {
+        std::mem::swap(&mut carved, &mut printed);
+    }
+    Ok(DecoyPair {
+        mesh: pairs.pair_of(carved, index)?.mesh,
+        print: pairs.pair_of(printed, index + 1)?.print,
     })
 }
 
