@@ -139,8 +139,10 @@ const CONTACT_SHEET: FaultScenario = FaultScenario {
         call(&mut contact_sheet(root)).expect(0);
         let new = content(&root.join("sheet"));
         assert_eq!(new.len(), 1);
-        // A sheet on which a pair is not drawn completely has exit code 3.
-        assert!(found == new || !done);
+        // A sheet on which a pair is not drawn completely has exit code 3. A hidden file that could not be removed stays
+        // until the next command.
+        let sheet = Path::new("out.png");
+        assert!(found[sheet] == new[sheet] || !done);
     },
 };
 
