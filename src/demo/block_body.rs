@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, HashSet};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::mesh_of_points::MeshOfPoints;
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
 use super::scalar_field::ScalarField;
-use super::scanner::MeshOfPoints;
 use crate::mesh::Mesh;
 
 /// Height of an ordinary scan with walls and base, mm.

@@ -9,10 +9,11 @@ use image::{GrayImage, ImageError};
 use rand::RngExt;
 
 use super::artwork::Artwork;
+use super::carved_block::CarvedBlock;
 use super::conditions::Conditions;
 use super::damage::Damage;
 use super::glyph::Glyphs;
-use super::pair::{CarvedBlock, DemoPair, Printed, finish_pair};
+use super::pair::{DemoPair, Printed, finish_pair};
 use super::rendered_print::PrintFrame;
 use super::scalar_field::bilinear;
 use super::scene::{Scene, pair_id, pair_rng};

@@ -1,9 +1,9 @@
 //! Conditions of one pair, drawn from the ranges of its kind.
 
-use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::kind::{Base, Bounds, Crop, Kind};
+use super::draw::{number_within, one_of, within};
+use super::kind::{Base, Crop, DemoKind, NumberRange};
 use super::noise::Noise;
 use super::paper_geometry::PaperGeometry;
 use super::weathering::Weathering;
@@ -16,7 +16,7 @@ pub(super) struct Conditions {
     /// Wear and dirt, if any.
     pub weathering: Option<Weathering>,
     /// Minimum and maximum share of the stroke area that is lost, if any is.
-    pub lost: Option<Bounds>,
+    pub lost: Option<NumberRange>,
     /// Errors of the scan.
     pub scan: ScanErrors,
     /// What the scan contains besides the carved face.
@@ -93,7 +93,7 @@ impl Default for Conditions {
 
 impl Conditions {
     /// Draws the conditions of a kind. Draws nothing if there is no kind.
-    pub(super) fn draw(kind: Option<&Kind>, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(kind: Option<&DemoKind>, rng: &mut ChaCha8Rng) -> Self {
         let Some(kind) = kind else {
             return Self::default();
         };
@@ -124,18 +124,4 @@ impl Conditions {
             crop: kind.crop,
         }
     }
-}
-
-/// Draws a number from a range.
-pub(super) fn within([low, high]: Bounds, rng: &mut ChaCha8Rng) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
-
-/// Draws a whole number from a range that includes both ends.
-fn number_within([low, high]: Bounds, rng: &mut ChaCha8Rng) -> u32 {
-    (low + (high - low + 1.0) * rng.random::<f64>()) as u32
-}
-
-fn one_of<'a, T>(choices: &'a [T], rng: &mut ChaCha8Rng) -> &'a T {
-    &choices[rng.random_range(0..choices.len())]
 }

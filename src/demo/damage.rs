@@ -5,12 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
 use super::ellipse::{Axis, Ellipse};
-use super::kind::Bounds;
+use super::kind::NumberRange;
 use super::noise::Noise;
 use super::scalar_field::ScalarField;
 
 /// Minimum and maximum share of the stroke area lost on a damaged block.
-const LOST_SHARE: Bounds = [0.05, 0.20];
+const LOST_SHARE: NumberRange = [0.05, 0.20];
 
 /// Damage to one block.
 #[derive(Debug, Clone, Default)]
@@ -40,7 +40,7 @@ impl Damage {
     }
 
     /// Draws the damage of a block that lost a share of its stroke area between two bounds.
-    pub(super) fn draw_with(share: Bounds, artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw_with(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
         let lost = Some(draw_lost_regions(share, artwork, rng));
         let cracks = (0..rng.random_range(0..3_u32))
             .map(|_| Crack::draw(rng))
@@ -87,7 +87,7 @@ impl Crack {
 }
 
 /// Draws ragged blobs over the strokes until a random share of the stroke area is lost.
-fn draw_lost_regions(share: Bounds, artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
+fn draw_lost_regions(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;
     let ink: Vec<(usize, usize)> = (0..frame.side * frame.side)

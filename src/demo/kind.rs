@@ -1,7 +1,7 @@
 //! Kinds of pairs: each is a set of ranges of the same physical quantities.
 
 /// Minimum and maximum of a quantity that is drawn uniformly.
-pub(super) type Bounds = [f64; 2];
+pub(super) type NumberRange = [f64; 2];
 
 /// What a scan contains besides the carved face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,55 +31,55 @@ pub(super) enum Crop {
 
 /// Ranges from which the conditions of a pair are drawn.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kind {
+pub(super) struct DemoKind {
     /// Carved depth as a share of an ordinary block's, which is 1.0 to 1.4 mm.
-    pub depth: Bounds,
+    pub depth: NumberRange,
     /// Height that wear removes from the stroke tops in patches, mm.
-    pub abrasion_mm: Bounds,
+    pub abrasion_mm: NumberRange,
     /// Height that wear removes from the stroke edges, mm.
-    pub rounding_mm: Bounds,
+    pub rounding_mm: NumberRange,
     /// Share of the carved depth that is filled with dirt.
-    pub fill: Bounds,
+    pub fill: NumberRange,
     /// Share of the stroke area that broke off after printing.
-    pub lost: Bounds,
+    pub lost: NumberRange,
     /// Factor of the height noise of an ordinary scan.
-    pub noise: Bounds,
+    pub noise: NumberRange,
     /// Amplitude of smooth scan errors with features of half a millimetre, mm.
-    pub ripple_mm: Bounds,
+    pub ripple_mm: NumberRange,
     /// Standard deviation of the Gaussian by which the scan is smoothed, mm.
-    pub smoothing_mm: Bounds,
+    pub smoothing_mm: NumberRange,
     /// Number of large holes of the scan.
-    pub holes: Bounds,
+    pub holes: NumberRange,
     /// Number of far outlier vertices.
-    pub spikes: Bounds,
+    pub spikes: NumberRange,
     /// Number of floating pieces.
-    pub blobs: Bounds,
+    pub blobs: NumberRange,
     /// What the scan contains besides the carved face; each is as likely as the others.
     pub bases: &'static [Base],
     /// Thickness of the block as a share of the character's size.
-    pub thickness: Bounds,
+    pub thickness: NumberRange,
     /// Distance by which the ink spreads beyond the printing surface, mm; may be negative.
-    pub spread_mm: Bounds,
+    pub spread_mm: NumberRange,
     /// Density of the ink.
-    pub strength: Bounds,
+    pub strength: NumberRange,
     /// Degree to which the ink misses the wood in dry patches.
-    pub dryness: Bounds,
+    pub dryness: NumberRange,
     /// Share of the ink that is missing where the paper had the least contact.
-    pub uneven: Bounds,
+    pub uneven: NumberRange,
     /// Density of ink smeared on the carved background.
-    pub smear: Bounds,
+    pub smear: NumberRange,
     /// Angle between the camera's axis and the paper's normal, degrees.
-    pub tilt_deg: Bounds,
+    pub tilt_deg: NumberRange,
     /// Amplitude of the smooth warp of the paper, mm.
-    pub warp_mm: Bounds,
+    pub warp_mm: NumberRange,
     /// Share by which the paper shrank along one axis.
-    pub shrink: Bounds,
+    pub shrink: NumberRange,
     /// Which of mesh and print shows the neighbours.
     pub crop: Crop,
 }
 
 /// A clean block, an ordinary scan and a good print.
-const ORDINARY: Kind = Kind {
+const ORDINARY: DemoKind = DemoKind {
     depth: [0.9, 1.1],
     abrasion_mm: [0.0, 0.0],
     rounding_mm: [0.0, 0.0],
@@ -105,7 +105,7 @@ const ORDINARY: Kind = Kind {
 };
 
 /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed paper.
-pub(super) const FIELD: Kind = Kind {
+pub(super) const FIELD: DemoKind = DemoKind {
     depth: [0.55, 1.15],
     abrasion_mm: [0.0, 0.16],
     rounding_mm: [0.0, 0.14],
@@ -127,67 +127,67 @@ pub(super) const FIELD: Kind = Kind {
 };
 
 /// Stroke tops worn down in patches and rounded at their edges.
-pub(super) const WORN: Kind = Kind {
+pub(super) const WORN: DemoKind = DemoKind {
     abrasion_mm: [0.02, 0.45],
     rounding_mm: [0.03, 0.40],
     ..ORDINARY
 };
 
 /// Shallow carving.
-pub(super) const SHALLOW: Kind = Kind {
+pub(super) const SHALLOW: DemoKind = DemoKind {
     depth: [0.16, 0.55],
     ..ORDINARY
 };
 
 /// Dirt in the valleys.
-pub(super) const FILLED: Kind = Kind {
+pub(super) const FILLED: DemoKind = DemoKind {
     fill: [0.15, 0.85],
     ..ORDINARY
 };
 
 /// Smoothed scans.
-pub(super) const SMOOTHED: Kind = Kind {
+pub(super) const SMOOTHED: DemoKind = DemoKind {
     smoothing_mm: [0.04, 0.26],
     ..ORDINARY
 };
 
 /// Scans with strong noise and ripples.
-pub(super) const NOISY: Kind = Kind {
+pub(super) const NOISY: DemoKind = DemoKind {
     noise: [1.5, 8.0],
     ripple_mm: [0.0, 0.07],
     ..ORDINARY
 };
 
 /// A block or foot deeper than it is wide.
-pub(super) const THICK: Kind = Kind {
+pub(super) const THICK: DemoKind = DemoKind {
     bases: &[Base::Foot],
     thickness: [1.1, 4.0],
     ..ORDINARY
 };
 
 /// Both faces carved, with different characters.
-pub(super) const DOUBLE_FACED: Kind = Kind {
+pub(super) const DOUBLE_FACED: DemoKind = DemoKind {
     bases: &[Base::SecondFace],
     thickness: [0.3, 3.0],
     ..ORDINARY
 };
 
 /// A block on a table that was scanned with it.
-pub(super) const TABLE: Kind = Kind {
+pub(super) const TABLE: DemoKind = DemoKind {
     bases: &[Base::Table],
     thickness: [0.2, 2.8],
     ..ORDINARY
 };
 
 /// Spikes and floating pieces.
-pub(super) const DEBRIS: Kind = Kind {
+pub(super) const DEBRIS: DemoKind = DemoKind {
     spikes: [0.0, 400.0],
     blobs: [1.0, 30.0],
     ..ORDINARY
 };
 
 /// Holes through which the bottom of the block or a surface behind it is seen.
-pub(super) const HOLES: Kind = Kind {
+pub(super) const HOLES: DemoKind = DemoKind {
     holes: [1.0, 12.0],
     bases: &[Base::SeenThroughHoles, Base::Foot],
     thickness: [0.3, 3.0],
@@ -195,7 +195,7 @@ pub(super) const HOLES: Kind = Kind {
 };
 
 /// Too little ink.
-pub(super) const DRY: Kind = Kind {
+pub(super) const DRY: DemoKind = DemoKind {
     spread_mm: [-0.12, 0.0],
     strength: [0.3, 0.85],
     dryness: [0.5, 1.3],
@@ -204,7 +204,7 @@ pub(super) const DRY: Kind = Kind {
 };
 
 /// Too much ink, which fills narrow gaps and smears on the background.
-pub(super) const HEAVY: Kind = Kind {
+pub(super) const HEAVY: DemoKind = DemoKind {
     spread_mm: [0.07, 0.25],
     strength: [0.88, 1.0],
     dryness: [0.0, 0.2],
@@ -213,43 +213,43 @@ pub(super) const HEAVY: Kind = Kind {
 };
 
 /// A photograph of the print, taken at an angle.
-pub(super) const PHOTO: Kind = Kind {
+pub(super) const PHOTO: DemoKind = DemoKind {
     tilt_deg: [3.0, 35.0],
     ..ORDINARY
 };
 
 /// Paper that dried unevenly.
-pub(super) const WAVY: Kind = Kind {
+pub(super) const WAVY: DemoKind = DemoKind {
     warp_mm: [0.05, 0.35],
     ..ORDINARY
 };
 
 /// Paper that shrank more along one axis than along the other.
-pub(super) const SHRUNK: Kind = Kind {
+pub(super) const SHRUNK: DemoKind = DemoKind {
     shrink: [0.005, 0.06],
     ..ORDINARY
 };
 
 /// A large part of the strokes lost.
-pub(super) const LOST: Kind = Kind {
+pub(super) const LOST: DemoKind = DemoKind {
     lost: [0.15, 0.60],
     ..ORDINARY
 };
 
 /// 3 x 3 characters in the mesh only.
-pub(super) const GRID_MESH: Kind = Kind {
+pub(super) const GRID_MESH: DemoKind = DemoKind {
     crop: Crop::WideMesh,
     ..ORDINARY
 };
 
 /// 3 x 3 characters in the print only.
-pub(super) const GRID_PRINT: Kind = Kind {
+pub(super) const GRID_PRINT: DemoKind = DemoKind {
     crop: Crop::WidePrint,
     ..ORDINARY
 };
 
 /// Several of the above at once, each milder than in its own kind.
-pub(super) const MIXED: Kind = Kind {
+pub(super) const MIXED: DemoKind = DemoKind {
     abrasion_mm: [0.0, 0.2],
     rounding_mm: [0.0, 0.15],
     fill: [0.0, 0.4],

@@ -3,22 +3,25 @@
 //! `tier` names the kinds of pairs, `kind` has their ranges, and `conditions` draws from them. `scene` draws the strokes
 //! (`artwork`) and `damage` removes parts of them. `carving` and `weathering` compute the carved surface. `scanner`,
 //! `block_body`, `debris` and `scan_pose` turn the surface into a mesh. `inking`, `print_sheet`, `paper_geometry`,
-//! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment. `generator` makes pairs in memory, from a seed, and
-//! `dataset` writes them to disk.
+//! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment. `generator` makes pairs
+//! in memory, from a seed, and `dataset` writes them to disk.
 
 mod artwork;
 mod block_body;
 mod calligraphy;
+mod carved_block;
 mod carving;
 mod conditions;
 mod damage;
 mod dataset;
 mod debris;
+mod draw;
 mod ellipse;
 mod generator;
 mod glyph;
 mod inking;
 mod kind;
+mod mesh_of_points;
 mod noise;
 mod pair;
 mod paper_geometry;

@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::artwork::WIDE_MARGIN;
 use super::block_body::BlockBody;
+use super::carved_block::CarvedBlock;
 use super::carving::carve;
 use super::conditions::Conditions;
 use super::glyph::Glyphs;
@@ -13,13 +14,12 @@ use super::kind::{Base, Crop};
 use super::polygon::Polygon;
 use super::print_format::encode_print;
 use super::rendered_print::{PrintFrame, render_print};
-use super::scalar_field::ScalarField;
 use super::scan_pose::ScanPose;
 use super::scanner::{ScanStyle, scan};
 use super::scene::{Scene, pair_rng};
 use super::solvable::{is_legible, is_solvable};
 use super::tier::Tier;
-use super::truth_line::{TruthLine, TruthSource};
+use super::truth_line::TruthLine;
 use crate::domain::LengthUnit;
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
@@ -105,43 +105,6 @@ fn print(scene: &Scene, rng: &mut ChaCha8Rng) -> Result<Option<Printed>, ImageEr
         bytes,
         extension,
     }))
-}
-
-/// The block at the time of the scan.
-pub(super) struct CarvedBlock {
-    /// Signed distance to the strokes left on the block, mm.
-    remaining: ScalarField,
-    /// Heights of the surface, mm.
-    surface: ScalarField,
-    /// The surface as smoothed by the scanner, if it smooths.
-    smoothed: Option<ScalarField>,
-}
-
-impl CarvedBlock {
-    /// Carves the damaged block.
-    pub(super) fn draw(scene: &Scene, rng: &mut ChaCha8Rng) -> Self {
-        let remaining = scene.damage.remaining(&scene.artwork.strokes);
-        let surface = carve(scene, &remaining, rng);
-        let sigma_mm = scene.conditions.scan.smoothing_mm;
-        Self {
-            smoothed: (sigma_mm > 0.0).then(|| surface.blurred(sigma_mm)),
-            remaining,
-            surface,
-        }
-    }
-
-    /// Returns the heights that the scanner sees, mm.
-    pub(super) fn scanned(&self) -> &ScalarField {
-        self.smoothed.as_ref().unwrap_or(&self.surface)
-    }
-
-    fn truth<'a>(&'a self, scene: &'a Scene) -> TruthSource<'a> {
-        TruthSource {
-            scene,
-            remaining: &self.remaining,
-            surface: self.scanned(),
-        }
-    }
 }
 
 /// Scans the block and records the ground truth.

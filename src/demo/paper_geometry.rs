@@ -3,9 +3,9 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::conditions::within;
+use super::draw::within;
 use super::ellipse::Axis;
-use super::kind::Kind;
+use super::kind::DemoKind;
 use super::noise::Noise;
 
 /// Largest number of steps of the fixed-point iteration that inverts the warp.
@@ -31,7 +31,7 @@ pub(super) struct PaperGeometry {
 
 impl PaperGeometry {
     /// Draws the geometry of a kind. Returns `None` if the kind has flat and undeformed paper.
-    pub(super) fn draw(kind: &Kind, rng: &mut ChaCha8Rng) -> Option<Self> {
+    pub(super) fn draw(kind: &DemoKind, rng: &mut ChaCha8Rng) -> Option<Self> {
         let most = [kind.warp_mm[1], kind.shrink[1], kind.tilt_deg[1]];
         most.iter().any(|value| *value > 0.0).then(|| {
             let shrink = within(kind.shrink, rng);

@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::block_body::{BlockBody, add_patch};
 use super::conditions::ScanErrors;
 use super::debris::{add_blobs, add_far_spikes};
+use super::mesh_of_points::MeshOfPoints;
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
 use super::scalar_field::ScalarField;
@@ -176,41 +177,6 @@ impl SampledSurface {
             }
         }
         kept
-    }
-}
-
-/// A mesh of points that enter it when the first triangle uses them.
-pub(super) struct MeshOfPoints<'a> {
-    points: &'a [[f64; 3]],
-    index: Vec<u32>,
-    /// The mesh.
-    pub mesh: Mesh,
-}
-
-impl<'a> MeshOfPoints<'a> {
-    fn new(points: &'a [[f64; 3]]) -> Self {
-        Self {
-            points,
-            index: vec![u32::MAX; points.len()],
-            mesh: Mesh::default(),
-        }
-    }
-
-    /// Adds triangles.
-    fn add(&mut self, triangles: &[[usize; 3]]) {
-        for triangle in triangles {
-            let corners = triangle.map(|corner| self.vertex(corner));
-            self.mesh.triangles.push(corners);
-        }
-    }
-
-    /// Returns the vertex of a point, which is added if the mesh does not have it yet.
-    pub(super) fn vertex(&mut self, point: usize) -> u32 {
-        if self.index[point] == u32::MAX {
-            self.index[point] = self.mesh.vertices.len() as u32;
-            self.mesh.vertices.push(self.points[point]);
-        }
-        self.index[point]
     }
 }
 

@@ -1,6 +1,6 @@
 //! Decides whether a pair of a kind has a right answer: print and relief must both show the character.
 
-use super::pair::CarvedBlock;
+use super::carved_block::CarvedBlock;
 use super::rendered_print::{PrintFrame, RenderedPrint};
 use super::scene::Scene;
 use super::truth_line::{IGNORED, STROKE_TOP};

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::kind::{self, Kind};
+use super::kind::{self, DemoKind};
 use crate::domain::enum_names;
 
 /// Number of pairs of the `real` tier.
@@ -94,7 +94,7 @@ impl Tier {
     }
 
     /// Returns the ranges of the conditions, or `None` for the first four tiers, which have their own rules.
-    pub(super) const fn kind(self) -> Option<&'static Kind> {
+    pub(super) const fn kind(self) -> Option<&'static DemoKind> {
         Some(match self {
             Self::Upright | Self::Pose | Self::Hard | Self::Real | Self::All => return None,
             Self::Field => &kind::FIELD,

@@ -2,8 +2,8 @@
 
 use rand_chacha::ChaCha8Rng;
 
-use super::conditions::within;
-use super::kind::Kind;
+use super::draw::within;
+use super::kind::DemoKind;
 use super::noise::{Noise, smoothstep};
 use super::scalar_field::ScalarField;
 
@@ -26,7 +26,7 @@ pub(super) struct Weathering {
 
 impl Weathering {
     /// Draws the wear and dirt of a kind. Returns `None` if the kind has none.
-    pub(super) fn draw(kind: &Kind, rng: &mut ChaCha8Rng) -> Option<Self> {
+    pub(super) fn draw(kind: &DemoKind, rng: &mut ChaCha8Rng) -> Option<Self> {
         let most = [kind.abrasion_mm[1], kind.rounding_mm[1], kind.fill[1]];
         most.iter().any(|value| *value > 0.0).then(|| Self {
             abrasion_mm: within(kind.abrasion_mm, rng),
