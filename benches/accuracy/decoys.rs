@@ -22,8 +22,8 @@ const FALSE_ALARMS: f64 = 0.01;
 
 const NOTE: &str = "\
 Rejected by a stage: the pair ended in an error. Rejected: that, or a confidence of the metric below the level under \
-which 1 % of the preset's right pairs of all tiers lie. The last columns count the decoys that no stage rejected, and those among \
-them with a confidence of at least 0.5.";
+which 1 % of the preset's right pairs of all tiers lie. The last columns count the decoys \
+that no stage rejected, and those among them with a confidence of at least 0.5.";
 
 /// Result of a decoy.
 pub(super) struct Answer {

@@ -46,8 +46,8 @@ struct Example {
 
 /// A logistic model, one factor of the confidence.
 struct Model {
-    /// Name of the constant with the weights, and of the constant with their number.
-    constant: [&'static str; 2],
+    /// Name of the constant with the weights.
+    constant: &'static str,
     /// Returns the inputs of the model.
     inputs: fn(&ConfidenceInputs) -> &[f64],
     /// Returns whether the model is fitted on an example.
@@ -59,19 +59,19 @@ struct Model {
 /// All factors of the confidence.
 const MODELS: [Model; 3] = [
     Model {
-        constant: ["POSE", "POSE_INPUTS"],
+        constant: "POSE",
         inputs: |inputs| &inputs.pose,
         is_used: |example| !example.is_look_alike,
         label: |example| example.is_pose_right,
     },
     Model {
-        constant: ["MASK", "MASK_INPUTS"],
+        constant: "MASK",
         inputs: |inputs| &inputs.mask,
         is_used: |example| example.is_pose_right,
         label: |example| example.is_mask_right,
     },
     Model {
-        constant: ["CHARACTER", "CHARACTER_INPUTS"],
+        constant: "CHARACTER",
         inputs: |inputs| &inputs.character,
         is_used: |example| example.is_pose_right || example.is_look_alike,
         label: |example| !example.is_look_alike,
@@ -204,10 +204,10 @@ fn logistic_regression(inputs: &[&[f64]], labels: &[bool]) -> Vec<f64> {
     plain
 }
 
-fn constant([name, length]: [&str; 2], weights: &[f64]) -> String {
+fn constant(name: &str, weights: &[f64]) -> String {
     let numbers: Vec<String> = weights.iter().map(|w| format!("{w:.2}")).collect();
     format!(
-        "const {name}: [f64; {length}] = [{}];\n",
+        "const {name}: [f64; {name}_INPUTS] = [{}];\n",
         numbers.join(", ")
     )
 }

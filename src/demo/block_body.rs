@@ -289,20 +289,12 @@ fn rows(depth_mm: f64) -> u32 {
 
 /// Removes the vertices that no triangle uses.
 fn drop_unused(mesh: &mut Mesh) {
-    let mut kept = Mesh::default();
-    let mut index = vec![u32::MAX; mesh.vertices.len()];
+    let points: Vec<[f64; 3]> = mesh.vertices.iter().collect();
+    let mut kept = MeshOfPoints::new(&points);
     for triangle in &mesh.triangles {
-        let corners = triangle.map(|corner| {
-            let new = &mut index[corner as usize];
-            if *new == u32::MAX {
-                *new = kept.vertices.len() as u32;
-                kept.vertices.push(mesh.vertices.at(corner as usize));
-            }
-            *new
-        });
-        kept.triangles.push(corners);
+        kept.add(&[triangle.map(|corner| corner as usize)]);
     }
-    *mesh = kept;
+    *mesh = kept.mesh;
 }
 
 /// Returns the edges that belong to only one triangle. Their direction and order are as in `triangles`.

@@ -46,6 +46,24 @@ impl PixelBox {
     }
 }
 
+impl<T: Copy> Grid<T> {
+    /// Returns the values inside a box, which must lie within the grid.
+    ///
+    /// ```
+    /// use mocban::raster::{Grid, PixelBox};
+    ///
+    /// let grid = Grid::from_fn(4, 3, |x, y| 10 * y + x);
+    /// let part = grid.part(PixelBox { x0: 1, y0: 1, x1: 2, y1: 2 });
+    /// assert_eq!(part.data(), [11, 12, 21, 22]);
+    /// ```
+    #[must_use]
+    pub fn part(&self, bounds: PixelBox) -> Self {
+        Self::from_fn(bounds.width(), bounds.height(), |x, y| {
+            self.at(bounds.x0 + x, bounds.y0 + y)
+        })
+    }
+}
+
 /// Largest count that fits in a `u8`. SIMD adds more `u8` than wider integers at once.
 const CHUNK_PIXELS: usize = 255;
 

@@ -17,9 +17,7 @@ pub(crate) fn hypotheses_within(
         return hypotheses(picture);
     };
     let part = PrintImage {
-        rgb: Grid::from_fn(bounds.width(), bounds.height(), |x, y| {
-            picture.rgb.at(bounds.x0 + x, bounds.y0 + y)
-        }),
+        rgb: picture.rgb.part(bounds),
         turned: picture.turned,
     };
     let whole = |ink: InkMask| {

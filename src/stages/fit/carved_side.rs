@@ -20,7 +20,7 @@ const WINDING: f64 = 2.0;
 /// Weight of the logarithm of the ratio of the two layer widths.
 const SHARPNESS: f64 = 0.7;
 /// Weight of the logarithm of the ratio of the two agreements.
-const AGREEMENT: f64 = 14.0;
+pub(super) const AGREEMENT: f64 = 14.0;
 /// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
 /// If the likelier side has this agreement with the print, the other side is not measured. Backs had at most 0.55.

@@ -2,7 +2,6 @@
 
 use super::side_surface::FittedSide;
 use crate::domain::PrintOutline;
-use crate::raster::Grid;
 use crate::stages::binarize::inside;
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
@@ -65,24 +64,18 @@ impl InkPyramids {
 
     /// Reads the ink of the part of a print inside an outline. Returns `None` if the print shows none.
     pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
+        let rgb = &print.image().rgb;
+        let inside = inside(outline, [rgb.width(), rgb.height()]);
+        let bounds = inside.bounding_box()?;
         let mut inks = Vec::new();
         for ink in print.hypotheses().ok()? {
-            let known = &ink.soft.known;
-            let inside = inside(outline, [known.width(), known.height()]);
-            let Some(bounds) = inside.bounding_box() else {
-                continue;
-            };
-            let (width, height) = (bounds.width(), bounds.height());
-            let at = |x: usize, y: usize| (bounds.x0 + x, bounds.y0 + y);
+            let known = ink
+                .soft
+                .known
+                .zip_map(&inside, |known, inside| known && inside);
             let part = SoftMask {
-                amount: Grid::from_fn(width, height, |x, y| {
-                    let (x, y) = at(x, y);
-                    ink.soft.amount.at(x, y)
-                }),
-                known: Grid::from_fn(width, height, |x, y| {
-                    let (x, y) = at(x, y);
-                    known.at(x, y) && inside.at(x, y)
-                }),
+                amount: ink.soft.amount.part(bounds),
+                known: known.part(bounds),
             };
             inks.extend(ImagePyramid::new(&part, BASE_PX));
         }

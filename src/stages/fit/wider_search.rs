@@ -8,6 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::Vector3;
 
+use super::carved_side::AGREEMENT;
 use super::directions::{candidates, facets};
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
@@ -26,8 +27,6 @@ pub(super) const LEAST: f64 = 0.58;
 pub(super) const BETTER: f64 = 1.12;
 /// Sides whose normals differ by a larger angle, in radians, are rivals.
 const RIVAL: f64 = 0.5;
-/// Weight of the logarithm of the ratio of two agreements, the same as in `carved_side`.
-const AGREEMENT: f64 = 14.0;
 /// A lower agreement of the best rival counts as this.
 const LEAST_RIVAL: f64 = 0.1;
 /// A region extends below the surface by this many times the relief. Anything lower is not part of the carving.
