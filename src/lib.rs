@@ -101,7 +101,8 @@
 //!
 //! ## A new threshold metric
 //!
-//! These source files name a variant of [`domain::ThresholdMetric`]; all others iterate over its `ALL` or `PAPER`:
+//! Outside unit tests, these source files name a variant of [`domain::ThresholdMetric`]; all others iterate over its
+//! `ALL` or `PAPER`, or take a metric as an argument:
 //!
 //! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics; its default metric stays
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
@@ -115,9 +116,8 @@
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
 //! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text of `--metric` in `src/cli/verdict.rs`, the
-//! `CHECK` lists of
-//! three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`,
-//! `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
+//! `CHECK` lists of three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`,
+//! `README.md`, `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## Rooms
 //!

@@ -27,7 +27,7 @@ const FILES: [(&str, &[&str]); 4] = [
     ),
 ];
 
-/// File names, without extensions, in the folders of pairs and of metrics.
+/// Names, without extensions, of the images that an export writes for a pair or for a metric of a pair.
 const IMAGES: [&str; 9] = [
     "print",
     "print_mask",

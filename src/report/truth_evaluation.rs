@@ -152,7 +152,8 @@ pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f
 
 /// Returns the intersection over union of a depth mask and the true stroke tops, both in the print's frame, in 0..=1.
 ///
-/// Pixels with the value 128 in the tops mask are ignored. If both masks are empty elsewhere, the value is 0.
+/// Pixels with the value 128 in the tops mask are ignored. If neither mask has a set pixel among the others, the value
+/// is 0.
 ///
 /// # Errors
 /// Returns an error if the masks differ in size.

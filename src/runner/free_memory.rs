@@ -232,7 +232,8 @@ mod tests {
     #[test]
     fn a_container_whose_group_is_mounted_as_the_root_is_limited_by_it() {
         let limit = [("memory.max", "5000"), ("memory.current", "1000")];
-        // The path of a group may start at its own namespace, start at the host's root, or leave the namespace ("..").
+        // The path in /proc/self/cgroup is relative to the namespace of the process ("/"), relative to the host's root
+        // ("/docker/7f"), or outside the namespace ("/../other").
         assert_eq!(free_in_v2("/", V2_MOUNT, &limit), Some(4000));
         let mount = V2_MOUNT.replace(" / /sys", " /docker/7f /sys");
         assert_eq!(free_in_v2("/docker/7f", &mount, &limit), Some(4000));

@@ -269,8 +269,8 @@ fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     fixture.assert_uninterrupted_results();
 }
 
-/// No other process takes over the suspended process's leases. The catalog still refuses its late write, and the
-/// process continues under a new worker id.
+/// The leases of the suspended process expire, but no other process recovers them. The process drops its late result
+/// all the same, and continues under a new worker id.
 #[test]
 fn a_process_suspended_past_its_leases_drops_its_work_and_continues() {
     let (fixture, mut suspended) = Fixture::suspended("2");

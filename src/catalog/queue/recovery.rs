@@ -53,9 +53,9 @@ SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Recovers the leases of workers. Each item has a worker, whether it died, and whether its pair is blamed for the
-/// death. The interrupted attempt does not count. If the worker died, its pairs must run exclusively from now on. The
-/// condition for status 4 (quarantined) is that of `domain::is_poisoned`.
+/// Recovers the leases of the workers in `?1`, a list of `[worker, died, blamed]`. `blamed` is 1 if the worker died with
+/// only one lease, so that this pair is blamed. The interrupted attempt is not counted. Pairs of a worker that died must
+/// run exclusively from now on. The condition for status 4 (quarantined) is that of `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)

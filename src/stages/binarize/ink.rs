@@ -11,7 +11,8 @@ use crate::stages::pose::SoftMask;
 const WHITE: f32 = 0.965;
 /// A background darker than this share of full white can be distinguished from the white around the print.
 const DISTINCT_BACKGROUND: f64 = 0.945;
-/// A coloured background covers at least this share of the image. A smaller area is only the soft edge of ink on white.
+/// Light pixels inside the white border are a coloured background if they cover at least this share of the image. A
+/// smaller area is only the soft edges of ink on white.
 const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;

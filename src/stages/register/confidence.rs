@@ -1,11 +1,12 @@
 //! Confidence of an alignment: the product of three logistic models, for the pose, for the mask, and for whether print
 //! and relief show the same character.
 //!
-//! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of every
-//! kind, meshes paired with another character's print, mirrored meshes and uncarved plates. It prints the weights, and
-//! a reliability table for pairs of other seeds. The weights below were fitted on 1,010 pairs of two independent
-//! generators. Only the last two weights of the mask model were set manually. They lower the confidence if the pose is
-//! a few percent off, or if the threshold cuts through worn or tilted tops.
+//! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of the chosen
+//! tiers (`--tiers all` for every kind), meshes paired with the print of another or a similar character, mirrored meshes
+//! and uncarved plates. It prints the weights, and a reliability table for pairs of other seeds. `POSE` and `MASK` were
+//! fitted on 1,010 pairs of two independent generators, `CHARACTER` as its comment says. Only the last two weights of
+//! `MASK` were set manually. They lower the confidence if the pose is a few percent off, or if the threshold cuts
+//! through worn or tilted tops.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
@@ -22,10 +23,11 @@ const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
 /// small: on hard generated pairs, the median rim is 0.03, and 3 % of the rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
 /// Weights of the character model's inputs. They were fitted on 1,000 pairs of 22 kinds and 77 prints of similar
-/// characters. All kinds had the same weight, except the generated tier `hard`, which had three times that weight.
+/// characters, outside this repository. All kinds had the same weight, except the tier `hard`, which had three times
+/// that weight.
 const CHARACTER: [f64; CHARACTER_INPUTS] = [4.93, -2.29, 11.84, -3.52, -15.08];
-/// Area without a partner at which the character model's inputs begin to grow by the logarithm of the area only, in
-/// squares of the stroke width.
+/// An input of the character model for an area without a partner is `ln(1 + area / SMALL_AREA)`. In squares of the
+/// stroke width.
 const SMALL_AREA: f64 = 0.3;
 /// `spread_input` divides the spread by this share of the depth map's longest side. Smaller spreads are invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
@@ -50,12 +52,8 @@ pub struct ConfidenceInputs {
 impl ConfidenceInputs {
     /// Returns the confidence, 0..=1, under the built-in weights.
     pub fn confidence(&self) -> f64 {
-        logistic(&POSE, &self.pose) * logistic(&MASK, &self.mask) * self.of_character()
-    }
-
-    /// Returns the probability, 0..=1, that print and relief show the same character, under the built-in weights.
-    pub fn of_character(&self) -> f64 {
-        logistic(&CHARACTER, &self.character)
+        let pose_and_mask = logistic(&POSE, &self.pose) * logistic(&MASK, &self.mask);
+        pose_and_mask * logistic(&CHARACTER, &self.character)
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! The pose is found from soft strokes, whose values fall gradually from 1 to 0, so no exact threshold is needed.
 //! `pose_search` searches all rotations and a band of scales, from coarse to fine. `refine` compares the best poses and
-//! refines the winner at full size. The paper's method, which starts with the thresholds, is `paper_method::register`.
+//! refines the winner at full size. `paper_method::register` is the method of the published paper, which chooses the
+//! thresholds before the pose.
 
 mod anisotropic_scale;
 mod confidence;
@@ -34,8 +35,9 @@ pub const REVISION: u32 = 13;
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
-/// A pair is refused if its confidence, with the strokes that have no partner, is below this share of `min_confidence`.
-/// The share is small, because damaged blocks and dry prints of the right character have such strokes too.
+/// A pair is refused if the probability of its pose, multiplied by the probability of the same character, is below this
+/// share of `min_confidence`. The share is small, because damaged blocks and dry prints of the right character have
+/// strokes without a partner too.
 const UNLIKELY: f64 = 0.06;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.

@@ -72,7 +72,7 @@ pub enum RegisterError {
         "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
     )]
     NoMatch {
-        /// Probability that the best pose is right.
+        /// Probability that the best pose is right, or that the pose is right and the character is the same.
         confidence: f64,
         /// The setting.
         needs: f64,
