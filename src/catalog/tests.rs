@@ -198,7 +198,8 @@ impl World {
 }
 
 impl World {
-    /// Asserts that a plan for all pairs, made from counters, equals a plan that inspects each named pair.
+    /// Asserts that a plan for all pairs, made from counters, equals a plan that inspects each named pair. Asserts the
+    /// same of the number of stale pairs.
     async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

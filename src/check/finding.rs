@@ -16,7 +16,8 @@ pub enum Kind {
     Database,
     /// A table, index or trigger differs from the schema.
     Schema,
-    /// A row that a run cannot restore. It differs from its checksum, is missing, or has an invalid value.
+    /// A row that a run cannot restore. It is missing, differs from its checksum, has no checksum, or has an invalid
+    /// value.
     Row,
     /// The hash of a fingerprint does not follow from its settings.
     Fingerprint,

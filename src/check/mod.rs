@@ -1,7 +1,7 @@
 //! Checks a project for damage. Compares the rows of the database with each other and with the files.
 //!
 //! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair makes the next run
-//! compute damaged results again. It never changes verdicts or the history of results.
+//! compute damaged results again. It never changes verdicts, answers, manual alignments or the log of attempts.
 
 mod finding;
 mod pairs;
@@ -24,7 +24,8 @@ const PAGE: usize = 500;
 /// Options of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CheckOptions {
-    /// Compare files by length instead of hash, and do not compare indexes with tables.
+    /// Compare files by length instead of hash. Do not compare indexes with tables, nor the fingerprints and dirty
+    /// marks of jobs with their results.
     pub quick: bool,
     /// Repair what can be repaired. The caller holds the exclusive run lock.
     pub repair: bool,

@@ -62,7 +62,8 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Checks that all numbers of a setting are in its range. The first of two must not exceed the second.
+/// Checks that all numbers of a setting are in its range. If the setting has two numbers, the first must not exceed the
+/// second.
 fn check_range(setting: &Setting) -> Result<(), ConfigError> {
     let Some((_, range)) = RANGES.iter().find(|(key, _)| *key == setting.key) else {
         return Ok(());
@@ -163,7 +164,7 @@ mod tests {
         assert!(RANGES.iter().all(|(_, range)| range.start() < range.end()));
     }
 
-    /// Finds `A to B` or `A or more` at the end of a clause.
+    /// Returns each range that a comment states as `A to B` or `A or more`.
     fn stated_ranges(comment: &str) -> Vec<RangeInclusive<f64>> {
         let clauses = comment.split([' ', '\n']).collect::<Vec<_>>();
         let number = |text: &str| text.trim_end_matches(['.', ';', ',']).parse::<f64>().ok();

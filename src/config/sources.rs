@@ -95,7 +95,8 @@ impl Default for BaseLayer {
 pub struct Sources {
     /// Preset or file.
     pub base: BaseLayer,
-    /// Environment variables. Settings are named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY`; others are ignored.
+    /// Environment variables. A variable named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` sets a setting. Variables
+    /// with other names are ignored.
     pub env: Vec<(String, String)>,
     /// `section.key=value`, as given to `--set`.
     pub sets: Vec<String>,

@@ -29,7 +29,7 @@ pub(super) fn of_list(reason: &str) -> String {
 /// All problems of a refused list. They are displayed one per line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct ManifestError {
-    /// Each with its line or file, in the order of the list; never empty.
+    /// The problems, each with its line or file unless it concerns the whole list. Never empty.
     pub problems: Vec<String>,
 }
 

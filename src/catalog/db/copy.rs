@@ -10,11 +10,12 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity, wrong_identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
-/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. While a catalog is
-/// copied, only the original is read.
+/// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. A copy is only written, so
+/// these errors concern the original.
 const READ_FAILED: [&str; 2] = ["266", "522"];
 
-/// If SQLite cannot open a file whose absolute path is longer than this, in bytes, the error blames the length.
+/// Length of an absolute path in bytes. If SQLite cannot open a file with a longer path, the error names the length as
+/// the cause.
 const MAX_PATH: usize = 500;
 
 const HAS_SETTINGS: &str =
@@ -27,7 +28,8 @@ impl Catalog {
     /// # Errors
     /// Returns an error if the path is not UTF-8, the copy fails, or the copy is damaged. May leave a partial copy.
     pub async fn back_up(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
-        // `VACUUM INTO` fails under `query_only`. The connection leaves the pool, because it turns this setting off.
+        // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
+        // off, so that the pool keeps only read connections.
         let mut conn = self.read_conn().await?.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)

@@ -97,10 +97,11 @@ impl LogWatch {
     }
 
     /// Compares the log with its state after the last commit. Must be called outside of a transaction, before a commit
-    /// begins and after it. Without a change this is two system calls.
+    /// begins and after it. While the log is the same file and not shorter, this costs one `stat` call.
     ///
     /// # Errors
-    /// Returns an error if the log is gone or shorter than its content, and the same error from then on.
+    /// Returns an error if the log was deleted or replaced, or is too short for its pages. Later calls return the same
+    /// error.
     pub(crate) async fn check(&mut self, conn: &mut SqliteConnection) -> Result<()> {
         if self.loss.is_none() {
             self.loss = self.find_loss(conn).await;
@@ -131,7 +132,7 @@ impl LogWatch {
             FileState::Gone => {
                 let copied = checkpoint(conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
                 let is_whole = matches!(copied, Ok((0, log, saved)) if log == saved);
-                // SQLite would read another log at its place.
+                // SQLite would apply the content of another log at this path when it opens the catalog next.
                 let is_clear =
                     std::fs::metadata(&self.log.path).map_or(true, |other| other.len() == 0);
                 Some(if is_whole && is_clear {

@@ -1,4 +1,5 @@
-//! The write connection of a catalog, which never writes to a log that another program deleted, replaced or cut.
+//! The write connection of a catalog. Before and after each commit, it checks whether another program deleted, replaced
+//! or cut the write-ahead log.
 
 use std::path::Path;
 use std::pin::Pin;

@@ -8,8 +8,8 @@ use crate::domain::{
     WorkerId,
 };
 
-/// The right to work on one pair. Only a claim creates a lease. Only the lease's owner can store results or failures of
-/// the pair.
+/// The right to run stages of one pair. A claim creates the lease, and a checkpoint continues it. Results and failures
+/// of stages are stored only under a valid lease.
 ///
 /// `token` is the fencing token. Each claim and each recovery increases the job's token, so a write under an older
 /// lease changes nothing.
@@ -35,7 +35,7 @@ impl Lease {
         self.pair
     }
 
-    /// Returns the first stage without a result.
+    /// Returns the next stage to run.
     pub const fn cursor(&self) -> Stage {
         self.cursor
     }
@@ -111,7 +111,7 @@ impl InputVersions {
 pub struct MetricResult {
     /// The scores.
     pub outcome: MetricOutcome,
-    /// Hash of the scores and of the images that a reviewer sees.
+    /// Hash of the numbers, except the confidence, and of the images that a reviewer sees.
     pub result_hash: ContentHash,
 }
 
@@ -137,7 +137,7 @@ pub struct StageCheckpoint {
     /// Results of the metrics, for the last stage.
     #[serde(skip)]
     pub metrics: Vec<MetricResult>,
-    /// Input files that this pair's stages read.
+    /// Versions of all input files read so far. Empty if they have not changed since an earlier stage listed them.
     #[serde(skip)]
     pub inputs: InputVersions,
     /// Computing time in milliseconds.

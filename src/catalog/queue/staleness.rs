@@ -173,10 +173,11 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Groups all jobs by counter key, sorted by cursor and status. Returns the number of jobs of each group, and the state
-/// of its jobs without the dirty and quarantined ones.
+/// Groups all jobs by counter key, sorted by this key. Returns one state and the number of jobs of each group. The
+/// number includes dirty and quarantined jobs, but the state may not apply to them: they are inspected one by one.
 ///
-/// A requeued job moves to an earlier group. Therefore a pass over the groups handles each job only once.
+/// A requeued job moves to an earlier group, or stays in its group. Therefore a pass over the groups, each in the order
+/// of pairs, handles each job only once.
 pub(crate) async fn groups(
     conn: &mut SqliteConnection,
     chains: &FingerprintChains,

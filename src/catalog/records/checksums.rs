@@ -1,8 +1,10 @@
 //! Checksums of the rows that no run can compute again, so that a check finds changed, added and removed rows.
 //!
-//! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction. A
-//! checksum is the first 64 bits of a BLAKE3 hash of the row's columns. In an append-only log, it also covers the
-//! previous row's checksum. This reveals a row that was removed together with its checksum.
+//! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction.
+//! A checksum is the first 64 bits of a BLAKE3 hash of the table's number, the row's number and the row's columns. For
+//! a pair, it covers only the imported columns. For a verdict, an answer and a manual alignment, it also covers the
+//! previous row's checksum. This reveals a row that was removed together with its checksum. The tables of undone rows
+//! have no such chain.
 
 use serde_json::json;
 use sqlx::error::BoxDynError;
@@ -46,7 +48,8 @@ enum_names! { pub ChecksummedTable, "a table with checksums":
 /// What is wrong with a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowFault {
-    /// The row differs from its checksum.
+    /// The row differs from its checksum. In a chained table, this is also reported if the row before it was removed
+    /// with its checksum.
     Changed,
     /// The row is missing, but its checksum is stored.
     Removed,
@@ -99,14 +102,15 @@ struct Statements {
     page: &'static str,
     /// Selects the numbers of checksums without a row.
     removed: &'static str,
-    /// Whether a checksum covers the previous checksum.
+    /// Whether a checksum also covers the previous row's checksum.
     is_chained: bool,
 }
 
-/// Builds the statements of a table from its name, its key, the columns that a checksum covers, and the id of a row's
-/// pair.
+/// Builds the statements of a table from its name, its key column, the columns that a checksum covers, an SQL
+/// expression for the id of a row's pair, and whether its checksums are chained.
 ///
-/// The first columns of a selected row are its number, its checksum, the previous checksum, and the name of its pair.
+/// The first four columns of a selected row are its number, its checksum, the previous checksum, and the name of its
+/// pair. `listed` selects only the number, and NULL for the other three.
 macro_rules! statements {
     ($table:literal, $key:literal, $columns:literal, $pair:literal, $is_chained:literal) => {
         Statements {
@@ -177,7 +181,7 @@ impl ChecksummedTable {
     }
 }
 
-/// Index of the first covered column in the rows of [`Statements`].
+/// Index of the first column that a checksum covers, in the rows of `listed` and `page`.
 const COVERED: usize = 4;
 
 const LAST: &str =

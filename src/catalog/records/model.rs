@@ -110,11 +110,13 @@ pub struct MetricRecord {
     /// The numbers.
     #[serde(flatten)]
     pub outcome: MetricOutcome,
-    /// Hash of the numbers and of the images that reviewers see. A verdict refers to a result by this hash.
+    /// Hash of the numbers, except the confidence, and of the images that reviewers see. A verdict refers to a result
+    /// by this hash.
     pub result_hash: ContentHash,
     /// Verdicts on this result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
-    /// Number of verdicts on older results of this pair and metric. They do not count.
+    /// Number of verdicts on other results of this pair and metric, which do not count. Of a reviewer's verdicts on one
+    /// result, only the newest is included.
     pub older_verdicts: u64,
 }
 

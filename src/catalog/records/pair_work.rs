@@ -89,7 +89,8 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns up to `limit` pairs with ids above `after`, sorted by id. Returns an empty list at the end.
+    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `among` is given,
+    /// returns only its pairs. Returns an empty list at the end.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -112,7 +113,7 @@ impl Catalog {
         found.iter().map(known_inputs).collect()
     }
 
-    /// Stores the current state of input files.
+    /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -26,7 +26,8 @@ pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Returns the counts of the `status` command. Results with other `fingerprints` or changed inputs count as stale.
+    /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
+    /// `fingerprints`, or if their inputs have changed.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -105,7 +105,7 @@ SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4,
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING id, act";
 
-/// Returns whether one of the first `?1` verdicts has the same values and was not undone.
+/// Returns whether a verdict with an id up to `?1` has the same values and was not undone.
 const IS_STORED: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict AS v
     WHERE v.pair = ?2 AND v.metric = ?3 AND v.reviewer = ?4 AND v.id <= ?1 AND v.at = ?5 AND v.result_hash = ?6
@@ -127,8 +127,9 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results in one transaction. Skips each verdict whose `event` is already stored,
-    /// and each verdict with a time of which an equal one was stored before. Returns the number of appended verdicts.
+    /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
+    /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
+    /// this call. Returns the number of verdicts of which a row was appended.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
@@ -194,8 +195,8 @@ impl Catalog {
     }
 }
 
-/// Appends a verdict. Returns `false` if all its rows are already stored. An equal verdict counts as stored up to the
-/// row `newest`.
+/// Appends a verdict. Returns `false` if all its rows are already stored. Compares the values only with rows up to the
+/// id `newest`, so that two equal verdicts of one call are both stored.
 async fn append(
     conn: &mut SqliteConnection,
     new: &NewVerdict,

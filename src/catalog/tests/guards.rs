@@ -313,7 +313,8 @@ async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     world.assert_counters().await;
 }
 
-/// A pair that must run exclusively waits for the leases of all workers, and all workers wait for its lease.
+/// A pair that must run exclusively is not leased while any worker holds a lease. While it is leased, no worker gets
+/// another lease.
 #[tokio::test]
 async fn an_exclusive_pair_is_leased_alone_whichever_worker_asks() {
     let world = World::new(3).await;
@@ -338,7 +339,7 @@ async fn an_exclusive_pair_is_leased_alone_whichever_worker_asks() {
     world.assert_counters().await;
 }
 
-/// Returns a pair that killed its workers, and the current worker.
+/// Returns a catalog whose only pair was quarantined after `CRASH_LIMIT` worker deaths, and the newest worker.
 async fn poisoned() -> (World, WorkerId) {
     let world = World::new(1).await;
     let mut me = world.worker;

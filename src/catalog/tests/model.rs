@@ -227,7 +227,8 @@ impl Queue {
         jobs.map(|(pair, _)| *pair).collect()
     }
 
-    /// Recovers leases of workers other than `me` whose last heartbeat is more than `margin` after the deadline.
+    /// Recovers each lease whose deadline is more than `margin` milliseconds before its worker's last heartbeat. Skips
+    /// the leases of `me`. Returns the number of pairs made ready.
     pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {

@@ -95,9 +95,9 @@ pub(super) enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// The worker is dead, or the deadline has passed long ago.
+    /// The worker is dead, or its lease is overdue.
     Recover {
-        /// Whether too many workers died over it: see [`is_poisoned`].
+        /// Whether the job is quarantined because it probably kills its workers: see `domain::is_poisoned`.
         poisoned: bool,
     },
     /// Ends a back-off that is due, or whose end is so far away that the clock must have jumped.
