@@ -16,7 +16,8 @@ const DISTINCT_BACKGROUND: f64 = 0.945;
 const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image covered by the white around the print.
 const LEAST_WHITE: f64 = 0.004;
-/// A dark pixel is pale if its grey is more than this share of the way from the darkest tenth to the background.
+/// A dark pixel is pale if its grey lies beyond this share of the way from the 10th percentile of the dark pixels to
+/// the median of the background.
 const PALE: f64 = 0.35;
 /// A print may have stains if more than this share of its dark pixels are pale (see [`PALE`]).
 const LEAST_PALE: f64 = 0.15;
@@ -37,7 +38,7 @@ pub enum BinarizeError {
     /// The image is too small.
     #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
     TooSmall { width: usize, height: usize },
-    /// The image has one grey only.
+    /// Ink and background differ too little in grey.
     #[error(
         "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
     )]
@@ -45,7 +46,7 @@ pub enum BinarizeError {
         /// Difference between the two classes of grey, 0..=1.
         contrast: f64,
     },
-    /// Nothing darker than the threshold.
+    /// Too few pixels are darker than the threshold.
     #[error("print has no ink: {share:.4} of it is beyond the grey threshold {threshold:.3}")]
     NoInk {
         /// Share of ink, 0..=1.
@@ -53,7 +54,7 @@ pub enum BinarizeError {
         /// Threshold, 0..=1.
         threshold: f64,
     },
-    /// Everything darker than the threshold.
+    /// Almost all pixels are darker than the threshold.
     #[error("print is ink all over: its lightest grey is {lightest:.3} of full white")]
     AllInk {
         /// Lightest grey, 0..=1.
@@ -219,7 +220,7 @@ fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     if beyond.density() < LEAST_WHITE {
         return all;
     }
-    // Pixels at the edge of the cut mix background and white.
+    // Pixels beside the white area mix background and white.
     let inside = beyond.dilate().map(|b| !b);
     let mut values = held(grey, &inside);
     let Some(split) = otsu::split(&mut values) else {

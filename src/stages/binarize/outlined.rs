@@ -6,7 +6,8 @@ use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::pose::SoftMask;
 
 /// Binarizes the smallest box around the outline like a print of its own, because a part of a print has smaller specks
-/// and may be shaded differently. Returns masks of the whole print, in which pixels outside the outline are unknown.
+/// and may be shaded differently. Returns masks of the whole print, in which pixels outside the outline are unknown. If
+/// the outline contains no pixel, binarizes the whole print.
 pub(crate) fn hypotheses_within(
     picture: &PrintImage,
     outline: &PrintOutline,
@@ -74,7 +75,7 @@ mod tests {
 
     #[test]
     fn pixels_outside_the_outline_are_unknown() {
-        // Bars of 6 pixels, on paper that is darker at the right.
+        // Bars of 6 pixels, on a background that is darker at the right.
         let bar = |x: usize| x % 15 < 6;
         let grey = |x: usize, y: usize| {
             let paper = 230 - x - y % 3;

@@ -5,8 +5,8 @@ use crate::raster::{Grid, Mask};
 
 /// If the sum of the evidence is below minus this value, ink is clearly darker than the background.
 const CLEAR: f64 = 0.8;
-/// If the sum of the evidence is above this, ink is clearly lighter than the background, as in rubbings. Heavy ink in a
-/// frame can cause a smaller sum.
+/// If the sum of the evidence is above this value, ink is clearly lighter than the background, as in rubbings. A print
+/// with heavy dark ink and a frame can have a positive sum, but a smaller one.
 const CLEAR_LIGHT: f64 = 1.6;
 /// Width of the rim that counts as evidence for the background, as a share of the image's shorter side.
 const RIM: f64 = 0.06;

@@ -4,7 +4,7 @@
 //!
 //! - Winding: the faces are wound outward in most files.
 //! - Flatness: stroke tops are planed and have about the same height; the ground is gouged and rough.
-//! - Manifest: it may give the direction of the scan.
+//! - Manifest: it may state whether the block lay face down in the scan.
 //! - Print: the relief of the carved side resembles the print. This weighs most, as only the print shows the character.
 
 use super::print_agreement::InkPyramids;
@@ -23,7 +23,8 @@ const SHARPNESS: f64 = 0.7;
 pub(super) const AGREEMENT: f64 = 14.0;
 /// Weight of the scan direction in the manifest, from -1 to 1.
 const MANIFEST: f64 = 0.4;
-/// If the likelier side has this agreement with the print, the other side is not measured. Backs had at most 0.55.
+/// If the side that is likelier without the print agrees with the print at least this much, the agreement of the other
+/// side is not measured. Backs of blocks had agreements up to 0.55.
 const CERTAIN: f64 = 0.62;
 /// Agreement that is assumed for a side that was not measured.
 const UNMEASURED: f64 = 0.45;
@@ -137,7 +138,8 @@ fn log_odds(
     SideOdds { odds, agreements }
 }
 
-/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief.
+/// Returns the interquartile range of the heights near the stroke tops, as a share of the relief, 0.005 or more. Uses
+/// the heights that are less than 0.4 times the relief below the surface. Returns 1 if these are fewer than 8.
 fn layer_width(side: &FittedSide) -> f64 {
     let mut upper = side.samples.residuals(&side.surface);
     upper.retain(|r| *r > -0.4 * side.relief);

@@ -5,18 +5,18 @@ use nalgebra::Vector3;
 use super::pca::Axes;
 use crate::mesh::Mesh;
 
-/// Approximate number of faces that are sampled.
+/// Largest number of faces that are sampled.
 const SAMPLES: usize = 30_000;
 /// Normals within this angle, in radians, belong to the same plane.
 const SAME: f64 = 0.26;
-/// Directions closer than this angle, in radians, count as one, because the fit of a side levels smaller tilts.
+/// Directions closer than this angle, in radians, count as one, because the fit of a side corrects smaller tilts.
 const DISTINCT: f64 = 0.2;
 /// A plane is large if the faces with normals within [`SAME`] of its normal have at least this share of the area of all
 /// sampled faces.
 const LEAST_AREA: f64 = 0.04;
-/// Number of directions of large planes.
+/// Largest number of large planes.
 const PLANES: usize = 6;
-/// Cells along a side of the cube whose surface divides the normals.
+/// Normals are grouped by the cells of a cube's surface. Each face of the cube has this many cells along a side.
 const CELLS: i32 = 12;
 
 /// A sampled face.
@@ -27,7 +27,7 @@ pub(super) struct Facet {
     pub(super) area: f64,
 }
 
-/// Samples the faces of a mesh evenly in the order of the file. Faces without area are left out.
+/// Samples every n-th face in the order of the file, so that at most [`SAMPLES`] remain. Leaves out faces without area.
 pub(super) fn facets(mesh: &Mesh) -> Vec<Facet> {
     let stride = mesh.triangles.len().div_ceil(SAMPLES).max(1);
     let faces = mesh.triangles.iter().step_by(stride);
@@ -56,7 +56,8 @@ pub(super) fn candidates(axes: &Axes, facets: &[Facet]) -> Vec<Vector3<f64>> {
     lines.iter().flat_map(|line| [*line, -line]).collect()
 }
 
-/// Returns the normals of the largest planes, the largest first. Opposite normals count as one.
+/// Returns the unit normals of at most [`PLANES`] large planes, roughly from the largest to the smallest: each starts
+/// at the cell with the largest area among the faces that belong to no earlier plane. Opposite normals count as one.
 pub(super) fn large_planes(facets: &[Facet]) -> Vec<Vector3<f64>> {
     let total: f64 = facets.iter().map(|facet| facet.area).sum();
     let mut left: Vec<Facet> = facets.to_vec();
@@ -109,7 +110,7 @@ fn fullest_cell(facets: &[Facet]) -> Vector3<f64> {
     fullest.map_or_else(Vector3::z, |(_, sum)| sum.normalize())
 }
 
-/// Returns the angle between two lines of unit length, from 0 to a right angle.
+/// Returns the angle in radians between two lines, given as unit vectors, from 0 to a right angle.
 pub(super) fn angle(one: &Vector3<f64>, other: &Vector3<f64>) -> f64 {
     one.dot(other).abs().min(1.0).acos()
 }

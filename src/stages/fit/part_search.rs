@@ -11,8 +11,9 @@ use crate::domain::{PrintOutline, Rigid3};
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// Returns the usual side that resembles a part of the print best, with the outline of the part. Returns `None` if no
-/// part resembles a side.
+/// Compares both sides of `start`'s plane with the parts of the print. Returns the side that resembles a part best,
+/// with the outline of the part. Returns `None` if no agreement reaches [`LEAST`], or if the finer fit of the side
+/// finds no carving.
 pub(super) fn search(
     indexed: &IndexedSurface,
     start: &Rigid3,

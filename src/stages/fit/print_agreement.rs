@@ -51,7 +51,7 @@ const BASE_PX: usize = 72;
 pub(super) struct InkPyramids(Vec<ImagePyramid>);
 
 impl InkPyramids {
-    /// Reads the ink of a print. Returns `None` if the print shows none.
+    /// Builds the pyramids of a print. Returns `None` if the print cannot be binarized.
     pub(super) fn new(print: &Print) -> Option<Self> {
         let inks: Vec<ImagePyramid> = print
             .hypotheses()
@@ -62,7 +62,8 @@ impl InkPyramids {
         Some(Self(inks))
     }
 
-    /// Reads the ink of the part of a print inside an outline. Returns `None` if the print shows none.
+    /// Builds the pyramids of the part of a print inside an outline. Returns `None` if the outline contains no pixel,
+    /// or if the print cannot be binarized.
     pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
         let rgb = &print.image().rgb;
         let inside = inside(outline, [rgb.width(), rgb.height()]);

@@ -12,7 +12,8 @@ use crate::stages::components::ConnectedComponents;
 
 /// Number of cells along the longest side of the ink.
 const CELLS: usize = 160;
-/// Largest gap over which ink is joined, in steps of two cells.
+/// Number of gap widths over which ink is joined. At step `k`, counted from 0, ink is grown by `k` cells on all sides,
+/// which closes gaps of up to `2 k` cells.
 const STEPS: usize = 24;
 /// Smallest and largest size of a group, as shares of the longest side of the ink. A character with a neighbour takes
 /// up about half at most.
@@ -21,21 +22,23 @@ const SIZES: [f64; 2] = [0.1, 0.58];
 const LEAST_PX: f64 = 24.0;
 /// Largest number of groups that are tried.
 const MOST: usize = 16;
-/// Paper around the ink of a group, as a share of the longest side of the group.
+/// Margin around the ink of a group, as a share of the longest side of the group.
 const MARGIN: f64 = 0.07;
-/// Shares of the ink's width and height around its middle.
+/// Sizes of the windows around the middle of the ink, as shares of the ink's width and height.
 const MIDDLE: [f64; 2] = [0.4, 0.5];
 
-/// A group of ink, and the number of gaps at which the group is the same.
+/// A group of ink. `bounds` is its box in cells. `steps` is the number of gap widths at which a group has the same box
+/// and area.
 #[derive(Debug, Clone, Copy)]
 struct Group {
     bounds: PixelBox,
     steps: usize,
-    /// Index of the first gap, and the component there.
+    /// Index of the first of these gap widths, and the component's label at this width.
     found: [usize; 2],
 }
 
-/// Returns outlines of the parts that may be a character, in pixels, the middle one first.
+/// Returns outlines, in pixels, of the parts that may be a character: first the groups of ink, the nearest to the
+/// middle first, then the windows around the middle.
 pub(super) fn print_parts(ink: &Mask) -> Vec<PrintOutline> {
     let Some(bounds) = ink.bounding_box() else {
         return Vec::new();
@@ -104,7 +107,8 @@ fn cells(ink: &Mask, bounds: PixelBox, cell: f64) -> Mask {
     cells
 }
 
-/// Returns the groups that stay the same over the most gaps, the nearest to the middle first.
+/// Returns at most [`MOST`] groups of a suitable size, the nearest to the middle first. Prefers groups that stay the
+/// same over many gap widths.
 fn groups(cells: &Mask, joined: &[ConnectedComponents]) -> Vec<Group> {
     let mut found: BTreeMap<[usize; 5], Group> = BTreeMap::new();
     for (step, components) in joined.iter().enumerate() {
@@ -128,7 +132,7 @@ fn groups(cells: &Mask, joined: &[ConnectedComponents]) -> Vec<Group> {
         .collect();
     groups.sort_by_key(|group| std::cmp::Reverse(group.steps));
     groups.truncate(MOST);
-    // Twice the distance from the middle, squared.
+    // The square of twice the distance from the middle.
     let from_middle = |group: &Group| {
         let PixelBox { x0, y0, x1, y1 } = group.bounds;
         let [x, y] = [x0 + x1, y0 + y1];
@@ -138,7 +142,7 @@ fn groups(cells: &Mask, joined: &[ConnectedComponents]) -> Vec<Group> {
     groups
 }
 
-/// Returns the middle of a box. `share` is the share of its width and height.
+/// Returns the window around the middle of a box. `share` is the window's share of the box's width and height.
 fn window(bounds: PixelBox, share: f64) -> Option<PrintOutline> {
     let inner = |from: usize, to: usize| {
         let (middle, half) = ((from + to) as f64 / 2.0, (to - from) as f64 * share / 2.0);
@@ -160,8 +164,8 @@ mod tests {
     /// Distance between the middles of two characters.
     const PITCH: usize = 120;
 
-    /// Returns nine characters. Each has two strokes, one above the other. Characters are `width` pixels wide, with a
-    /// gap of 10 pixels between their strokes.
+    /// Returns nine characters. Each has two strokes, one above the other, with a gap of 9 pixels between them. A
+    /// character is about `width` pixels wide and high.
     fn grid(width: usize) -> Mask {
         Mask::from_fn(SIDE, SIDE, |x, y| {
             let [x, y] = [x % PITCH, y % PITCH].map(|at| at.abs_diff(PITCH / 2));
@@ -169,7 +173,8 @@ mod tests {
         })
     }
 
-    /// Returns the share of the middle character inside a part, and the share of the part's ink that is no part of it.
+    /// Returns the share of the middle character's ink inside a part, and the share of the part's ink that belongs to
+    /// other characters.
     fn shares(part: &PrintOutline, ink: &Mask) -> [f64; 2] {
         let inside = inside(part, [SIDE; 2]).zip_map(ink, |inside, ink| inside && ink);
         let middle = Mask::from_fn(SIDE, SIDE, |x, y| {

@@ -26,7 +26,8 @@ const THICKNESS: f64 = 1.6;
 /// A smaller share of the faces is no block.
 const LEAST_PART: f64 = 0.02;
 
-/// Returns the parts that may be the block: first the scan without debris, then the part above each large plane.
+/// Returns the parts that may be the block: first the scan without debris, then the part above each large plane that
+/// may be a support.
 pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     let whole = without_debris(mesh, indexed);
     let all = facets(&whole);
@@ -44,8 +45,9 @@ pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
     parts
 }
 
-/// Finds the plane, with about this normal, on which the rest of the scan stands. Returns its normal, towards the rest,
-/// and the height above which the rest lies. Returns `None` if the plane is small or the rest lies on both sides.
+/// Finds a support: a plane, with about this normal, on which the rest of the scan stands. Returns the unit normal that
+/// points to the rest, and a height in mesh units. The rest consists of the points whose product with the normal
+/// exceeds this height. Returns `None` if the plane is small or the rest lies on both sides.
 fn support(facets: &[Facet], normal: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let total: f64 = facets.iter().map(|facet| facet.area).sum();
     let (layer, centre) = fullest_layer(facets, &normal)?;

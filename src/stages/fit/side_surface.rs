@@ -77,7 +77,8 @@ fn opposite_side(frame: &Rigid3) -> Rigid3 {
     Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
 }
 
-/// Renders the mesh along a frame's z and fits the tops. Returns `None` if the mesh is empty or shows no tops.
+/// Renders the mesh along a frame's z and fits the tops. Returns `None` if the mesh is empty or covers fewer than 16
+/// pixels.
 pub(super) fn fit_view(
     indexed: &IndexedSurface,
     frame: &Rigid3,

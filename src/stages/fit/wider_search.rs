@@ -62,7 +62,9 @@ struct JudgedSide {
     region: ScanRegion,
 }
 
-/// Returns the side that resembles the print best, or `None` if it is not clearly better than the usual side.
+/// Returns the side that resembles the print best. `usual` is the agreement of the usual side with the print. Returns
+/// `None` if the best agreement is below [`LEAST`] or below `usual` times [`BETTER`], or if the finer fit of the side
+/// finds no carving.
 pub(super) fn search(
     mesh: &Mesh,
     indexed: &IndexedSurface,
@@ -196,7 +198,7 @@ impl SideSearch<'_> {
 }
 
 /// Cuts off the area that lies deeper than any carving, such as the foot of a block or a table below it. Returns `None`
-/// if that area is a small share of the visible area.
+/// if that area is a small share of the visible area, or if almost nothing would remain.
 fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
     let heights = side.samples.residuals(&side.surface);
@@ -210,7 +212,8 @@ fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
     (near.vertices.len() >= 16).then_some(near)
 }
 
-/// Returns the frame with the least principal axis as z in which the mesh has the smallest bounding box.
+/// Returns the frame with the least principal axis as z whose x and y axes give the bounding box of the mesh the
+/// smallest area.
 fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
     let normal = axes.normal();
     let level = frame(normal, axes.centre);

@@ -1,4 +1,4 @@
-//! Fits different scales along two perpendicular axes, because paper shrinks by about 1 % across its grain.
+//! Fits different scales along two perpendicular axes, because a sheet shrinks by about 1 % across its grain.
 
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};

@@ -80,11 +80,12 @@ pub(super) fn of_character(features: &PoseFeatures) -> f64 {
     logistic(&CHARACTER, &character_inputs(features))
 }
 
-/// Returns the inputs of the character model: 1, the size of the tops without ink, that size times the scatter of the
-/// edges, the geometric mean of the sizes of these tops and of the ink without wood, and the scatter.
+/// Returns the inputs of the character model. With `size(area) = ln(1 + area / SMALL_AREA)`, they are 1, the size of
+/// the tops without ink, that size times the edge scatter, the size of the geometric mean of the areas of tops without
+/// ink and of ink without wood, and the edge scatter.
 ///
 /// Dry ink leaves tops without ink and rough edges, and lost wood leaves ink without tops. Prints of similar characters
-/// often have both, or tops without ink and sharp edges.
+/// often have tops without ink together with ink without tops, or tops without ink together with sharp edges.
 fn character_inputs(features: &PoseFeatures) -> [f64; CHARACTER_INPUTS] {
     let (tops, ink) = (features.tops_alone, features.ink_alone);
     let size = |area: f64| (area / SMALL_AREA).ln_1p();

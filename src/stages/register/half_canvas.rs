@@ -67,8 +67,9 @@ impl HalfCanvas {
         InkEdge::mean_near(&mut self.distances_at_edges(|at| levels[at] >= level, &self.edge))
     }
 
-    /// Returns the distance to `edge` at each edge of a mask, in pixels. `is_set` returns whether the mask is set at an
-    /// index of the canvas. Edges beside pixels without data are left out.
+    /// Returns the signed distance to `edge`, in pixels, at each boundary between a set and an unset pixel of a mask.
+    /// `is_set` returns whether the mask is set at an index of the canvas. Boundaries beside a pixel without data are
+    /// left out.
     pub(super) fn distances_at_edges(
         &self,
         is_set: impl Fn(usize) -> bool,

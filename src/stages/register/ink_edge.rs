@@ -10,7 +10,7 @@ const NEAR: f32 = 2.0;
 /// Number of times that `mean_near` improves its estimate.
 const ROUNDS: usize = 3;
 
-/// Signed distance of each pixel to the edge of the ink, in pixels: positive on ink, negative on paper.
+/// Signed distance of each pixel to the edge of the ink, in pixels: positive on ink, negative on the background.
 pub(super) struct InkEdge(Grid<f32>);
 
 impl InkEdge {
@@ -86,7 +86,7 @@ fn distances(mask: &Mask) -> Grid<f32> {
     };
     (1..height).for_each(|y| step(y - 1, y));
     (1..height).rev().for_each(|y| step(y, y - 1));
-    // The nearest pixel of a row is at most `REACH` columns away.
+    // A pixel more than `REACH` columns away cannot lie within `REACH`.
     let mut padded = vec![most * most; width + 2 * REACH];
     let mut nearest = vec![0.0; width];
     let mut all = Vec::with_capacity(width * height);

@@ -32,7 +32,7 @@ struct Candidate {
     area: f64,
     /// Number of stroke pixels whose ink is not missing.
     area_inked: f64,
-    /// Agreement with the corrected ink: 1 if the mask covers all ink and no paper.
+    /// Agreement with the corrected ink: 1 if the mask covers all ink and no background.
     agreement: f64,
 }
 

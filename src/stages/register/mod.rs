@@ -47,7 +47,8 @@ const UNLIKELY: f64 = 0.06;
 ///
 /// # Errors
 /// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not
-/// match: no pose correlates, the mirrored relief matches better, or the confidence is below `min_confidence`.
+/// match: no pose correlates, the mirrored relief matches better, the confidence in the pose is below `min_confidence`,
+/// or print and relief very probably show different characters.
 ///
 /// # Examples
 /// ```

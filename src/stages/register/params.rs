@@ -16,7 +16,8 @@ pub struct RegisterParams {
     pub working_px: u32,
     /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// Whether the pose may have different scales along two perpendicular axes, because paper shrinks across its grain.
+    /// Whether the pose may have different scales along two perpendicular axes, because a sheet shrinks across its
+    /// grain.
     pub anisotropic_scale: bool,
     /// Smallest depth below the tops that is tried as a threshold, as a share of the relief's depth.
     pub threshold_min: f64,

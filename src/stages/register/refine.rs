@@ -23,7 +23,8 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// If a competitor scores more than this share of the best score, both competitors are refined at size `CLOSER` too.
 const CLOSE: f64 = 0.75;
-/// In `fair_share`, the ratio of the scores on all pixels counts at most this much. A symmetric character can reach it.
+/// `fair_share` counts the ratio of the scores on all pixels only up to this value. Competing poses of a symmetric
+/// character can reach it.
 const SYMMETRIC: f64 = 0.9;
 /// The refinement is repeated from the pose scaled down and up by this factor. Ideally, all three end at the same pose.
 const OTHER_SIZE: f64 = 1.08;

@@ -26,8 +26,8 @@ pub(super) struct Unmatched {
     pub(super) tops_alone: f64,
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
     pub(super) ink_alone: f64,
-    /// Mean deviation of the ink's edge from the edge of the strokes, after the spread of the ink, as a share of the stroke
-    /// width.
+    /// Mean absolute deviation of the distances from the ink's edge to the edge of the strokes, from their median, as a
+    /// share of the stroke width. The median is the spread of the ink.
     pub(super) edge_scatter: f64,
 }
 
@@ -99,7 +99,8 @@ mod tests {
     const SIDE: usize = 96;
     const TOP: u16 = 1000;
 
-    /// Returns the strokes of two characters of three bars, 8 px wide. The bars of the other character may be shorter.
+    /// Measures a block and a print of three bars of 64 x 8 px. `wood` and `ink` state which bars the block and the
+    /// print have. The ink is shifted up by `shift` px.
     fn unmatched(wood: [bool; 3], ink: [bool; 3], shift: usize) -> Unmatched {
         let on_bar = |bars: [bool; 3], x: usize, y: usize| {
             let bar = (y / 8)
