@@ -14,7 +14,7 @@ use crate::raster::Grid;
 const MARGIN_MM: f64 = 2.2;
 /// Sample spacing, mm; finer than the densest scan.
 const STEP_MM: f64 = 0.035;
-/// The same for scenes that show 3 x 3 characters.
+/// Sample spacing for scenes that show 3 x 3 characters, mm.
 const WIDE_STEP_MM: f64 = 0.05;
 /// Margin of crops that show 3 x 3 characters, as a share of the character's size.
 pub(super) const WIDE_MARGIN: f64 = 1.1;
@@ -90,8 +90,9 @@ impl Artwork {
         }
     }
 
-    /// Draws the neighbouring characters and the column rules. Returns the signed distance to their outlines in mm.
-    /// Each neighbour and each rule is present with a fixed probability; wide crops show all eight neighbours.
+    /// Draws the neighbouring characters and the column rules. Returns the signed distance to their outlines in mm,
+    /// positive inside. Each of the four nearest neighbours and each rule is present with a fixed probability. If mesh
+    /// or print shows 3 x 3 characters, all eight neighbours are present.
     pub(super) fn draw_neighbours(
         &self,
         glyphs: &Glyphs,
@@ -133,14 +134,14 @@ impl Artwork {
         neighbours
     }
 
-    /// Returns the signed distance field of an empty surrounding.
+    /// Returns the distance field of a scene without neighbours: `-size_mm` everywhere.
     pub(super) fn empty_neighbours(&self) -> ScalarField {
         ScalarField::from_fn(self.strokes.frame, |_, _, _| -self.size_mm)
     }
 }
 
-/// Draws the outward offset of the outline in mm. A stroke widens by twice the offset: by 2.6-4.4 % of the character's
-/// size.
+/// Draws the distance in mm by which the outline is moved outwards. A stroke widens by twice this distance, which is
+/// 2.6 to 4.4 % of the character's size.
 fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }

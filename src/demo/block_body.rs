@@ -15,9 +15,10 @@ use crate::mesh::Mesh;
 const THIN_MM: f64 = 1.9;
 /// Rows of vertices on a side wall of an ordinary scan.
 const THIN_ROWS: u32 = 5;
-/// Height of a row of vertices on other side walls, mm.
+/// Approximate height of a row of faces on other side walls, mm.
 const ROW_MM: f64 = 0.4;
-/// Spacing of the vertices of tables and patches, mm.
+/// Spacing of the vertices of tables and patches, mm. Large tables have a wider spacing, and small patches a narrower
+/// one.
 const COARSE_MM: f64 = 0.4;
 
 /// What a scan contains besides the carved face. Depths are in mm below the plane of the stroke tops.
@@ -37,7 +38,7 @@ pub(super) enum BlockBody {
     /// Side walls and the table around the block.
     Table {
         depth_mm: f64,
-        /// Rise of the table per mm along both axes.
+        /// Slope of the table along x and along y.
         slope: [f64; 2],
         texture: Noise,
         /// Half the side of the table, mm.
@@ -92,7 +93,7 @@ impl BlockBody {
             } => roughness.map_or(-depth_mm, |(amplitude_mm, noise)| {
                 -depth_mm + amplitude_mm * noise.two_octaves(x / 1.5, y / 0.6)
             }),
-            // The second face looks the opposite way: turned by 180 degrees about the y axis.
+            // The second face is seen from below: its frame is rotated by 180 degrees about the y axis.
             Self::SecondFace { depth_mm, surface } => -depth_mm - surface.value([x, -y]),
             Self::Table {
                 depth_mm,
@@ -115,7 +116,8 @@ impl BlockBody {
         }
     }
 
-    /// Adds walls and bottom or table to the carved face. `all` are the face's triangles including those in holes.
+    /// Adds walls and bottom or table to the carved face. `all` has the face's triangles and those inside its large
+    /// holes, so that walls are built only at the outer boundary and at small holes.
     pub(super) fn complete(
         &self,
         mut face: MeshOfPoints,
@@ -227,7 +229,7 @@ impl BlockBody {
     }
 }
 
-/// Adds a rough disc that is seen through a hole at (u, v).
+/// Adds a rough disc `depth_mm` below the plane of the stroke tops, which is seen through a hole at (u, v).
 pub(super) fn add_patch(
     mesh: &mut Mesh,
     [u, v]: [f64; 2],
@@ -244,7 +246,8 @@ pub(super) fn add_patch(
     add_sheet(mesh, centre, radius_mm, step_mm, disc, rng);
 }
 
-/// Adds a square grid of points, and the triangles between three points that `point` returned.
+/// Adds the points that `point` returns for the positions of a square grid, and the triangles whose three corners
+/// exist. Then removes unused vertices from the whole mesh.
 fn add_sheet(
     mesh: &mut Mesh,
     centre: [f64; 2],
@@ -297,7 +300,8 @@ fn drop_unused(mesh: &mut Mesh) {
     *mesh = kept.mesh;
 }
 
-/// Returns the edges that belong to only one triangle. Their direction and order are as in `triangles`.
+/// Returns the edges that no other triangle shares in the opposite direction. Their direction and order are as in
+/// `triangles`.
 pub(super) fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     let edges = || {
         triangles

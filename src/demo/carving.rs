@@ -16,7 +16,7 @@ use super::scene::Scene;
 pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
     let frame = strokes.frame;
     let knife = Knife::draw(scene.conditions.depth, frame, rng);
-    // A shallow block was worn less: its tops are still above its floor.
+    // Wear is scaled down on a shallow block, so that its tops stay above its floor.
     let worn_share = scene.conditions.depth.clamp(0.5, 1.0);
     let wear = Wear::draw(rng);
     let cut = ScalarField::from_fn(frame, |point, x, y| {
@@ -46,7 +46,7 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
 
 /// Shape of the carved background.
 struct Knife {
-    /// Factor of all depths and of the distances from the strokes that they need.
+    /// Factor of all depths. The walls keep their slope.
     scale: f64,
     slope: f64,
     lean: Noise,

@@ -8,7 +8,7 @@ use super::noise::Noise;
 use super::paper_geometry::PaperGeometry;
 use super::weathering::Weathering;
 
-/// Conditions that differ from those of the first four tiers.
+/// Conditions of carving, scan, print and crop. The default applies to the tiers without a kind.
 #[derive(Debug, Clone)]
 pub(super) struct Conditions {
     /// Factor of the carved depth.
@@ -25,9 +25,10 @@ pub(super) struct Conditions {
     pub thickness: f64,
     /// Amount of ink. `None` if the tier's own rule applies.
     pub ink: Option<InkAmount>,
-    /// Deformation of the paper and position of the camera.
+    /// Deformation of the sheet and position of the camera. `None` for an undeformed sheet that is not photographed at
+    /// an angle.
     pub paper: Option<PaperGeometry>,
-    /// Which of mesh and print shows the neighbours.
+    /// Which of mesh and print shows all neighbours.
     pub crop: Crop,
 }
 
@@ -36,7 +37,7 @@ pub(super) struct Conditions {
 pub(super) struct ScanErrors {
     /// Factor of the height noise.
     pub noise: f64,
-    /// Smooth error: amplitude in mm.
+    /// Amplitude of the smooth height error, mm.
     pub ripple_mm: f64,
     /// Standard deviation of the smoothing, mm.
     pub smoothing_mm: f64,
@@ -92,7 +93,7 @@ impl Default for Conditions {
 }
 
 impl Conditions {
-    /// Draws the conditions of a kind. Draws nothing if there is no kind.
+    /// Draws the conditions of a kind. Without a kind, returns the default and draws no random numbers.
     pub(super) fn draw(kind: Option<&DemoKind>, rng: &mut ChaCha8Rng) -> Self {
         let Some(kind) = kind else {
             return Self::default();

@@ -39,7 +39,7 @@ impl Damage {
         Self::draw_with(LOST_SHARE, artwork, rng)
     }
 
-    /// Draws the damage of a block that lost a share of its stroke area between two bounds.
+    /// Draws the damage of a block that lost a share of its stroke area within `share`. The block has up to two cracks.
     pub(super) fn draw_with(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
         let lost = Some(draw_lost_regions(share, artwork, rng));
         let cracks = (0..rng.random_range(0..3_u32))

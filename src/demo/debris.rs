@@ -7,7 +7,7 @@ use super::noise::normal;
 use super::polygon::Polygon;
 use crate::mesh::Mesh;
 
-/// Moves random vertices by up to 4 mm, mostly along the viewing direction.
+/// Moves random vertices by 0.3 to 4 mm along the viewing direction, and by less across it.
 pub(super) fn add_far_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
     for _ in 0..spikes {
         if mesh.vertices.is_empty() {
@@ -26,7 +26,7 @@ pub(super) fn add_blobs(mesh: &mut Mesh, blobs: u32, outline: &Polygon, rng: &mu
     let bounds = outline.bounds();
     for _ in 0..blobs {
         let [u, v] = [0, 1].map(|i| rng.random_range(bounds.min[i] - 3.0..bounds.max[i] + 3.0));
-        // A lump over the character would hide the surface from the scanner, so lumps there are small.
+        // A lump above or below the scanned area can hide the surface, so lumps there are small.
         let is_over = outline.contains([u, v]);
         let radius_mm = rng.random_range(0.05..if is_over { 0.2 } else { 0.9 });
         let side = if rng.random_bool(0.7) { 1.0 } else { -1.0 };

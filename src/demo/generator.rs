@@ -49,7 +49,8 @@ impl PairGenerator {
         self.drawn(kind, index, self.glyphs.characters())
     }
 
-    /// Makes a pair of a given character of the font. In the `real` tier, the print is drawn instead of photographed.
+    /// Makes a pair of a character, which must be in the font. In the `real` tier, the print is drawn, not a
+    /// photograph.
     ///
     /// # Errors
     /// Returns an error if an image cannot be encoded.

@@ -20,7 +20,7 @@ enum InkLoad {
 
 /// One inked impression of a block.
 pub(super) struct Inking {
-    /// Signed distance to the printing area, mm, with corners filled by ink.
+    /// Signed distance to the printed area, mm, positive inside, with corners filled by ink.
     printed: ScalarField,
     spread_mm: f64,
     spread: Noise,
@@ -32,7 +32,7 @@ pub(super) struct Inking {
     bristles: Noise,
     gaps: Vec<Ellipse>,
     specks: Vec<Ellipse>,
-    /// Amount of ink of the kinds that have their own rule.
+    /// Amount of ink that the tier's kind prescribes. `None` for tiers without a kind.
     amount: Option<InkAmount>,
 }
 
@@ -124,7 +124,7 @@ impl Inking {
     }
 }
 
-/// Draws the amount of ink. Only the `hard` tier has too much or too little.
+/// Draws the amount of ink for the tiers without a kind. Of these, only `hard` has too much or too little ink.
 fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
     let share: f64 = rng.random();
     match share {
@@ -140,7 +140,8 @@ fn fill_corners(printed: &ScalarField) -> ScalarField {
     let ink = ScalarField::from_fn(printed.frame, |_, x, y| f64::from(printed.at(x, y) > 0.0));
     let blurred = ink.blurred(SIGMA_MM);
     ScalarField::from_fn(printed.frame, |_, x, y| {
-        // At the edge, the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. Dividing by this slope gives mm.
+        // At a straight edge, the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. Dividing by this slope
+        // gives mm.
         let blurred_mm = (blurred.at(x, y) - 0.45) * SIGMA_MM * (std::f64::consts::TAU).sqrt();
         0.5 * printed.at(x, y) + 0.5 * blurred_mm
     })

@@ -6,7 +6,7 @@ pub(super) type NumberRange = [f64; 2];
 /// What a scan contains besides the carved face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Base {
-    /// Nothing, or in one of eight scans thin side walls and a flat base.
+    /// Nothing, or, in one of eight scans, thin side walls and a flat bottom.
     Ordinary,
     /// Side walls and a rough bottom.
     Foot,
@@ -18,7 +18,7 @@ pub(super) enum Base {
     SeenThroughHoles,
 }
 
-/// Which of mesh and print shows the neighbouring characters as well.
+/// Which of mesh and print shows all eight neighbouring characters, if either does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Crop {
     /// Neither: both are cut around the character.
@@ -62,19 +62,19 @@ pub(super) struct DemoKind {
     pub spread_mm: NumberRange,
     /// Density of the ink.
     pub strength: NumberRange,
-    /// Degree to which the ink misses the wood in dry patches.
+    /// Degree of dryness in dry patches, where ink is missing inside the strokes. 0 for none.
     pub dryness: NumberRange,
-    /// Share of the ink that is missing where the paper had the least contact.
+    /// Share of the ink that is missing where the sheet had the least contact.
     pub uneven: NumberRange,
     /// Density of ink smeared on the carved background.
     pub smear: NumberRange,
-    /// Angle between the camera's axis and the paper's normal, degrees.
+    /// Angle between the camera's axis and the sheet's normal, degrees.
     pub tilt_deg: NumberRange,
-    /// Amplitude of the smooth warp of the paper, mm.
+    /// Amplitude of the smooth warp of the sheet, mm.
     pub warp_mm: NumberRange,
-    /// Share by which the paper shrank along one axis.
+    /// Share by which the sheet shrank along one axis. It shrank less along the other.
     pub shrink: NumberRange,
-    /// Which of mesh and print shows the neighbours.
+    /// Which of mesh and print shows all neighbours.
     pub crop: Crop,
 }
 
@@ -104,7 +104,7 @@ const ORDINARY: DemoKind = DemoKind {
     crop: Crop::Character,
 };
 
-/// A moderate mix of wear, dirt, scan errors, uneven ink and deformed paper.
+/// A moderate mix of wear, dirt, scan errors, uneven ink and deformed sheets.
 pub(super) const FIELD: DemoKind = DemoKind {
     depth: [0.55, 1.15],
     abrasion_mm: [0.0, 0.16],
@@ -218,13 +218,13 @@ pub(super) const PHOTO: DemoKind = DemoKind {
     ..ORDINARY
 };
 
-/// Paper that dried unevenly.
+/// Sheets warped by uneven drying.
 pub(super) const WAVY: DemoKind = DemoKind {
     warp_mm: [0.05, 0.35],
     ..ORDINARY
 };
 
-/// Paper that shrank more along one axis than along the other.
+/// Sheets that shrank more along one axis than along the other.
 pub(super) const SHRUNK: DemoKind = DemoKind {
     shrink: [0.005, 0.06],
     ..ORDINARY
@@ -248,7 +248,7 @@ pub(super) const GRID_PRINT: DemoKind = DemoKind {
     ..ORDINARY
 };
 
-/// Several of the above at once, each milder than in its own kind.
+/// Several of the above at once, most of them milder than in their own kind.
 pub(super) const MIXED: DemoKind = DemoKind {
     abrasion_mm: [0.0, 0.2],
     rounding_mm: [0.0, 0.15],

@@ -45,7 +45,8 @@ pub struct DemoPair {
     pub print: Vec<u8>,
     /// File name extension of the print.
     pub print_extension: &'static str,
-    /// Mask of the stroke tops in the print frame: 255 = stroke top, 0 = background, 128 = excluded from the score.
+    /// Mask of the true stroke tops, with the size of the print image: 255 = stroke top, 0 = background, 128 = excluded
+    /// from the score.
     pub tops: Grid<u8>,
     /// Ground truth.
     pub truth: TruthLine,
@@ -61,8 +62,8 @@ pub(super) struct Printed {
     pub extension: &'static str,
 }
 
-/// Makes a pair of a tier other than `real`: the character is one of `characters`, which are in the font. A pair of a
-/// kind that has no right answer is drawn again.
+/// Makes a pair whose print is drawn, so not a photograph. The character is one of `characters`, which are in the font.
+/// If the tier has a kind, draws again until print and relief both show the character.
 ///
 /// # Errors
 /// Returns an error if the print cannot be encoded.
@@ -168,7 +169,8 @@ fn draw_body(glyphs: &Glyphs, scene: &Scene, rng: &mut ChaCha8Rng) -> BlockBody 
     }
 }
 
-/// Draws the polygon along which a scan or a print is cut. `wide` is the crop in which it shows 3 x 3 characters.
+/// Draws the polygon along which a scan or a print is cut. If the scene's crop is `wide`, the polygon contains 3 x 3
+/// characters.
 fn cut_outline(scene: &Scene, wide: Crop, rng: &mut ChaCha8Rng) -> Polygon {
     let artwork = &scene.artwork;
     let margin_mm = rng.random_range(0.3..0.75);
@@ -185,7 +187,7 @@ fn draw_mesh_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
         10..=12 => MeshFormat::PlyLittleEndian,
         13..=14 => MeshFormat::PlyBigEndian,
         15..=16 => MeshFormat::PlyAscii,
-        // ASCII STL is six times larger, so it is used for small scans only.
+        // ASCII STL files are about six times as large as binary ones, so only small scans use them.
         17 if vertices < 40_000 => MeshFormat::StlAscii,
         18..=19 => MeshFormat::Obj,
         _ => MeshFormat::StlBinary,

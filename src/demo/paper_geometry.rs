@@ -1,4 +1,4 @@
-//! Deformation of the paper and perspective of the camera: the map from the block's plane to the image plane.
+//! Deformation of the sheet and perspective of the camera: the map from the block's plane to the image plane.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +12,7 @@ use super::noise::Noise;
 const INVERSION_STEPS: usize = 30;
 /// Size of the warp's features, mm.
 const WARP_SIZE_MM: [f64; 2] = [4.5, 9.0];
-/// Distance of the camera from the paper, mm.
+/// Distance of the camera from the sheet, mm.
 const CAMERA_MM: [f64; 2] = [70.0, 300.0];
 
 /// A smooth warp, then a shrinkage, then a perspective view. All of them keep the character's centre nearly in place.
@@ -30,7 +30,7 @@ pub(super) struct PaperGeometry {
 }
 
 impl PaperGeometry {
-    /// Draws the geometry of a kind. Returns `None` if the kind has flat and undeformed paper.
+    /// Draws the geometry of a kind. Returns `None` if the kind has flat sheets that are scanned and not photographed.
     pub(super) fn draw(kind: &DemoKind, rng: &mut ChaCha8Rng) -> Option<Self> {
         let most = [kind.warp_mm[1], kind.shrink[1], kind.tilt_deg[1]];
         most.iter().any(|value| *value > 0.0).then(|| {

@@ -22,16 +22,17 @@ pub(super) struct PrintFrame {
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Maps (u, v) in mm to pixels. With a deformed paper, the best affine approximation over the strokes.
+    /// Maps (u, v) in mm to pixels. If the sheet is deformed or photographed, this is the affine least-squares fit over
+    /// the strokes.
     pub print_from_uv: Affine2,
     /// Maps pixels to (u, v) in mm.
     pub uv_from_print: Affine2,
-    /// The deformed paper, and the map from its image plane in mm to pixels.
+    /// The geometry of a deformed or photographed sheet, and the map from its image plane in mm to pixels.
     deformed: Option<(PaperGeometry, Affine2)>,
 }
 
 impl PrintFrame {
-    /// Creates a frame from a similarity.
+    /// Creates a frame without deformation from an invertible map of (u, v) in mm to pixels.
     pub(super) fn new(width: usize, height: usize, print_from_uv: Affine2) -> Self {
         let uv_from_print = print_from_uv.inverse();
         Self {
@@ -87,7 +88,7 @@ impl PrintFrame {
         }
     }
 
-    /// Returns the side of a pixel, mm.
+    /// Returns the side of a pixel, mm. For a deformed or photographed sheet, this is an average.
     pub(super) fn px_mm(&self) -> f64 {
         self.uv_from_print.scale()
     }
@@ -163,7 +164,7 @@ pub(super) fn render_print(
         if !inside_cut.at(x, y) {
             return [255.0; 3];
         }
-        // Damp paper stretches unevenly by a few hundredths of a millimetre.
+        // A damp sheet stretches unevenly by a few hundredths of a millimetre.
         let [su, sv] = stretch.map(|noise| 0.035 * noise.at(u / 4.0, v / 4.0));
         let point = [u + su, v + sv];
         let mut ink = inking.at(point, frame.px_mm());

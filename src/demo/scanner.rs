@@ -26,17 +26,17 @@ pub(super) struct ScanStyle {
     pub vertices: f64,
     /// Standard deviation of the height noise, mm.
     pub noise_mm: f64,
-    /// Number of outlier vertices.
+    /// Number of slightly displaced outlier vertices.
     pub spikes: u32,
-    /// Number of holes.
+    /// Number of small holes in deep regions.
     pub holes: u32,
     /// Whether the faces are wound inward.
     pub is_inside_out: bool,
 }
 
 impl ScanStyle {
-    /// Draws the properties of a scan with about `vertices` vertices. If `vertices` is `None`, their number is drawn as
-    /// well: 22,000 to 132,000, with small numbers more likely.
+    /// Draws the properties of a scan with about `vertices` vertices. If `vertices` is `None`, draws a number from
+    /// 22,000 to 132,000, in which small numbers are more likely.
     pub(super) fn draw(
         is_damaged_scan: bool,
         errors: ScanErrors,

@@ -23,9 +23,9 @@ pub(super) struct Scene {
     pub character: char,
     /// Strokes of the character.
     pub artwork: Artwork,
-    /// Signed distance to neighbours and column rules on the block, mm.
+    /// Signed distance to neighbours and column rules on the block, mm, positive inside.
     pub block_neighbours: ScalarField,
-    /// Signed distance to neighbours and column rules on the print, mm.
+    /// Signed distance to neighbours and column rules on the print, mm, positive inside.
     pub print_neighbours: ScalarField,
     /// Damage of the block after printing.
     pub damage: Damage,
@@ -33,7 +33,8 @@ pub(super) struct Scene {
     pub conditions: Conditions,
 }
 
-/// Creates the random generator of an attempt to draw a pair, from seed, tier and index. The first attempt is 0.
+/// Creates the random number generator for one attempt to draw a pair. It depends only on seed, tier, index and
+/// `attempt`, which counts from 0.
 pub(super) fn pair_rng(seed: u64, tier: Tier, index: u64, attempt: u32) -> ChaCha8Rng {
     let mut name = format!("mocban demo {tier} {seed} {index}");
     if attempt > 0 {

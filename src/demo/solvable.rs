@@ -1,4 +1,5 @@
-//! Decides whether a pair of a kind has a right answer: print and relief must both show the character.
+//! Decides whether a pair can be aligned: print and relief must both show the character. Only the tiers with a kind use
+//! this.
 
 use super::carved_block::CarvedBlock;
 use super::rendered_print::{PrintFrame, RenderedPrint};
@@ -8,11 +9,12 @@ use crate::raster::Grid;
 
 /// Smallest intersection over union of the strokes and the print under its best global threshold.
 const MIN_PRINT_IOU: f64 = 0.6;
-/// Smallest intersection over union of the true tops and the relief under its best global threshold. A mask is right
-/// from 0.7.
+/// Smallest intersection over union of the true tops and the relief under its best global threshold. It is higher than
+/// the 0.7 from which a mask counts as right.
 const MIN_TOPS_IOU: f64 = 0.8;
 
-/// Returns whether some threshold of the print's darkness reproduces the strokes.
+/// Returns whether some threshold of the print's brightness reproduces the strokes. Ignores pixels on or near
+/// neighbours.
 pub(super) fn is_legible(scene: &Scene, frame: &PrintFrame, picture: &RenderedPrint) -> bool {
     let mut samples = Vec::new();
     for (y, x) in pixels(frame) {
@@ -26,7 +28,8 @@ pub(super) fn is_legible(scene: &Scene, frame: &PrintFrame, picture: &RenderedPr
     best_iou(samples) >= MIN_PRINT_IOU
 }
 
-/// Returns whether some threshold of the scanned heights reproduces the mask of the true tops.
+/// Returns whether some threshold of the heights that the scanner sees reproduces the mask of the true tops. Ignores
+/// the excluded pixels of the mask.
 pub(super) fn is_solvable(block: &CarvedBlock, frame: &PrintFrame, tops: &Grid<u8>) -> bool {
     let labelled = pixels(frame).filter(|(y, x)| tops.at(*x, *y) != IGNORED);
     let samples = labelled.map(|(y, x)| {
@@ -41,8 +44,8 @@ fn pixels(frame: &PrintFrame) -> impl Iterator<Item = (usize, usize)> {
     (0..frame.height).flat_map(move |y| (0..width).map(move |x| (y, x)))
 }
 
-/// Returns the best intersection over union of the labelled samples and the samples above a threshold. Returns 0 if
-/// no sample is labelled.
+/// Returns the highest intersection over union, for any threshold, of the samples labelled `true` and the samples with
+/// values above the threshold. Returns 0 if no label is `true`.
 fn best_iou(mut samples: Vec<(f64, bool)>) -> f64 {
     samples.sort_by(|a, b| b.0.total_cmp(&a.0));
     let wanted = samples.iter().filter(|(_, is_wanted)| *is_wanted).count();

@@ -23,7 +23,7 @@ pub enum Tier {
     Hard,
     /// The prints are twenty photographs of characters. The reliefs are carved from clean masks and have any pose.
     Real,
-    /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed paper.
+    /// A moderate mix of wear, dirt, scan errors, uneven ink and deformed sheets.
     Field,
     /// Stroke tops worn down in patches and rounded at their edges.
     Worn,
@@ -51,9 +51,9 @@ pub enum Tier {
     Heavy,
     /// A photograph of the print, taken at an angle.
     Photo,
-    /// Paper that dried in waves.
+    /// Sheets warped by uneven drying.
     Wavy,
-    /// Paper that shrank more along one axis than along the other.
+    /// Sheets that shrank more along one axis than along the other.
     Shrunk,
     /// A large part of the strokes lost after printing.
     Lost,
@@ -61,7 +61,7 @@ pub enum Tier {
     GridMesh,
     /// A print with all eight neighbours of the character; the mesh shows only the character.
     GridPrint,
-    /// Several of these at once, each milder.
+    /// Several of these at once, most of them milder.
     Mixed,
     /// All other tiers in turn.
     All,
@@ -83,8 +83,8 @@ impl Tier {
         (self == Self::Real).then_some(REAL_PAIRS)
     }
 
-    /// Returns the tier and the index within that tier of the pair with the given index. They differ from `self` and
-    /// `index` only in `All`.
+    /// Returns the tier of the pair with the given index, and its index within that tier. They differ from `self` and
+    /// `index` only if `self` is `All`.
     pub(super) fn tier_and_index(self, index: u64) -> (Self, u64) {
         if self != Self::All {
             return (self, index);

@@ -25,7 +25,7 @@ const NEIGHBOUR_MARGIN_MM: f64 = 0.2;
 pub struct TruthLine {
     /// Id of the pair.
     pub id: String,
-    /// Maps mesh coordinates to print pixels and height.
+    /// Maps mesh coordinates to print pixels, and to the height over the plane of the stroke tops in mesh units.
     pub print_from_mesh: PrintFromMesh,
     /// The plane of the stroke tops, in mesh coordinates.
     pub plane: TopsPlane,

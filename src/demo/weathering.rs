@@ -39,8 +39,8 @@ impl Weathering {
         })
     }
 
-    /// Returns the surface after wear and dirt. `strokes` is the signed distance to all strokes in mm, and `depth_mm`
-    /// the carved depth.
+    /// Returns the surface after wear and dirt. `surface` has heights in mm over the unworn tops. `strokes` is the
+    /// signed distance to all strokes in mm, positive inside, and `depth_mm` the carved depth.
     pub(super) fn applied(
         &self,
         surface: &ScalarField,
@@ -52,7 +52,7 @@ impl Weathering {
         ScalarField::from_fn(surface.frame, |point, x, y| {
             let height = surface.at(x, y);
             let worn_mm = self.worn_mm(point, strokes.at(x, y), depth_mm);
-            // Wear removes most at the top of the walls and nothing below twice its depth.
+            // Removes `worn_mm` at the level of the tops, less from the walls, and nothing below twice this depth.
             let worn =
                 height - worn_mm * (1.0 + height / (2.0 * worn_mm).max(1e-9)).clamp(0.0, 1.0);
             if self.fill <= 0.0 {

@@ -261,7 +261,8 @@ fn add_value(bytes: &mut Vec<u8>, row: &SqliteRow, column: usize) -> Result<(), 
 }
 
 impl Catalog {
-    /// Compares the rows of all tables in [`ChecksummedTable`] with their checksums. Returns the rows that do not agree.
+    /// Compares the rows of all tables in [`ChecksummedTable`] with their checksums. Returns the rows that do not
+    /// agree.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -1,4 +1,4 @@
-//! Known-answer worlds for both methods.
+//! Tests of both fit methods on synthetic sheets with known planes.
 
 use nalgebra::Vector3;
 

@@ -2,11 +2,11 @@
 //! and relief show the same character.
 //!
 //! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of the chosen
-//! tiers (`--tiers all` for every kind), meshes paired with the print of another or a similar character, mirrored meshes
-//! and uncarved plates. It prints the weights, and a reliability table for pairs of other seeds. `POSE` and `MASK` were
-//! fitted on 1,010 pairs of two independent generators, `CHARACTER` as its comment says. Only the last two weights of
-//! `MASK` were set manually. They lower the confidence if the pose is a few percent off, or if the threshold cuts
-//! through worn or tilted tops.
+//! tiers (`--tiers all` for every tier), meshes paired with the print of another or a similar character, mirrored
+//! meshes and uncarved plates. It prints the weights, and a reliability table for pairs of other seeds. `POSE` and
+//! `MASK` were fitted on 1,010 pairs of two independent generators, and `CHARACTER` on the pairs that its comment
+//! describes. Only the last two weights of `MASK` were set manually. They lower the confidence if the pose is a few
+//! percent off, or if the threshold cuts through worn or tilted tops.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 

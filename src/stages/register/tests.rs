@@ -118,7 +118,7 @@ fn distant_specks_change_nothing() {
     assert!(error < 0.7, "{error} px");
 }
 
-/// The same surface as a triangle soup, its faces in another order.
+/// Returns the same surface with its faces in another order and no shared vertices.
 fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
     let count = mesh.triangles.len();
     let corners = (0..count).flat_map(|k| mesh.triangles[(k * 7919) % count]);
@@ -130,7 +130,7 @@ fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
     }
 }
 
-/// Largest distance in print pixels between two answers over the sheet.
+/// Returns the largest distance, in print pixels, between the images of a sheet's corner under two maps.
 fn apart_px(world: &SyntheticSheet, a: &PrintFromMesh, b: &PrintFromMesh) -> f64 {
     let corners = [[-4.0, -4.0], [4.0, -4.0], [-4.0, 4.0], [4.0, 4.0]];
     let apart = |[x, y]: [f64; 2]| {
@@ -192,7 +192,7 @@ fn a_character_among_neighbours_in_the_print_is_aligned() {
         let error = landmark_error_px(&world, &truth, &found);
         assert!(error < 0.6, "{error} px, {metric:?}");
         assert!(metric.confidence.is_some_and(|confidence| confidence > 0.9));
-        // The neighbours are no ink on the canvas.
+        // Neighbouring characters do not count as ink on the canvas.
         assert!(metric.scores.iou > 0.6, "{:?}", metric.scores);
     }
 }
