@@ -27,7 +27,7 @@ impl Catalog {
         &self,
         find: impl FnMut(&str) -> Option<String> + Send + 'static,
     ) -> Result<Vec<String>> {
-        // Otherwise a damaged row would get a valid checksum.
+        // Verifies first, because the update would give a damaged row a valid checksum.
         self.verify_checksums().await?;
         self.in_transaction(move |conn| Box::pin(replace(conn, find)))
             .await

@@ -29,7 +29,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
     }
 }
 
-/// Two metrics with equal results.
+/// Returns a shown item with the results of two metrics.
 fn two() -> Shown {
     let of = |metric: ThresholdMetric| (metric, ContentHash::of(metric.name().as_bytes()));
     Shown::Results(vec![

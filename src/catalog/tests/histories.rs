@@ -16,8 +16,9 @@ use crate::catalog::{
 };
 use crate::domain::{Failure, FailureClass, Stage};
 
-/// Pairs at first, and at most.
+/// Number of pairs at the start of a history.
 const PAIRS: usize = 5;
+/// Largest number of pairs.
 const MOST_PAIRS: usize = 8;
 /// Longest back-off.
 const LONGEST: i64 = 200;
@@ -28,7 +29,7 @@ struct Game {
     model: Queue,
     /// Leases that processes hold or believe to hold.
     leases: Vec<Lease>,
-    /// The wall clock of the next process and of back-offs; it jumps.
+    /// Wall clock in ms, which new processes start with and which ends back-offs. It jumps forward and back.
     wall: i64,
     settings: (Fingerprints, FingerprintIds),
     verdicts: Vec<i64>,

@@ -4,7 +4,7 @@ use super::{World, name};
 use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
-/// Results of a pair that is done.
+/// Number of metrics with a result, of a pair that is done.
 const METRICS: usize = ThresholdMetric::ALL.len();
 
 fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {

@@ -36,10 +36,10 @@ pub enum FitError {
     /// Every vertex on one line.
     #[error("all {0} vertices lie on one line")]
     OneLine(usize),
-    /// Neither faces nor enough points to stand for a surface.
+    /// No faces, and too few points to represent a surface.
     #[error("mesh has no faces, and {0} points are too few to show a surface")]
     NoFaces(usize),
-    /// Hardly a pixel of a rendering is covered, from either side.
+    /// Renderings of the mesh cover fewer than 16 pixels.
     #[error("mesh of {0} vertices shows no surface from either side")]
     NoSurface(usize),
     /// Nothing is carved.

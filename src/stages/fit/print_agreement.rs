@@ -85,7 +85,7 @@ impl InkPyramids {
 
     /// Returns the best agreement of a side with any interpretation of the print, from `LEAST_AGREEMENT` to 1.
     pub(super) fn agreement(&self, side: &FittedSide) -> f64 {
-        // Seen from outside, so in mirror writing.
+        // The samples show the block from outside, so the tops are in mirror writing.
         let tops = side.samples.soft_tops(&side.surface, side.relief);
         let scores = self.0.iter().map(|ink| best_score(ink, &tops));
         scores.fold(LEAST_AGREEMENT, f64::max)

@@ -23,7 +23,7 @@ const WRONG_SIDE: f64 = 0.03;
 const LAYERS: usize = 96;
 /// Faces within this many layers of a support belong to it.
 const THICKNESS: f64 = 1.6;
-/// A smaller share of the faces is no block.
+/// A part with a smaller share of the scan's faces is not a block.
 const LEAST_PART: f64 = 0.02;
 
 /// Returns the parts that may be the block: first the scan without debris, then the part above each large plane that

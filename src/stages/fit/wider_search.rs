@@ -250,7 +250,7 @@ fn region(mesh: &Mesh, indexed: &IndexedSurface, side: &FittedSide, along: &Rigi
     let normal = row(&side.plane_from_mesh, 2);
     let box_from_mesh = frame_along(normal, row(along, 0), Vector3::from(origin));
     let [low, high] = indexed.bounds(&box_from_mesh);
-    // Corners of faces at the rim must not fall out by rounding.
+    // Keeps corners of faces on the boundary inside despite rounding.
     let slack = 1e-4 * side.extent;
     // A table that was cut off lies below the lowest corner.
     let lowest = bounds(mesh, &box_from_mesh)[0][2] - slack;

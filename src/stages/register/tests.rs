@@ -68,7 +68,7 @@ fn the_papers_method_aligns_an_upright_pair() {
     assert!(error < 4.0, "{error} px");
 }
 
-/// The metrics of results, in their order.
+/// Returns the metrics of results, in their order.
 fn metrics(results: &[(PrintFromMesh, MetricOutcome)]) -> Vec<ThresholdMetric> {
     results.iter().map(|(_, outcome)| outcome.metric).collect()
 }
