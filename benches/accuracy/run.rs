@@ -67,6 +67,7 @@ fn align(
         })
         .map_err(StageError::from)?;
     let plane = &*fit.insert(plane);
+    let print = print.within(plane.print_outline.as_ref());
     let depth = times
         .book(Part::Depth, || {
             depth::depth(&scan, plane, None, &settings.depth)

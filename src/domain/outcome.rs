@@ -161,6 +161,10 @@ pub struct ReliefHeights {
     pub ground: f64,
     /// Depth below `top` at which the stroke tops end and the walls begin, as a share of [`Self::depth`].
     pub tops_end: f64,
+    /// Standard deviation of the logarithm of [`Self::tops_end`]: about 0.1 on new blocks, and above 0.5 where wear has
+    /// rounded the strokes.
+    #[serde(default)]
+    pub tops_end_log_deviation: f64,
 }
 
 impl ReliefHeights {
@@ -175,7 +179,12 @@ impl ReliefHeights {
     /// ```
     /// use mocban::domain::{Affine2, DepthScale, ReliefHeights};
     ///
-    /// let relief = ReliefHeights { top: 0.0, ground: -1.0, tops_end: 0.08 };
+    /// let relief = ReliefHeights {
+    ///     top: 0.0,
+    ///     ground: -1.0,
+    ///     tops_end: 0.08,
+    ///     tops_end_log_deviation: 0.1,
+    /// };
     /// let scale = DepthScale {
     ///     height_min: -1.0,
     ///     height_per_level: 0.001,

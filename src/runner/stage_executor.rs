@@ -120,7 +120,9 @@ impl PipelineExecutor {
             pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
                 // Name the print if the characters do not match. For other errors, the mesh is the likelier cause.
                 let path = match error {
-                    RegisterError::NoMatch { .. } => &pair.attributes.print_path,
+                    RegisterError::NoMatch { .. } | RegisterError::OtherCharacter { .. } => {
+                        &pair.attributes.print_path
+                    }
                     _ => &pair.attributes.mesh_path,
                 };
                 in_file(path, &error.into())

@@ -6,6 +6,7 @@ mod binarize;
 mod blur;
 mod components;
 pub mod depth;
+mod face;
 pub mod fit;
 #[cfg(test)]
 mod golden;

@@ -10,3 +10,4 @@ pub(super) use ink::BinarizeError;
 pub(super) use ink::{InkMask, fixed, hypotheses};
 pub(super) use otsu::{Split, split, split_inner};
 pub(super) use outlined::{hypotheses_within, inside};
+pub(super) use polarity::rim_share;

@@ -38,8 +38,8 @@ fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5)
 }
 
-/// Returns the share of dark pixels in the rim of the known area.
-fn rim_share(dark: &Mask, known: &Mask) -> f64 {
+/// Returns the share of pixels of a mask in the rim of the known area, 0..=1.
+pub(crate) fn rim_share(dark: &Mask, known: &Mask) -> f64 {
     let (width, height) = (known.width(), known.height());
     let reach = ((width.min(height) as f64 * RIM).round() as usize).max(1);
     let (mut rim, mut of_it) = (0_usize, 0_usize);

@@ -1,11 +1,12 @@
 //! The fit stage (paper III-A): finds the plane of the stroke tops and the carved side of a mesh.
 //!
-//! Both sides of the mesh are rendered, and a surface is fitted to the stroke tops of each rendering. The plane of a
-//! side depends on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the side
-//! is chosen in this stage. If the chosen side does not resemble the print, all sides and parts of the scan are tried
-//! (`wider_search`), and parts of the print (`part_search`). The outcome of `wider_search` has a region, which is the
-//! part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the part of the
-//! print that shows the character. The paper's own fit is in `paper_method::fit`.
+//! Both sides of the mesh are rendered, and a surface is fitted to the stroke tops of each rendering. Side walls, a
+//! foot or a table below the carved face are left out; if there are any, the outcome has a region. The plane of a
+//! side depends on the mesh only. The choice of the side also depends on the print. `src/lib.rs` explains why the
+//! side is chosen in this stage. If the chosen side does not resemble the print, all sides and parts of the scan are
+//! tried (`wider_search`), and parts of the print (`part_search`). The outcome of `wider_search` always has a region,
+//! which is the part of the scan that the depth map shows. The outcome of `part_search` has an outline, which is the
+//! part of the print that shows the character. The paper's own fit is in `paper_method::fit`.
 
 mod carved_side;
 mod directions;
@@ -27,7 +28,7 @@ pub(super) use surface::quantile;
 pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 13;
+pub const REVISION: u32 = 14;
 
 #[cfg(test)]
 mod tests;

@@ -15,6 +15,8 @@ const CELLS: f64 = 64.0;
 const MARKS: f64 = 2e7;
 /// A component is debris if its area is below this share of the largest component's area.
 const DEBRIS: f64 = 0.05;
+/// A face is narrow at a corner if both edges there are more than this many times as long as the third edge.
+const NARROW: f64 = 2.5;
 /// Least share of the area that lies in a support, the plane on which a block stands.
 const LEAST_SUPPORT: f64 = 0.2;
 /// Largest share of the remaining area that may lie below a support.
@@ -26,10 +28,10 @@ const THICKNESS: f64 = 1.6;
 /// A part with a smaller share of the scan's faces is not a block.
 const LEAST_PART: f64 = 0.02;
 
-/// Returns the parts that may be the block: first the scan without debris, then the part above each large plane that
-/// may be a support.
+/// Returns the parts that may be the block: first the scan without spikes and debris, then the part above each large
+/// plane that may be a support.
 pub(super) fn parts(mesh: &Mesh, indexed: &IndexedSurface) -> Vec<Mesh> {
-    let whole = without_debris(mesh, indexed);
+    let whole = without_debris(&without_spikes(mesh), indexed);
     let all = facets(&whole);
     let mut parts = Vec::new();
     for normal in large_planes(&all) {
@@ -93,6 +95,30 @@ fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> 
     let pairs = areas.windows(2).map(|pair| pair[0] + pair[1]).enumerate();
     let (fullest, _) = pairs.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some((layer, low + (fullest + 1) as f64 * layer))
+}
+
+/// Returns a mesh without the faces at spikes. A vertex is a spike if in most of its faces the two edges that meet
+/// there are much longer than the third edge.
+pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
+    // Number of faces at each vertex, and how many of them are narrow there.
+    let mut faces = vec![[0_u32; 2]; mesh.vertices.len()];
+    for face in &mesh.triangles {
+        let at = corners(mesh, face);
+        let edge = |from: usize, to: usize| (at[to % 3] - at[from % 3]).norm();
+        for k in 0..3 {
+            let [all, narrow] = &mut faces[face[k] as usize];
+            let opposite = edge(k + 1, k + 2);
+            *all += 1;
+            *narrow += u32::from(edge(k, k + 1).min(edge(k + 2, k)) > NARROW * opposite);
+        }
+    }
+    let is_spike = |corner: &u32| {
+        let [all, narrow] = faces[*corner as usize];
+        2 * narrow > all
+    };
+    let is_kept = |face: &&[u32; 3]| !face.iter().any(is_spike);
+    let kept: Vec<[u32; 3]> = mesh.triangles.iter().filter(is_kept).copied().collect();
+    of_faces(mesh, &kept)
 }
 
 /// Returns a mesh without distant specks and without connected components that are smaller than [`DEBRIS`] of the

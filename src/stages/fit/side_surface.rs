@@ -186,7 +186,7 @@ impl FittedView {
         let is_bent = over_plane[3..].iter().any(|c| *c != 0.0);
         let bow = is_bent.then_some(Bow(over_plane));
         let relief = if (MIN_TOPS..=MAX_TOPS).contains(&surface.tops) {
-            relief(&samples.inner_residuals(&surface))
+            relief(&mut samples.face_residuals(&surface))
         } else {
             0.0
         };
@@ -230,8 +230,6 @@ fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
 }
 
 /// Returns the depth of the carving: the median of the tops minus the median of the ground, without extreme heights.
-fn relief(residuals: &[f64]) -> f64 {
-    let mut residuals: Vec<f32> = residuals.iter().map(|r| *r as f32).collect();
-    binarize::split_inner(&mut residuals, TRIMMED_ONE_IN)
-        .map_or(0.0, |split| split.high - split.low)
+fn relief(residuals: &mut [f32]) -> f64 {
+    binarize::split_inner(residuals, TRIMMED_ONE_IN).map_or(0.0, |split| split.high - split.low)
 }

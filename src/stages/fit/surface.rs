@@ -6,10 +6,14 @@
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
 use crate::raster::{Grid, Mask};
+use crate::stages::binarize;
 use crate::stages::components::ConnectedComponents;
+use crate::stages::face::{Face, HeightSample};
 use crate::stages::pose::SoftMask;
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
+/// Fewer points do not determine a surface.
+const LEAST_POINTS: usize = 16;
 /// Weight of points above the surface in the first passes, which solve a convex problem. Points below weigh
 /// `1 - ENVELOPE`. The resulting surface is the 0.97 expectile of the heights.
 const ENVELOPE: f64 = 0.97;
@@ -30,8 +34,11 @@ const CUT_PX: i64 = 2;
 const OFF_TOP_WEIGHT: f64 = 1e-6;
 /// Least share of the tops that must remain without the tops at the edge.
 const LEAST_OWN: f64 = 0.4;
-/// Share of the view's width and height left out at each border when the depth of the carving is measured.
-const MARGIN: f64 = 0.15;
+/// A carving is at most about this many times as deep as the median of its ground. Lower points are side walls of the
+/// block, its foot, or a table.
+const DEEPEST: f64 = 1.8;
+/// Least share of the points below the carving at which they are left out.
+const DEEP_SHARE: f64 = 0.01;
 /// Errors of neighbouring pixels are correlated: this many pixels count as one independent observation.
 const CORRELATED_PX: f64 = 40.0;
 /// Standard deviation of the heights on rough stroke tops, as a share of the height range.
@@ -71,6 +78,8 @@ pub(super) struct HeightSamples {
     extent: f64,
     /// Range of the heights over the mean plane, without the lowest and the highest 3 %.
     range: f64,
+    /// Whether points below the carving were left out.
+    pub(super) is_cropped: bool,
 }
 
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.
@@ -86,7 +95,7 @@ pub(super) struct Surface {
 }
 
 impl HeightSamples {
-    /// Collects the visible pixels of a rendering. Returns `None` if fewer than 16 are visible.
+    /// Collects the visible pixels of a rendering. Returns `None` if fewer than [`LEAST_POINTS`] are visible.
     pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
         let size = [heights.width(), heights.height()];
@@ -103,7 +112,8 @@ impl HeightSamples {
                 }
             }
         }
-        (points.len() >= 16).then(|| Self::of(points, places, size, centre, extent))
+        (points.len() >= LEAST_POINTS)
+            .then(|| Self::of(points, places, size, centre, extent).without_depths())
     }
 
     fn of(
@@ -131,6 +141,7 @@ impl HeightSamples {
             size,
             centre,
             extent,
+            is_cropped: false,
         }
     }
 
@@ -146,7 +157,11 @@ impl HeightSamples {
             let [u, v, z] = at(point);
             points.push([u - x, v - y, z].map(|length| length / self.extent));
         }
-        Self::of(points, self.places.clone(), self.size, [x, y], self.extent)
+        let turned = Self::of(points, self.places.clone(), self.size, [x, y], self.extent);
+        Self {
+            is_cropped: self.is_cropped,
+            ..turned
+        }
     }
 
     /// Fits a surface to the stroke tops. Returns a plane, unless `allow_bow` is set and a curved surface fits better.
@@ -272,21 +287,49 @@ impl HeightSamples {
         residuals
     }
 
-    /// Returns the residuals without the border of the view. Side walls and a protruding foot of the block may be
-    /// visible at the border, and are neither tops nor ground.
-    pub(super) fn inner_residuals(&self, surface: &Surface) -> Vec<f64> {
+    /// Returns the heights of the carved face over a surface, in mesh units. Side walls and a protruding foot of the
+    /// block may be visible around the face, and are neither tops nor ground.
+    pub(super) fn face_residuals(&self, surface: &Surface) -> Vec<f32> {
+        let samples = self.height_samples(&surface.coefficients);
+        Face::of(&samples).heights(&samples)
+    }
+
+    fn height_samples(&self, surface: &Coefficients) -> Vec<HeightSample> {
         let [width, height] = self.size;
-        let inside = |i: usize, side: usize| {
-            let cut = (side as f64 * MARGIN) as usize;
-            (cut..side - cut).contains(&i)
+        let residuals = self.points.residuals(surface);
+        let sample = |(residual, place): (&f64, &usize)| HeightSample {
+            x: (place % width) as f32 / width as f32,
+            y: (place / width) as f32 / height as f32,
+            height: (residual * self.extent) as f32,
         };
-        let residuals = self.residuals(surface);
-        let pixels = residuals.iter().zip(&self.places);
-        let inner: Vec<f64> = pixels
-            .filter(|(_, place)| inside(*place % width, width) && inside(*place / width, height))
-            .map(|(residual, _)| *residual)
-            .collect();
-        if inner.len() < 16 { residuals } else { inner }
+        residuals.iter().zip(&self.places).map(sample).collect()
+    }
+
+    /// Leaves out the points that are deeper below the mean plane than any carving. Does nothing if there are few.
+    fn without_depths(self) -> Self {
+        let samples = self.height_samples(&self.mean_plane);
+        let Some(split) = binarize::split(&mut Face::of(&samples).heights(&samples)) else {
+            return self;
+        };
+        let lowest = split.high - DEEPEST * (split.high - split.low);
+        let is_near = |sample: &HeightSample| f64::from(sample.height) > lowest;
+        let near = samples.iter().filter(|sample| is_near(sample)).count();
+        let deep = samples.len() - near;
+        if near < LEAST_POINTS || (deep as f64) < DEEP_SHARE * samples.len() as f64 {
+            return self;
+        }
+        let (mut points, mut places) = (Points::default(), Vec::new());
+        for ((point, place), sample) in self.points.iter().zip(&self.places).zip(&samples) {
+            if is_near(sample) {
+                points.push(point);
+                places.push(*place);
+            }
+        }
+        let kept = Self::of(points, places, self.size, self.centre, self.extent);
+        Self {
+            is_cropped: true,
+            ..kept
+        }
     }
 
     /// Returns an image of the nearness to the surface: 1 on or above it, falling to 0 at half the relief below it.

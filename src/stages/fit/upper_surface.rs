@@ -86,7 +86,13 @@ pub fn fit(
             min_relief: params.min_relief,
         });
     }
-    Ok(outcome(&fine, usual.evidence, mesh))
+    // The rest of the scan is not the face: side walls, a foot or a table.
+    let face = fine.samples.is_cropped;
+    let region = face.then(|| wider_search::region(mesh, indexed, &fine, &start));
+    Ok(FitOutcome {
+        region,
+        ..outcome(&fine, usual.evidence, mesh)
+    })
 }
 
 /// Returns the result of the stage for a surface, for the whole scan and the whole print.

@@ -13,7 +13,7 @@ use super::directions::{candidates, facets};
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
-use super::scan_parts::parts;
+use super::scan_parts::{parts, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
 use crate::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
 use crate::mesh::Mesh;
@@ -30,7 +30,7 @@ const RIVAL: f64 = 0.5;
 /// A lower agreement of the best rival counts as this.
 const LEAST_RIVAL: f64 = 0.1;
 /// A region extends below the surface by this many times the relief. Anything lower is not part of the carving.
-const DEEPEST: f64 = 4.0;
+const DEEPEST: f64 = 2.5;
 /// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
 const HIGHEST: f64 = 1.0;
 /// A carving is not deeper than this share of the extent of its side.
@@ -100,7 +100,7 @@ pub(super) fn search(
         .iter()
         .filter(|other| normal(&other.plane_from_mesh).angle(&here) > RIVAL);
     let rival = rivals.map(|other| other.agreement).fold(0.0, f64::max);
-    let part = part_of(mesh, |corner| best.region.contains(corner));
+    let part = without_spikes(&part_of(mesh, |corner| best.region.contains(corner)));
     let indexed = IndexedSurface::new(&part);
     let side = fit_view(&indexed, &best.plane_from_mesh, params.curved_blocks, FINE)?;
     if side.relief < params.min_relief * side.extent {
@@ -244,7 +244,12 @@ fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
 }
 
 /// Returns the box around a side of a part. Its z is the side's normal, and its x is close to that of `along`.
-fn region(mesh: &Mesh, indexed: &IndexedSurface, side: &FittedSide, along: &Rigid3) -> ScanRegion {
+pub(super) fn region(
+    mesh: &Mesh,
+    indexed: &IndexedSurface,
+    side: &FittedSide,
+    along: &Rigid3,
+) -> ScanRegion {
     let row = |of: &Rigid3, k: usize| Vector3::new(of.0[k][0], of.0[k][1], of.0[k][2]);
     let origin = side.plane_from_mesh.inverse().apply([0.0; 3]);
     let normal = row(&side.plane_from_mesh, 2);

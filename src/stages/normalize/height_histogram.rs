@@ -83,6 +83,7 @@ mod tests {
             top: 0.0,
             ground: -1.0,
             tops_end: 0.0,
+            tops_end_log_deviation: 0.0,
         };
         // Most tops are worn by 0.06, walls are spread evenly from 0 to 1, and ground lies at 1.
         let tops = (0..4000).map(|i| -0.04 - 0.04 * (i % 100) as f32 / 100.0);

@@ -13,13 +13,13 @@ mod steepness;
 pub(super) use normalized::box_wrap;
 pub use normalized::{Normalized, PrintMasks};
 pub use params::{NormalizeError, NormalizeParams};
-pub(super) use relief::{relative_depths, soft_stroke, stroke_growth};
+pub(super) use relief::{relative_depths, soft_stroke};
 
 use super::print::Print;
 use crate::raster::DepthMap;
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 13;
+pub const REVISION: u32 = 14;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///

@@ -7,11 +7,9 @@ use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
 use crate::stages::binarize::{self, Split};
+use crate::stages::face::{Face, HeightSample};
 use crate::stages::pose::SoftMask;
 
-/// Share of the map's width and height left out at each border when tops and ground are separated. Side walls and a
-/// protruding foot of the block may lie there. They are neither tops nor ground.
-const MARGIN: f64 = 0.15;
 /// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
 
@@ -20,19 +18,15 @@ const DEEPEST: f64 = 0.25;
 /// Largest share of the sampled heights that may lie below the ground, such as heights of a table seen through holes.
 const MOST_BELOW: f64 = 0.3;
 
-/// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
-const LOWERED_BY: f64 = 0.03;
-
 /// Measures the heights of tops and ground over the fitted surface. Returns `None` if no two sampled heights differ.
 ///
 /// Otsu's threshold splits the heights into two classes. The ground is the median of the lower class. The top is the
 /// most frequent height near the upper class, whose median would be too low because of worn rims and walls.
 pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
     let bounds = depth.levels.map(|level| *level != 0).bounding_box()?;
-    let heights = |margin| heights(depth, bounds, margin);
+    let samples = samples(depth, bounds);
     let side = bounds.longest_side() as f64 * depth.scale.mesh_unit_per_px;
-    let split = |margin| split_face(heights(margin), DEEPEST * side);
-    let split = split(MARGIN).or_else(|| split(0.0))?;
+    let split = split_face(Face::of(&samples).heights(&samples), DEEPEST * side)?;
     let classes = ReliefHeights {
         // Heights are measured from the fitted surface, which lies on the tops.
         top: if split.high.abs() < ANCHORED * (split.high - split.low) {
@@ -42,15 +36,18 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
         },
         ground: split.low,
         tops_end: 0.0,
+        tops_end_log_deviation: 0.0,
     };
-    let heights = heights(0.0);
+    let heights: Vec<f32> = samples.iter().map(|sample| sample.height).collect();
     let peak = HeightHistogram::of(&heights, &classes).peak();
     let tops = ReliefHeights {
         top: classes.top - peak * classes.depth(),
         ..classes
     };
+    let end = SteepnessProfile::of(depth, bounds, &tops).tops_end();
     Some(ReliefHeights {
-        tops_end: SteepnessProfile::of(depth, bounds, &tops).tops_end(),
+        tops_end: end.depth,
+        tops_end_log_deviation: end.log_deviation,
         ..tops
     })
 }
@@ -74,17 +71,6 @@ fn split_face(mut heights: Vec<f32>, deepest: f64) -> Option<Split> {
     Some(split)
 }
 
-/// Returns the growth of the strokes' area if the threshold `level` is lowered by [`LOWERED_BY`] of the relief, as the
-/// logarithm of the ratio of the two areas.
-///
-/// Walls are steep, so strong growth means that the threshold cuts through worn or tilted tops.
-pub(crate) fn stroke_growth(depth: &DepthMap, relief: &ReliefHeights, level: u16) -> f64 {
-    let step = LOWERED_BY * relief.depth() / depth.scale.height_per_level;
-    let lower = (f64::from(level) - step).clamp(1.0, 65_535.0) as u16;
-    let area = |least: u16| depth.levels.count_at_least(least);
-    (area(lower) as f64 / area(level.max(1)).max(1) as f64).ln()
-}
-
 /// Returns the depth of every pixel below the tops as a share of the relief, clamped to -1..=2.
 pub(crate) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftMask {
     let scale = &depth.scale;
@@ -104,34 +90,29 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }
 
-/// Samples the heights inside a box. `margin` is the part left out at each side, as a share of the side's length.
-fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
-    let mut heights = Vec::new();
-    for y in sampled(bounds.y0, bounds.y1, margin) {
+/// Samples the heights inside a box.
+fn samples(depth: &DepthMap, bounds: PixelBox) -> Vec<HeightSample> {
+    let [width, height] = [bounds.width(), bounds.height()].map(|side| side as f32);
+    let mut samples = Vec::new();
+    for y in sampled(bounds.y0, bounds.y1) {
         let row = depth.levels.row(y);
-        let known = sampled(bounds.x0, bounds.x1, margin)
-            .map(|x| row[x])
-            .filter(|level| *level > 0);
-        heights.extend(known.map(|level| depth.scale.height(level) as f32));
+        for x in sampled(bounds.x0, bounds.x1).filter(|x| row[*x] > 0) {
+            samples.push(HeightSample {
+                x: (x - bounds.x0) as f32 / width,
+                y: (y - bounds.y0) as f32 / height,
+                height: depth.scale.height(row[x]) as f32,
+            });
+        }
     }
-    heights
+    samples
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{relief_heights, stroke_growth};
-    use crate::domain::ReliefHeights;
+    use super::relief_heights;
     use crate::raster::{DepthMap, Grid};
 
     const SIDE: usize = 80;
-
-    /// Returns the map of a bar on flat ground. The bar is 50,000 levels high and falls by `tilt` levels to the right.
-    fn bar(tilt: f64) -> DepthMap {
-        let on_bar = |x, y| (20..60).contains(&x) && (30..50).contains(&y);
-        let top = |x: usize| 51_000.0 - tilt * (x as f64 - 40.0) / 40.0;
-        let level = |x, y| if on_bar(x, y) { top(x) as u16 } else { 1000 };
-        DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
-    }
 
     #[test]
     fn a_table_seen_through_holes_is_not_the_ground() {
@@ -148,17 +129,5 @@ mod tests {
         map.scale.mesh_unit_per_px = 0.1;
         let relief = relief_heights(&map).expect("a relief");
         assert!((relief.depth() - 1.0).abs() < 0.1, "{relief:?}");
-    }
-
-    #[test]
-    fn strokes_grow_where_a_threshold_cuts_through_tops() {
-        let relief = ReliefHeights {
-            top: 0.02,
-            ground: -0.98,
-            tops_end: 0.05,
-        };
-        let growth = |tilt| stroke_growth(&bar(tilt), &relief, 51_000);
-        assert_eq!(growth(0.0), 0.0);
-        assert!(growth(6000.0) > 0.3, "{}", growth(6000.0));
     }
 }

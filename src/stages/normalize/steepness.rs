@@ -29,6 +29,32 @@ const RANGE: [f64; 2] = [0.02, 0.4];
 /// Depth that is used if a map has no slopes to measure. It keeps most strokes whole on blocks of all kinds.
 const USUAL: f64 = 0.13;
 
+/// Deviation of the logarithm of the depth on a new block.
+const LEAST_DEVIATION: f64 = 0.1;
+/// Growth of this deviation if the tops are steeper than `FLAT_TOPS`, as a share of the walls' steepness.
+const ROUNDED_DEVIATION: f64 = 2.5;
+/// The depth is reduced by this factor times the same excess, on the logarithmic scale.
+const ROUNDED_SHIFT: f64 = 2.0;
+const FLAT_TOPS: f64 = 0.04;
+/// Growth of the deviation if the surface below the found depth is flatter than `EVEN_WALLS`, as a share of the walls'
+/// steepness. Then the found depth may be the edge of the last unworn tops, and the strokes end at a lower depth.
+const DIP_DEVIATION: f64 = 4.0;
+const EVEN_WALLS: f64 = 0.8;
+/// The surface below the found depth begins this much deeper, and is measured at every `BELOW_STEP`-th bin.
+const BELOW: f64 = 0.04;
+const BELOW_STEP: usize = 10;
+/// Deviation that is used if a map has no slopes to measure.
+const UNKNOWN_DEVIATION: f64 = 1.0;
+
+/// Depth at which the tops end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TopsEnd {
+    /// Depth below the tops, as a share of the relief.
+    pub(super) depth: f64,
+    /// Standard deviation of the logarithm of `depth`.
+    pub(super) log_deviation: f64,
+}
+
 /// Number of samples in each bin of depth, and the sum of their slopes.
 #[derive(Debug, Clone)]
 pub(super) struct SteepnessProfile {
@@ -49,10 +75,10 @@ impl SteepnessProfile {
             slopes: vec![0.0; BINS],
         };
         let is_inside = |at: &usize, side: usize| *at >= reach && at + reach < side;
-        let columns: Vec<usize> = sampled(bounds.x0, bounds.x1, 0.0)
+        let columns: Vec<usize> = sampled(bounds.x0, bounds.x1)
             .filter(|x| is_inside(x, width))
             .collect();
-        for y in sampled(bounds.y0, bounds.y1, 0.0).filter(|y| is_inside(y, height)) {
+        for y in sampled(bounds.y0, bounds.y1).filter(|y| is_inside(y, height)) {
             let [above, row, below] = [y - reach, y, y + reach].map(|y| levels.row(y));
             for &x in &columns {
                 let near = [row[x - reach], row[x + reach], above[x], below[x]];
@@ -71,28 +97,52 @@ impl SteepnessProfile {
         profile
     }
 
-    /// Returns the depth at which the tops end, as a share of the relief.
-    pub(super) fn tops_end(&self) -> f64 {
-        let (counts, slopes) = (smoothed(&self.counts, WIDTH), smoothed(&self.slopes, WIDTH));
-        let steepness = |bin: usize| (counts[bin] > 0.0).then(|| slopes[bin] / counts[bin]);
-        let of_range = |[from, to]: [f64; 2]| (bin_of(from)..bin_of(to)).filter_map(steepness);
-        let mut walls: Vec<f64> = of_range(WALLS).collect();
-        let flattest = of_range(TOPS).reduce(f64::min);
-        let (Some(tops), Some(last)) = (flattest, walls.len().checked_sub(1)) else {
-            return USUAL;
+    /// Estimates the depth at which the tops end.
+    pub(super) fn tops_end(&self) -> TopsEnd {
+        let steepness = self.smoothed();
+        let Some([tops, walls]) = tops_and_walls(&steepness) else {
+            return TopsEnd {
+                depth: USUAL,
+                log_deviation: UNKNOWN_DEVIATION,
+            };
         };
-        let at = (last as f64 * WALL_QUANTILE).round() as usize;
-        let wall = *walls.select_nth_unstable_by(at, f64::total_cmp).1;
-        let end = wall.powf(1.0 - SHARE) * tops.max(FLATTEST * wall).powf(SHARE);
-        (bin_of(RANGE[0])..bin_of(RANGE[1]))
-            .find(|bin| steepness(*bin).is_some_and(|steepness| steepness >= end))
-            .map_or(RANGE[1], middle)
+        let end = walls.powf(1.0 - SHARE) * tops.max(FLATTEST * walls).powf(SHARE);
+        let depth = (bin_of(RANGE[0])..bin_of(RANGE[1]))
+            .find(|bin| steepness[*bin].is_some_and(|steepness| steepness >= end))
+            .map_or(RANGE[1], middle);
+        let below = (bin_of(depth + BELOW)..bin_of(WALLS[1])).step_by(BELOW_STEP);
+        let flattest_below = below.filter_map(|bin| steepness[bin]).fold(walls, f64::min);
+        let [rounded, dip] = [
+            (tops / walls - FLAT_TOPS).max(0.0),
+            (EVEN_WALLS - flattest_below / walls).max(0.0),
+        ];
+        TopsEnd {
+            depth: depth * (-ROUNDED_SHIFT * rounded).exp(),
+            log_deviation: LEAST_DEVIATION + ROUNDED_DEVIATION * rounded + DIP_DEVIATION * dip,
+        }
     }
+
+    /// Returns the mean steepness at each bin of depth, or `None` for bins without samples.
+    fn smoothed(&self) -> Vec<Option<f64>> {
+        let (counts, slopes) = (smoothed(&self.counts, WIDTH), smoothed(&self.slopes, WIDTH));
+        let mean = |(count, slope): (&f64, &f64)| (*count > 0.0).then(|| slope / count);
+        counts.iter().zip(&slopes).map(mean).collect()
+    }
+}
+
+/// Returns the steepness of the flattest tops and of the walls. Returns `None` if there are no tops or no walls.
+fn tops_and_walls(steepness: &[Option<f64>]) -> Option<[f64; 2]> {
+    let of_range = |[from, to]: [f64; 2]| steepness[bin_of(from)..bin_of(to)].iter().flatten();
+    let tops = of_range(TOPS).copied().reduce(f64::min)?;
+    let mut walls: Vec<f64> = of_range(WALLS).copied().collect();
+    let at = (walls.len().checked_sub(1)? as f64 * WALL_QUANTILE).round() as usize;
+    let walls = *walls.select_nth_unstable_by(at, f64::total_cmp).1;
+    Some([tops, walls.max(f64::MIN_POSITIVE)])
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{SteepnessProfile, USUAL};
+    use super::{SteepnessProfile, TopsEnd, UNKNOWN_DEVIATION, USUAL};
     use crate::domain::ReliefHeights;
     use crate::raster::{DepthMap, Grid, PixelBox};
 
@@ -100,7 +150,7 @@ mod tests {
 
     /// Returns the depth at which the tops of bars end. The tops are rounded, and their edges are worn by up to `worn`,
     /// a share of the relief. The walls are `wall_px` wide.
-    fn tops_end(worn: f64, wall_px: f64) -> f64 {
+    fn tops_end(worn: f64, wall_px: f64) -> TopsEnd {
         let depth = |x: usize, y: usize| {
             let from_axis = (x % 64).abs_diff(32) as f64;
             let uneven = 0.5 + 0.5 * (y as f64 / 9.0).sin();
@@ -113,6 +163,7 @@ mod tests {
             top: map.scale.height(50_001),
             ground: map.scale.height(1),
             tops_end: 0.0,
+            tops_end_log_deviation: 0.0,
         };
         let bounds = PixelBox {
             x0: 0,
@@ -127,7 +178,7 @@ mod tests {
     fn tops_end_where_walls_begin_at_any_wear_and_depth() {
         for wall_px in [10.0, 16.0] {
             for worn in [0.05, 0.15, 0.25] {
-                let end = tops_end(worn, wall_px);
+                let end = tops_end(worn, wall_px).depth;
                 let wanted = 0.4 * worn..worn + 0.08;
                 assert!(wanted.contains(&end), "{end} for {worn}, {wall_px}");
             }
@@ -140,6 +191,10 @@ mod tests {
             counts: vec![0.0; super::BINS],
             slopes: vec![0.0; super::BINS],
         };
-        assert_eq!(profile.tops_end(), USUAL);
+        let unknown = TopsEnd {
+            depth: USUAL,
+            log_deviation: UNKNOWN_DEVIATION,
+        };
+        assert_eq!(profile.tops_end(), unknown);
     }
 }

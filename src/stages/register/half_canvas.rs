@@ -60,11 +60,14 @@ impl HalfCanvas {
         self.levels.map(|l| *l >= level)
     }
 
-    /// Estimates how far the ink spreads over the edge of the strokes, in pixels of this canvas. The result is negative
-    /// if dry ink leaves the edge of the strokes bare. See [`InkEdge::mean_near`].
-    pub(super) fn ink_spread(&self, level: u16) -> f64 {
-        let levels = self.levels.data();
-        InkEdge::mean_near(&mut self.distances_at_edges(|at| levels[at] >= level, &self.edge))
+    /// Returns the mean width of the ink's strokes in pixels of this canvas, at least 1. The mean distance to the edge of
+    /// a stroke is a quarter of its width.
+    pub(super) fn stroke_width(&self) -> f64 {
+        let inside = self.edge.distances().iter().filter(|d| **d > 0.0);
+        let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), d| {
+            (sum + f64::from(*d), count + 1)
+        });
+        (4.0 * sum / f64::from(count.max(1))).max(1.0)
     }
 
     /// Returns the signed distance to `edge`, in pixels, at each boundary between a set and an unset pixel of a mask.
@@ -108,49 +111,4 @@ fn scattered(mask: &Mask, canvas_from_mask: &Affine2, side: usize) -> Mask {
         }
     }
     canvas
-}
-
-#[cfg(test)]
-mod tests {
-    use super::HalfCanvas;
-    use crate::raster::{Grid, Mask};
-
-    const SIDE: usize = 96;
-    const TOP: u16 = 1000;
-
-    /// Returns a canvas of two bars with a half width of 8 px, inked up to `ink_px` from their axes. The first bar has
-    /// ink only in the rows of `is_inked`. The second bar has wood only in the rows of `is_carved`.
-    fn canvas(
-        ink_px: f64,
-        is_inked: impl Fn(usize) -> bool,
-        is_carved: impl Fn(usize) -> bool,
-    ) -> HalfCanvas {
-        let from_axis = |x: usize| (x % 48) as f64 - 23.5;
-        let level = |x: usize, y: usize| {
-            let on_bar = from_axis(x).abs() < 8.0 && (x < 48 || is_carved(y));
-            if on_bar { TOP } else { 1 }
-        };
-        let ink = |x: usize, y: usize| from_axis(x).abs() < ink_px && (x > 48 || is_inked(y));
-        HalfCanvas::of(
-            Grid::from_fn(SIDE, SIDE, level),
-            Mask::from_fn(SIDE, SIDE, ink),
-        )
-    }
-
-    #[test]
-    fn ink_spread_is_measured_from_dry_to_heavy_ink() {
-        for spread in [-2.0, -1.0, 0.0, 1.0, 2.0, 4.0] {
-            let found = canvas(8.0 + spread, |_| true, |_| true).ink_spread(TOP);
-            assert!((found - spread).abs() < 0.1, "{found} for {spread}");
-        }
-    }
-
-    #[test]
-    fn missing_ink_and_missing_wood_do_not_change_the_spread() {
-        let missing = |y: usize| !(30..60).contains(&y);
-        for spread in [-1.0, 2.0] {
-            let found = canvas(8.0 + spread, missing, missing).ink_spread(TOP);
-            assert!((found - spread).abs() < 0.2, "{found} for {spread}");
-        }
-    }
 }

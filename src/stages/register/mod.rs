@@ -15,6 +15,7 @@ mod pose_search;
 mod refine;
 mod scoring;
 mod soft_thresholds;
+mod tops_edge;
 mod unmatched;
 
 pub use confidence::ConfidenceInputs;
@@ -22,23 +23,30 @@ pub use params::{RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 
-use super::normalize::{Normalized, relative_depths, stroke_growth};
-use crate::domain::{PoseFeatures, ThresholdChoice};
+use super::normalize::{Normalized, relative_depths};
+use crate::domain::PoseFeatures;
 use crate::raster::DepthMap;
+use crate::stages::binarize::rim_share;
 use half_canvas::HalfCanvas;
+use metric_thresholds::ChosenThreshold;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 13;
+pub const REVISION: u32 = 14;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
-/// A pair is refused if the probability of its pose, multiplied by the probability of the same character, is below this
-/// share of `min_confidence`. The share is small, because damaged blocks and dry prints of the right character have
-/// strokes without a partner too.
+/// A pair is refused if its pose is less probable than `CLEAR_POSE`, and if the probability of the pose, multiplied by
+/// the probability of the same character, is below this share of `min_confidence`. Damaged blocks and dry prints of the
+/// right character have strokes without a partner too, but a clear pose.
 const UNLIKELY: f64 = 0.06;
+const CLEAR_POSE: f64 = 0.9;
+
+/// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
+/// a character, so these tops are the carved ground, seen from the back of the scanned surface.
+const TOPS_AT_RIM: f64 = 0.6;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
@@ -91,11 +99,13 @@ pub fn register(
         normalized.outcome.canvas_px,
     );
     let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    let light_on_dark = normalized.outcome.inks[search.ink].light_on_dark;
+    require_tops(depth, light_on_dark, &thresholds, params)?;
     let features = with_unmatched(refined.features, &canvas, &thresholds);
     require_character(&features, params)?;
     let alignments: Vec<Alignment> = thresholds
         .iter()
-        .map(|choice| Alignment {
+        .map(|ChosenThreshold { choice, .. }| Alignment {
             metric: choice.metric,
             level: choice.level,
             print_from_depth: refined.print_from_depth,
@@ -112,24 +122,43 @@ pub fn register(
         &alignments,
         params.window,
     )?;
-    let growth = |level| stroke_growth(depth, &relief, level);
-    registered.confidence_inputs =
-        confidence::set_confidence(&mut registered.outcome.metrics, &features, growth);
+    let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
+    let metrics = &mut registered.outcome.metrics;
+    registered.confidence_inputs = confidence::set_confidence(metrics, &features, probabilities);
     registered.outcome.features = Some(features);
     Ok(registered)
 }
 
-/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character.
+/// Refuses pairs with a doubtful pose whose strokes without a partner almost rule out that print and relief show the
+/// same character.
 fn require_character(
     features: &PoseFeatures,
     params: &RegisterParams,
 ) -> Result<(), RegisterError> {
-    let confidence = confidence::of_pose(features) * confidence::of_character(features);
-    if confidence < UNLIKELY * params.min_confidence {
-        return Err(RegisterError::NoMatch {
-            confidence,
-            needs: params.min_confidence,
-        });
+    let [pose, character] = [
+        confidence::of_pose(features),
+        confidence::of_character(features),
+    ];
+    if pose < CLEAR_POSE && pose * character < UNLIKELY * params.min_confidence {
+        return Err(RegisterError::OtherCharacter { pose, character });
+    }
+    Ok(())
+}
+
+/// Refuses pairs whose print was read as light strokes on dark, and whose tops surround the character.
+fn require_tops(
+    depth: &DepthMap,
+    light_on_dark: bool,
+    thresholds: &[ChosenThreshold],
+    params: &RegisterParams,
+) -> Result<(), RegisterError> {
+    let Some(chosen) = thresholds.last().filter(|_| light_on_dark) else {
+        return Ok(());
+    };
+    let tops = depth.stroke_mask(chosen.choice.level);
+    let known = depth.levels.map(|level| *level != 0);
+    if params.min_confidence > 0.0 && rim_share(&tops, &known) > TOPS_AT_RIM {
+        return Err(RegisterError::Inverted);
     }
     Ok(())
 }
@@ -138,9 +167,9 @@ fn require_character(
 fn with_unmatched(
     features: PoseFeatures,
     canvas: &HalfCanvas,
-    thresholds: &[ThresholdChoice],
+    thresholds: &[ChosenThreshold],
 ) -> PoseFeatures {
-    let levels = || thresholds.iter().map(|choice| choice.level);
+    let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
     let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
     let unmatched = Unmatched::of(canvas, range);
     PoseFeatures {

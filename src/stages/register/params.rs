@@ -68,12 +68,27 @@ pub enum RegisterError {
         /// Smallest that counts.
         needs: f64,
     },
-    /// Relief and print show different characters, or the evidence for the same character is too weak.
+    /// The print was read as light strokes on dark, and its strokes match the valleys of the relief.
+    #[error(
+        "the strokes of the print match the valleys of the relief, not its tops; was the mesh mirrored, or does it show the back of the scanned surface?"
+    )]
+    Inverted,
+    /// The pose is doubtful, and relief and print have strokes that the other one lacks.
+    #[error(
+        "relief and print both have strokes that the other one lacks, and no pose fits well (confidence in the pose {pose:.2}, in the same character {character:.3}); is it the print of another character?"
+    )]
+    OtherCharacter {
+        /// Probability that the best pose is right.
+        pose: f64,
+        /// Probability that relief and print show the same character.
+        character: f64,
+    },
+    /// Relief and print show different characters, or the evidence for the best pose is too weak.
     #[error(
         "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
     )]
     NoMatch {
-        /// Probability that the best pose is right, or that the pose is right and the character is the same.
+        /// Probability that the best pose is right.
         confidence: f64,
         /// The setting.
         needs: f64,

@@ -1,8 +1,11 @@
 //! The four stages recover known alignments.
 
-use super::{RegisterError, RegisterParams, require_character, require_match};
-use crate::domain::{MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdMetric};
+use super::{
+    ChosenThreshold, RegisterError, RegisterParams, require_character, require_match, require_tops,
+};
+use crate::domain::{MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice, ThresholdMetric};
 use crate::mesh::Mesh;
+use crate::raster::{DepthMap, Grid};
 use crate::stages::StageError;
 use crate::stages::testing::{
     SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings, some_turn,
@@ -84,16 +87,17 @@ fn the_papers_method_gives_the_papers_metrics_and_ours_one_more() {
 }
 
 #[test]
-fn threshold_of_relief_does_not_depend_on_the_print() {
+fn threshold_of_relief_hardly_depends_on_the_size_of_the_print() {
     let mesh = SyntheticSheet::default().mesh();
-    let levels = [14.0, 9.0].map(|px_per_mm| {
+    let depths = [14.0, 9.0].map(|px_per_mm| {
         let (picture, _) = print(px_per_mm, 3.0);
         let results = run(&mesh, &picture, &settings()).expect("an alignment");
         let relief = results[3].1;
         assert_eq!(relief.metric, ThresholdMetric::Relief);
-        relief.threshold_level
+        relief.threshold_depth
     });
-    assert_eq!(levels[0], levels[1]);
+    // The carving is 1.2 mm deep.
+    assert!((depths[0] - depths[1]).abs() < 0.03, "{depths:?}");
 }
 
 #[test]
@@ -220,12 +224,43 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
     };
     let refused = require_character(&other, &params);
     assert!(
-        matches!(refused, Err(RegisterError::NoMatch { .. })),
+        matches!(refused, Err(RegisterError::OtherCharacter { .. })),
         "{refused:?}"
     );
+    let clear = PoseFeatures {
+        correlation: 0.9,
+        tops_covered: 0.9,
+        ..other
+    };
+    assert_eq!(require_character(&clear, &params), Ok(()));
     let any = RegisterParams {
         min_confidence: 0.0,
         ..params
     };
     assert_eq!(require_character(&other, &any), Ok(()));
+}
+
+#[test]
+fn light_prints_of_a_surface_seen_from_its_back_are_refused() {
+    let params = settings().register;
+    let is_stroke = |x: usize, y: usize| (20..60).contains(&x) && (y / 8) % 2 == 1 && y < 72;
+    let map = |strokes, rest| {
+        let level = move |x, y| if is_stroke(x, y) { strokes } else { rest };
+        DepthMap::of_levels(Grid::from_fn(80, 80, level))
+    };
+    let thresholds = [ChosenThreshold {
+        choice: ThresholdChoice {
+            metric: ThresholdMetric::Relief,
+            level: 1000,
+            score: 0.0,
+            at_bound: false,
+        },
+        probability_right: 1.0,
+    }];
+    let (front, back) = (map(2000, 1), map(1, 2000));
+    let check = |map: &DepthMap, is_light| require_tops(map, is_light, &thresholds, &params);
+    assert_eq!(check(&front, true), Ok(()));
+    assert_eq!(check(&front, false), Ok(()));
+    assert_eq!(check(&back, false), Ok(()));
+    assert_eq!(check(&back, true), Err(RegisterError::Inverted));
 }

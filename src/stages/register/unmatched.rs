@@ -36,7 +36,7 @@ impl Unmatched {
     /// wood above the highest one surely prints, and only ink outside the lowest one surely lies on no wood.
     pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2]) -> Self {
         let wood = InkEdge::of(&canvas.mask(lowest));
-        let width = stroke_width(canvas);
+        let width = canvas.stroke_width();
         let tolerance = (TOLERANCE * width).max(TOLERANCE_PX) as f32;
         let is_far = |distance: &f32| *distance < -tolerance;
         let unknown = canvas.levels.map(|level| *level == 0);
@@ -63,16 +63,6 @@ impl Unmatched {
             edge_scatter: mean_deviation(&mut edge, NEAR * width) / width,
         }
     }
-}
-
-/// Returns the mean width of the ink's strokes in pixels, at least 1. The mean distance to the edge of a stroke is a
-/// quarter of its width.
-fn stroke_width(canvas: &HalfCanvas) -> f64 {
-    let inside = canvas.edge.distances().iter().filter(|d| **d > 0.0);
-    let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), d| {
-        (sum + f64::from(*d), count + 1)
-    });
-    (4.0 * sum / f64::from(count.max(1))).max(1.0)
 }
 
 /// Returns the mean of the absolute deviations from the median, of the values that deviate by less than `most`. Returns
