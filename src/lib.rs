@@ -112,12 +112,12 @@
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
-//! - `src/stages/register/confidence.rs`: compares each mask with the mask of the relief metric; has fitted weights
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
-//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text of `--metric` in `src/cli/verdict.rs`, the
-//! `CHECK` lists of three tables and `user_version` in `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`,
-//! `README.md`, `docs/report.md`, and tests and snapshots. `CONTRIBUTING.md` lists them in the order of work.
+//! Also touched: the weights in `src/stages/register/confidence.rs`, `REVISION` in `src/stages/register/mod.rs`, the
+//! help text of `--metric` in `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
+//! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, and tests and snapshots.
+//! `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## Rooms
 //!
