@@ -12,9 +12,9 @@ use super::binarize;
 const CELLS: usize = 32;
 /// Least share of the upper class in a cell of the hull.
 const LEAST_SHARE: f64 = 0.2;
-/// The upper class is the face, and not the tops, if it fills at least this share of its hull, and at least
-/// `FACE_AREA` of the map.
-const FACE_DENSITY: f64 = 0.85;
+/// The upper class is the face, and not the tops, if it fills at least this share of the inner cells of its hull, and
+/// if these cells hold at least `FACE_AREA` of the map's heights. Dense strokes fill up to about 0.8.
+const FACE_DENSITY: f64 = 0.95;
 const FACE_AREA: f64 = 0.3;
 /// Number of cells by which the hull of tops is enlarged, so that it contains ground around a single stroke.
 const ENLARGED_BY: usize = 2;
@@ -81,8 +81,9 @@ impl Face {
             points.extend(ends.into_iter().flatten().map(|x| [x as f64, y as f64]));
         }
         let hull = Self::hull(&points);
+        let inner = hull.reduced();
         let (mut all_inside, mut high_inside) = (0, 0);
-        for (row, columns) in cells.iter().zip(&hull.0) {
+        for (row, columns) in cells.iter().zip(&inner.0) {
             for [all, high] in &row[columns.clone()] {
                 all_inside += all;
                 high_inside += high;
@@ -92,7 +93,7 @@ impl Face {
         let is_face =
             high > FACE_DENSITY * f64::from(all_inside) && high > FACE_AREA * samples.len() as f64;
         if is_face {
-            hull.reduced()
+            inner
         } else {
             (0..ENLARGED_BY).fold(hull, |hull, _| hull.enlarged())
         }
