@@ -31,8 +31,8 @@
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash
 //! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
-//!     transaction; import, registration and recovery have their own; several processes take turns by SQLite's lock
-//!     (`busy_retry.rs`)
+//!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
+//!     turns by SQLite's lock (`busy_retry.rs`)
 //! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
 //! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
 //!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
@@ -46,9 +46,11 @@
 //! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
 //! (checks the values of a row), `cli/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
 //! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns
-//! the write connection), `records/stage_results.rs` (the SQL that reads results), `catalog/new_catalog.rs` (a new
-//! project is durable when its catalog gets its name), `records/pair_work.rs` (attributes and earlier results of leased
-//! pairs), `records/checksums.rs` (checksums of the rows that no run can compute again) and `cli/report.rs`.
+//! the write connection), `db/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
+//! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
+//! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
+//! rows that no run can compute again), `cli/report.rs`, `report/render/table.rs` and `report/number_format.rs` (the
+//! text of a cell).
 //! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
 //! ## A lost lease
@@ -65,8 +67,8 @@
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
 //! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
 //! lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock. If a statement
-//! changes no row, `group_commit.rs` stores nothing of that request, and the worker learns it from the reply of
-//! `src/catalog/queue/api.rs`:
+//! returns no row for a job, `group_commit.rs` stores nothing of that job's request, and the worker learns it from the
+//! reply of `src/catalog/queue/api.rs`:
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
@@ -74,23 +76,25 @@
 //! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
 //! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process warns, releases the pairs that it has not started, ends its old id, registers as a new worker, and recovers the jobs of the old id; its running pairs end at their next write |
 //! | claim | no leases | not distinguished from "no pair is ready" | tried again at every poll, until the next heartbeat |
-//! | release | `false`, ignored | `release_all` in `prefetch.rs`, `StoredStages::finish` in `checkpointer.rs` | nothing: the job was recovered meanwhile; a pair that had started counts as released, or as done after `--until` |
+//! | release | `false`, ignored | `release_all` in `prefetch.rs`, `StoredStages::finish` in `checkpointer.rs` | nothing: the job was recovered meanwhile; a pair that had started counts as released, or as done after `run --stage` |
 //!
 //! The pair ends as `PairEnd::LeaseLost`. `StoredStages::finish` in `checkpointer.rs` decides this after any refused
 //! checkpoint, `store_failure` after a refused failure. `count` in `scheduler.rs` counts it as neither done nor failed,
 //! and claims again. Stages stored before stay. The pair is leased again when its job is ready, unless the recovery
 //! quarantined it. Artifact files without a row are used again if a stage gives the same bytes.
 //!
-//! If another worker recovered the job, the pair runs alone until its next stage is stored, and its crash count grows
-//! if it was the only lease of its worker or if the lease was overdue. A suspended worker counts as dead here. A job
+//! If another worker recovered the job, the pair runs alone: other processes lease nothing until its next stage is
+//! stored, and its own process until the pair leaves its slot. Its crash count grows if it was the only lease of its
+//! worker or if the lease was overdue. A suspended worker counts as dead here. A job
 //! that a process recovers itself (`register_again`), or that an ended worker left, is neither blamed nor alone. A
 //! repair resets both.
 //!
 //! If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in progress and ends with
 //! that error. If the write-ahead log is lost, it does so after the first failed heartbeat. An error while the files, a
 //! checkpoint, a failure or the release of a running pair are stored has the same effect (`count`); the pair does not
-//! fail, and its lease stays until it is recovered. An error of the main loop itself ends the run immediately: of a
-//! claim, of the release of pairs that have not started, of a recovery, or of registering again.
+//! fail, and its lease stays until it is recovered. An error of any other catalog call of the main loop ends the run
+//! immediately, such as of a claim, of the release of pairs that have not started, of the search for ready pairs, of a
+//! recovery, or of registering again.
 //!
 //! ## Why `fit` reads the print
 //!
@@ -101,7 +105,7 @@
 //!
 //! ## A new threshold metric
 //!
-//! Outside unit tests, these source files name a variant of [`domain::ThresholdMetric`]; all others iterate over its
+//! Outside unit tests and comments, these files in `src/` name a variant of [`domain::ThresholdMetric`]; all others iterate over its
 //! `ALL` or `PAPER`, or take a metric as an argument:
 //!
 //! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics; its default metric stays

@@ -67,7 +67,7 @@ async fn compute(
             }
             ComputeEvent::Finished(computed, next) => {
                 if !checkpointer.store(*computed) {
-                    // The lease is lost, or the disk or the catalog returned an error.
+                    // The lease is lost, the disk or the catalog returned an error, or the run stops at once.
                     return PairOutcome::Ended(checkpointer.finish(PairEnd::LeaseLost).await);
                 }
                 match next {

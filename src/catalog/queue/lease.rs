@@ -11,8 +11,8 @@ use crate::domain::{
 /// The right to run stages of one pair. A claim creates the lease, and a checkpoint continues it. Results and failures
 /// of stages are stored only under a valid lease.
 ///
-/// `token` is the fencing token. Each claim and each recovery increases the job's token, so a write under an older
-/// lease changes nothing.
+/// `token` is the fencing token. Each claim, recovery and repair increases the job's token, so a write under
+/// an older lease changes nothing.
 #[derive(Debug, sqlx_macros::FromRow)]
 pub struct Lease {
     pub(crate) pair: PairId,
