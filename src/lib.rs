@@ -105,8 +105,8 @@
 //!
 //! ## A new threshold metric
 //!
-//! Outside unit tests and comments, these files in `src/` name a variant of [`domain::ThresholdMetric`]; all others iterate over its
-//! `ALL` or `PAPER`, or take a metric as an argument:
+//! Outside unit tests and comments, these files in `src/` name a variant of [`domain::ThresholdMetric`]; all others
+//! iterate over its `ALL` or `PAPER`, or take a metric as an argument:
 //!
 //! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics; its default metric stays
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
