@@ -19,9 +19,13 @@ use crate::domain::{LengthUnit, PairName};
 use crate::manifest::{ManifestRow, RowIds};
 use crate::store::Project;
 
-/// Rows per chunk sent to the catalog, and chunks that may wait there.
-const CHUNK: usize = 2_000;
+/// Maximum number of rows of a chunk that is sent to the catalog, and of the chunks that may wait there.
+const CHUNK_ROWS: usize = 2_000;
 const WAITING_CHUNKS: usize = 2;
+/// A chunk ends with the row that reaches this many bytes of memory.
+const CHUNK_BYTES: usize = 2 << 20;
+/// Maximum number of missing files that `--json` lists.
+const MAX_MISSING: usize = 1000;
 
 /// End of the message when the file of true alignments is refused.
 const NOT_IMPORTED: &str = "nothing was imported";
@@ -60,8 +64,25 @@ pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
 pub(super) struct ImportOutcome {
     pub(super) summary: ImportSummary,
     pub(super) truths: u64,
-    missing: Vec<String>,
+    missing: MissingFiles,
     warnings: Vec<String>,
+}
+
+/// Files of a list that do not exist.
+#[derive(Debug, Default)]
+struct MissingFiles {
+    /// Messages of the first [`MAX_MISSING`] files.
+    lines: Vec<String>,
+    count: usize,
+}
+
+impl MissingFiles {
+    fn add(&mut self, line: String) {
+        self.count += 1;
+        if self.lines.len() < MAX_MISSING {
+            self.lines.push(line);
+        }
+    }
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
@@ -103,8 +124,8 @@ struct ImportList {
     truths: Vec<(PairName, Value)>,
 }
 
-/// The summary of an import, the number of stored true alignments, and a message for each missing file.
-type StoredList = (ImportSummary, u64, Vec<String>);
+/// The summary of an import, the number of stored true alignments, and the missing files.
+type StoredList = (ImportSummary, u64, MissingFiles);
 
 /// Returns the missing directories of a path, the deepest first.
 fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
@@ -169,24 +190,30 @@ async fn store_in(
     Ok((summary, truths, missing))
 }
 
-/// Sends the rows to the catalog in chunks. Returns a message for each missing file.
+/// Sends the rows to the catalog in chunks. Returns the missing files.
 fn send_rows(
     listing: &Listing,
     project: &Project,
     sender: &mpsc::Sender<ImportChunk>,
-) -> anyhow::Result<Vec<String>> {
-    let (mut missing, mut chunk) = (Vec::new(), Vec::new());
+) -> anyhow::Result<MissingFiles> {
+    let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
     let mut outcome = Ok(());
     listing.rows(|row, lines| {
-        missing.extend(lines);
+        for line in lines {
+            missing.add(line);
+        }
         match stored_row(&row, project) {
-            Ok(row) => chunk.push(row),
+            Ok(row) => {
+                bytes += memory(&row);
+                chunk.push(row);
+            }
             Err(error) if outcome.is_ok() => outcome = Err(error),
             Err(_) => {}
         }
-        if chunk.len() == CHUNK {
+        if chunk.len() == CHUNK_ROWS || bytes >= CHUNK_BYTES {
             // The catalog stops receiving after an error, which it reports itself.
             let _ = sender.blocking_send(ImportChunk::Rows(std::mem::take(&mut chunk)));
+            bytes = 0;
         }
     });
     outcome?;
@@ -262,14 +289,41 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
     })
 }
 
+/// Returns roughly the memory that a row needs, in bytes.
+fn memory(row: &ImportRow) -> usize {
+    let cells = [&row.character, &row.block].into_iter().flatten();
+    let meta = row.meta.iter();
+    size_of::<ImportRow>()
+        + row.mesh_path.len()
+        + row.print_path.len()
+        + cells.map(String::len).sum::<usize>()
+        + meta
+            .map(|(key, value)| key.len() + value_memory(value))
+            .sum::<usize>()
+}
+
+/// Returns roughly the memory that a JSON value needs, in bytes. A number of one digit needs much more than its text.
+fn value_memory(value: &Value) -> usize {
+    size_of::<Value>()
+        + match value {
+            Value::Null | Value::Bool(_) | Value::Number(_) => 0,
+            Value::String(text) => text.len(),
+            Value::Array(values) => values.iter().map(value_memory).sum(),
+            Value::Object(entries) => entries
+                .iter()
+                .map(|(key, value)| size_of::<String>() + key.len() + value_memory(value))
+                .sum(),
+        }
+}
+
 /// Prints what an import changed, after its warnings.
 pub(super) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     const MAX_WARNINGS: usize = 20;
     const MAX_CHANGES: usize = 10;
-    for line in outcome.missing.iter().take(MAX_WARNINGS) {
+    for line in outcome.missing.lines.iter().take(MAX_WARNINGS) {
         context.warn(line);
     }
-    if let Some(more) = outcome.missing.len().checked_sub(MAX_WARNINGS + 1) {
+    if let Some(more) = outcome.missing.count.checked_sub(MAX_WARNINGS + 1) {
         context.warn(&format!("{} more files do not exist", more + 1));
     }
     for line in &outcome.warnings {
@@ -305,7 +359,8 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "changed": changed.collect::<Value>(),
         "unchanged": summary.unchanged,
         "truths": outcome.truths,
-        "missing_files": outcome.missing,
+        "missing_files": outcome.missing.lines,
+        "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),
         "warnings": outcome.warnings,
     })
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use crate::domain::{ContentHash, LengthUnit, PairName};
+use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
@@ -165,6 +165,9 @@ impl SimilarIds {
     }
 }
 
+/// Longest path in a message, in characters.
+const MAX_PATH_CHARS: usize = 300;
+
 fn missing_files(label: &str, row: &ManifestRow) -> Vec<String> {
     let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
     let line = |(kind, path): (&str, &PathBuf)| {
@@ -173,7 +176,8 @@ fn missing_files(label: &str, row: &ManifestRow) -> Vec<String> {
             Ok(false) => "does not exist".to_owned(),
             Err(error) => format!("cannot be read: {error}"),
         };
-        let (path, line, name) = (path.display(), row.line, &row.name);
+        let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
+        let (line, name) = (row.line, &row.name);
         Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
     };
     files.filter_map(line).collect()
@@ -214,6 +218,21 @@ mod tests {
                 .starts_with("id a1 differs from another id only in case, and so do 1 more ids"),
             "{warnings:?}"
         );
+    }
+
+    #[test]
+    fn a_long_path_is_cut_in_messages() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("pairs.csv");
+        let path = "d/".repeat(2000);
+        std::fs::write(&file, format!("id,mesh,print\na,{path}a,{path}b\n")).expect("written");
+        let listing = Listing::from_file(&file).expect("valid");
+        let mut missing = Vec::new();
+        listing.rows(|_, lines| missing.extend(lines));
+        assert_eq!(missing.len(), 2);
+        for line in missing {
+            assert!(line.len() < 600 && line.contains("... of a "), "{line}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::draft::{DraftRow, RowCollector};
+use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
 use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
 use super::text::{LineCounter, as_utf8, delimiter};
@@ -32,55 +32,98 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
         .trim(::csv::Trim::All)
         .flexible(true)
         .has_headers(false)
-        .from_reader(bytes);
+        .from_reader(BoundedRows::new(bytes));
     let mut lines = LineCounter::new(bytes);
-    let mut records = reader.byte_records().map(|record| {
-        let record = record.map_err(|error| of_list(&error.to_string()))?;
-        let line = lines.at(record.position());
-        Ok::<_, ManifestError>((line, record))
-    });
-    let header = match records.next() {
-        Some(header) => CsvHeader::parse(&header?)?,
-        None => return Err(of_list("the list is empty").into()),
-    };
+    let mut record = ::csv::ByteRecord::new();
+    let mut header: Option<CsvHeader> = None;
     let mut rows = RowCollector::new(each);
-    for record in records {
-        let (line, record) = record?;
-        rows.push(line, header.draft(line, &record));
+    loop {
+        reader.get_mut().left = MAX_ROW_BYTES;
+        let start = reader.position().clone();
+        let is_read = reader.read_byte_record(&mut record);
+        let position = record.position().unwrap_or(&start);
+        let line = lines.at(Some(if is_read.is_ok() { position } else { &start }));
+        match (is_read, &header) {
+            (Ok(false), Some(_)) => break,
+            (Ok(false), None) => return Err(of_list("the list is empty").into()),
+            (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
+            (Ok(true), None) => header = Some(CsvHeader::parse(line, &record)?),
+            (Err(error), _) => {
+                rows.push(line, Err(error.to_string()));
+                break;
+            }
+        }
     }
     rows.finish()
 }
+
+/// Reads a list, and fails in a row that is longer than [`MAX_ROW_BYTES`].
+struct BoundedRows<'a> {
+    rest: &'a [u8],
+    /// Number of bytes that may still be read for the current row.
+    left: usize,
+}
+
+impl<'a> BoundedRows<'a> {
+    const fn new(rest: &'a [u8]) -> Self {
+        Self {
+            rest,
+            left: MAX_ROW_BYTES,
+        }
+    }
+}
+
+impl std::io::Read for BoundedRows<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        if self.left == 0 && !self.rest.is_empty() {
+            return Err(std::io::Error::other(format!(
+                "the row has more than {MAX_ROW_BYTES} bytes; a closing quotation mark may be missing"
+            )));
+        }
+        let len = buffer.len().min(self.left);
+        let read = self.rest.read(&mut buffer[..len])?;
+        self.left -= read;
+        Ok(read)
+    }
+}
+
+/// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
+const MAX_NAME_BYTES: usize = 1000;
 
 /// The columns in order. Each has its standard name, if the column is known, and its name as written.
 struct CsvHeader(Vec<(Option<&'static str>, String)>);
 
 impl CsvHeader {
-    fn parse((line, record): &(usize, ::csv::ByteRecord)) -> Result<Self, ManifestError> {
-        let mut problems = Vec::new();
+    fn parse(line: usize, record: &::csv::ByteRecord) -> Result<Self, ManifestError> {
+        let mut problems = ManifestError::default();
         let mut seen = BTreeMap::new();
         let mut columns = Vec::new();
         for (number, field) in (1..).zip(record) {
             let Ok(name) = std::str::from_utf8(field) else {
                 let reason = format!("the name of column {number} is not UTF-8");
-                problems.push(at_line(*line, &reason));
+                problems.add(at_line(line, &reason));
                 continue;
             };
+            if name.len() > MAX_NAME_BYTES {
+                let (len, limit) = (name.len(), MAX_NAME_BYTES);
+                let reason = format!(
+                    "the name of column {number} has {len} bytes, over the limit of {limit}"
+                );
+                problems.add(at_line(line, &reason));
+            }
             let known = known_column(name);
             if !name.is_empty()
                 && let Some(first) = seen.insert(known.unwrap_or(name), number)
             {
                 let reason = format!("columns {first} and {number} are both named {name:?}");
-                problems.push(at_line(*line, &reason));
+                problems.add(at_line(line, &reason));
             }
             columns.push((known, name.to_owned()));
         }
         let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| at_line(*line, &missing_column(name, record))));
-        if problems.is_empty() {
-            Ok(Self(columns))
-        } else {
-            Err(ManifestError { problems })
-        }
+        problems.extend(missing.map(|name| at_line(line, &missing_column(name, record))));
+        problems.check(false)?;
+        Ok(Self(columns))
     }
 
     /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheet programs append such rows.
@@ -215,6 +258,34 @@ mod tests {
         );
         assert_eq!(refusal(""), "the list is empty");
         assert_eq!(refusal("id,mesh,print\n"), "the list contains no pairs");
+    }
+
+    #[test]
+    fn a_row_without_closing_quotation_mark_is_refused_with_its_line() {
+        let rest = "b,m,p,\n".repeat(1 << 18);
+        let text = format!("id,mesh,print,note\n\n\na/b,m,p,\n\nc,m,p,\"open\n{rest}");
+        assert_eq!(
+            refusal(&text).lines().collect::<Vec<_>>(),
+            [
+                "line 4: id \"a/b\" holds '/'; an id is made of letters A-Z, digits, _ and -",
+                "line 6: the row has more than 1048576 bytes; a closing quotation mark may be missing",
+            ]
+        );
+        // The limit applies to each row, not to the list.
+        let rows: Vec<_> = (0..300_000).map(|n| format!("{n},m,p")).collect();
+        let rows = parse(&format!("id,mesh,print\n{}", rows.join("\n"))).expect("parses");
+        assert_eq!(rows.last().map(|row| row.line), Some(300_001));
+    }
+
+    #[test]
+    fn a_long_column_name_is_refused() {
+        let name = "n".repeat(1001);
+        assert_eq!(
+            refusal(&format!("id,mesh,print,{name}\na,b,c,d\n")),
+            "line 1: the name of column 4 has 1001 bytes, over the limit of 1000"
+        );
+        let text = format!("id,mesh,print,{}\na,b,c,d\n", &name[1..]);
+        assert_eq!(parse(&text).expect("parses")[0].meta.len(), 1);
     }
 
     #[test]

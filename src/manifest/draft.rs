@@ -27,7 +27,7 @@ impl DraftRow {
 
 /// Passes valid rows on; collects problems and ids.
 pub(super) struct RowCollector<'e> {
-    problems: Vec<String>,
+    problems: ManifestError,
     ids: RowIds,
     each: &'e mut dyn FnMut(ManifestRow),
 }
@@ -36,7 +36,7 @@ impl<'e> RowCollector<'e> {
     /// Passes valid rows to `each`.
     pub(super) fn new(each: &'e mut dyn FnMut(ManifestRow)) -> Self {
         Self {
-            problems: Vec::new(),
+            problems: ManifestError::default(),
             ids: RowIds::default(),
             each,
         }
@@ -44,7 +44,7 @@ impl<'e> RowCollector<'e> {
 
     /// Returns the ids of the list, or all its problems.
     pub(super) fn finish(self) -> Result<RowIds, ManifestError> {
-        ManifestError::check(self.ids.is_empty(), self.problems)?;
+        self.problems.check(self.ids.is_empty())?;
         Ok(self.ids)
     }
 
@@ -141,6 +141,9 @@ fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
     }
 }
 
+/// Longest row in bytes. It bounds the memory that a row needs, for example if a closing quotation mark is missing and
+/// all lines that follow become one cell.
+pub(super) const MAX_ROW_BYTES: usize = 1 << 20;
 /// Longest path in bytes; the system accepts no longer one.
 const MAX_PATH_BYTES: usize = 4096;
 /// Longest other cell in bytes.

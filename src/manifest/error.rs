@@ -8,7 +8,7 @@ use crate::domain::sanitize;
 /// Longest text of a problem, in characters.
 const MAX_CHARS: usize = 300;
 
-/// Maximum number of problems shown; the others are counted.
+/// Maximum number of problems that are kept and shown; the others are counted.
 const MAX_SHOWN: usize = 20;
 
 /// Returns a problem of a line, counted from 1.
@@ -26,18 +26,29 @@ pub(super) fn of_list(reason: &str) -> String {
     sanitize(reason, MAX_CHARS)
 }
 
-/// All problems of a refused list. They are displayed one per line.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+/// The problems of a refused list. They are displayed one per line.
+#[derive(Debug, Clone, Default, PartialEq, Eq, thiserror::Error)]
 pub struct ManifestError {
-    /// The problems, each with its line or file unless it concerns the whole list. Never empty.
+    /// The first problems, each with its line or file unless it concerns the whole list. Never empty.
     pub problems: Vec<String>,
+    /// Number of further problems. Their texts are dropped, because every row of a long list may have one.
+    pub more: usize,
 }
 
 impl ManifestError {
+    /// Adds a problem. Only counts it if there are many already.
+    pub(super) fn add(&mut self, problem: String) {
+        if self.problems.len() < MAX_SHOWN {
+            self.problems.push(problem);
+        } else {
+            self.more += 1;
+        }
+    }
+
     /// Refuses a list that has problems, or no pairs.
-    pub(super) fn check(is_empty: bool, problems: Vec<String>) -> Result<(), Self> {
-        if !problems.is_empty() {
-            return Err(Self { problems });
+    pub(super) fn check(self, is_empty: bool) -> Result<(), Self> {
+        if !self.problems.is_empty() {
+            return Err(self);
         }
         if is_empty {
             return Err(of_list("the list contains no pairs").into());
@@ -50,15 +61,21 @@ impl From<String> for ManifestError {
     fn from(problem: String) -> Self {
         Self {
             problems: vec![problem],
+            more: 0,
         }
+    }
+}
+
+impl Extend<String> for ManifestError {
+    fn extend<T: IntoIterator<Item = String>>(&mut self, problems: T) {
+        problems.into_iter().for_each(|problem| self.add(problem));
     }
 }
 
 impl fmt::Display for ManifestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shown = self.problems.len().min(MAX_SHOWN);
-        f.write_str(&self.problems[..shown].join("\n"))?;
-        match self.problems.len() - shown {
+        f.write_str(&self.problems.join("\n"))?;
+        match self.more {
             0 => Ok(()),
             more => write!(f, "\nand {more} more"),
         }
@@ -84,8 +101,10 @@ mod tests {
 
     #[test]
     fn twenty_problems_are_shown_and_the_rest_counted() {
-        let problems = (1..=23).map(|line| at_line(line, "no id")).collect();
-        let text = ManifestError { problems }.to_string();
+        let mut error = ManifestError::default();
+        error.extend((1..=23).map(|line| at_line(line, "no id")));
+        assert_eq!(error.problems.len(), 20);
+        let text = error.to_string();
         assert_eq!(text.lines().count(), 21);
         assert!(text.starts_with("line 1: no id\nline 2: no id\n"));
         assert!(text.ends_with("line 20: no id\nand 3 more"));

@@ -33,7 +33,7 @@ pub struct FolderPairs {
 /// Returns an error if two meshes or two prints have the same stem, the stem of a pair is not a valid id, or there is
 /// no pair.
 pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
-    let mut problems = Vec::new();
+    let mut problems = ManifestError::default();
     let (meshes, mut ignored) = by_stem(meshes, &MESH_EXTENSIONS, "meshes", &mut problems);
     let (mut prints, more) = by_stem(prints, &PRINT_EXTENSIONS, "prints", &mut problems);
     ignored.extend(more);
@@ -46,10 +46,10 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
         };
         match PairName::new(&stem.text) {
             Ok(name) => rows.push(row(rows.len() + 1, name, mesh, print)),
-            Err(error) => problems.push(at_file(&mesh, &error.to_string())),
+            Err(error) => problems.add(at_file(&mesh, &error.to_string())),
         }
     }
-    ManifestError::check(rows.is_empty(), problems)?;
+    problems.check(rows.is_empty())?;
     Ok(FolderPairs {
         rows,
         meshes_alone,
@@ -96,7 +96,7 @@ fn by_stem(
     listing: &[PathBuf],
     extensions: &[&str],
     kind: &str,
-    problems: &mut Vec<String>,
+    problems: &mut ManifestError,
 ) -> (BTreeMap<Stem, PathBuf>, Vec<PathBuf>) {
     let mut sorted = listing.to_vec();
     sorted.sort();
@@ -114,7 +114,7 @@ fn by_stem(
             Entry::Occupied(first) => {
                 let first = first.get().display();
                 let reason = format!("{first} has the same stem; {kind} are paired by stem");
-                problems.push(at_file(&path, &reason));
+                problems.add(at_file(&path, &reason));
             }
         }
     }

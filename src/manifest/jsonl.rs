@@ -6,7 +6,7 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;
 
-use super::draft::{DraftRow, RowCollector};
+use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
@@ -40,7 +40,15 @@ pub fn read_jsonl(
         if content.is_empty() {
             continue;
         }
-        rows.push(line, draft(line, content).map(Some));
+        let draft = if content.len() > MAX_ROW_BYTES {
+            let len = content.len();
+            Err(format!(
+                "the row has {len} bytes, over the limit of {MAX_ROW_BYTES}"
+            ))
+        } else {
+            draft(line, content).map(Some)
+        };
+        rows.push(line, draft);
     }
     rows.finish()
 }
@@ -175,6 +183,18 @@ mod tests {
             let wanted = format!("line 2: the key \"{key}\" is given twice");
             assert_eq!(refusal.to_string(), wanted);
         }
+    }
+
+    #[test]
+    fn a_long_row_is_refused_before_it_is_parsed() {
+        let long = format!(
+            r#"{{"id":"a","mesh":"m","print":"p","x":[0{}"#,
+            ",0".repeat(1 << 19)
+        );
+        assert_eq!(
+            parse(&long).expect_err("refused").to_string(),
+            "line 1: the row has 1048615 bytes, over the limit of 1048576"
+        );
     }
 
     #[test]

@@ -35,6 +35,8 @@ mod hostile_pairs;
 mod image_pages;
 mod invariance;
 mod kill;
+#[cfg(target_os = "linux")]
+mod large_lists;
 mod layers;
 mod limits;
 #[cfg(unix)]
