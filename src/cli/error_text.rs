@@ -62,7 +62,26 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
         );
     }
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
-    explained.unwrap_or_else(|| join_causes(error))
+    explained.unwrap_or_else(|| {
+        let mut text = join_causes(error);
+        if is_disk_full(error) {
+            text += "; ";
+            text += FREE_SPACE;
+        }
+        text
+    })
+}
+
+/// What to do when a disk is full.
+const FREE_SPACE: &str = "free some space and try again, everything stored so far is safe";
+
+/// Returns whether a command failed because a disk or a quota is full.
+fn is_disk_full(error: &anyhow::Error) -> bool {
+    use std::io::ErrorKind::{QuotaExceeded, StorageFull};
+    error.chain().any(|cause| {
+        let system_error = cause.downcast_ref::<std::io::Error>();
+        system_error.is_some_and(|error| matches!(error.kind(), StorageFull | QuotaExceeded))
+    })
 }
 
 /// Most files that a command needs open at the same time, rounded up.
@@ -159,9 +178,9 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
             CatalogError::NotWritable(path.into()).to_string()
         }
-        Some(CatalogErrorKind::Full) => format!(
-            "{path} cannot grow because the disk is full; free some space and try again, everything stored so far is safe"
-        ),
+        Some(CatalogErrorKind::Full) => {
+            format!("{path} cannot grow because the disk is full; {FREE_SPACE}")
+        }
         Some(CatalogErrorKind::Busy) => locked(&path, lock_owner(Path::new(&path))),
         Some(CatalogErrorKind::Disk) => format!(
             "{path}: the disk reported an error ({}), or another program changed the catalog's files; check the disk, then run `check`",
@@ -214,7 +233,9 @@ fn root_cause(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{ExitCode, Refusal};
+    use rustix::io::Errno;
+
+    use super::{ExitCode, Refusal, describe};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
     use crate::catalog::{CatalogError, LockOwner};
     use crate::export::ExportError;
@@ -232,6 +253,17 @@ mod tests {
         let io = std::io::Error::other("disk on fire");
         let error = anyhow::Error::new(io).context("a.png: disk on fire");
         assert_eq!(join_causes(&error), "a.png: disk on fire");
+    }
+
+    #[test]
+    fn full_disk_or_quota_is_explained() {
+        for code in [Errno::NOSPC, Errno::DQUOT, Errno::IO] {
+            let io = std::io::Error::from_raw_os_error(code.raw_os_error());
+            let text = describe(&anyhow::Error::new(io).context("a.png"), Path::new("p"));
+            assert!(text.starts_with("a.png: "), "{text}");
+            let says_safe = text.ends_with("everything stored so far is safe");
+            assert_eq!(says_safe, code != Errno::IO, "{text}");
+        }
     }
 
     #[test]

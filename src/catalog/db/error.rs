@@ -51,7 +51,9 @@ pub enum CatalogError {
     )]
     Unread(PathBuf),
     /// The file cannot be created.
-    #[error("{0} cannot be created: its folder is not writable, or the disk reported an error")]
+    #[error(
+        "{0} cannot be created: its folder is read-only, or the disk is full or reported an error"
+    )]
     NotCreated(PathBuf),
     /// There is a write-ahead log or journal, but no catalog.
     #[error(
