@@ -32,7 +32,10 @@ const MAX_SMALL: u64 = 1 << 20;
 pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
-    if metadata(path).with_context(failed)?.is_none() {
+    // A link to a missing file exists, and cannot be read.
+    if let Err(error) = path.symlink_metadata()
+        && error.kind() == std::io::ErrorKind::NotFound
+    {
         return Ok(None);
     }
     let (file, _) = open_regular(path)?;

@@ -104,6 +104,21 @@ mod tests {
     }
 
     #[test]
+    fn link_to_missing_settings_is_an_error() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("mocban.toml");
+        std::os::unix::fs::symlink("missing.toml", &file).expect("a link");
+        let linked = load(&Sources {
+            base: BaseLayer::Project(file),
+            ..Sources::default()
+        });
+        assert!(
+            matches!(linked, Err(ConfigError::Read { .. })),
+            "{linked:?}"
+        );
+    }
+
+    #[test]
     fn project_without_a_file_has_the_defaults() {
         let missing = BaseLayer::Project(PathBuf::from("/nonexistent/mocban.toml"));
         let loaded = load(&Sources {

@@ -1,6 +1,7 @@
 //! The layers above the defaults: preset, file, environment variables, flags.
 
 use std::io::ErrorKind;
+use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
@@ -108,8 +109,14 @@ impl Sources {
         match &self.base {
             BaseLayer::Preset(preset) => preset_layer(*preset),
             BaseLayer::File(path) => file_layers(path),
-            BaseLayer::Project(path) if path.exists() => file_layers(path),
-            BaseLayer::Project(_) => Ok(Vec::new()),
+            BaseLayer::Project(path) => match is_present(path) {
+                Ok(true) => file_layers(path),
+                Ok(false) => Ok(Vec::new()),
+                Err(source) => Err(ConfigError::Read {
+                    path: path.clone(),
+                    source,
+                }),
+            },
         }
     }
 
@@ -176,6 +183,24 @@ fn preset_layer(preset: Preset) -> Result<Vec<(Table, Origin)>, ConfigError> {
         Preset::Default => Ok(Vec::new()),
         Preset::Paper => Ok(vec![(preset.table()?, preset.origin())]),
     }
+}
+
+/// Returns whether a project has a file of settings.
+///
+/// # Errors
+/// Returns an error if the file is a link to a missing file, if it is a pipe, or if the system does not say whether it
+/// exists. The defaults would make results stale, and opening a pipe would wait for a writer.
+fn is_present(path: &Path) -> std::io::Result<bool> {
+    match path.symlink_metadata() {
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            return Ok(false);
+        }
+        found => found?,
+    };
+    if path.metadata()?.file_type().is_fifo() {
+        return Err(std::io::Error::other("it is a pipe, not a file"));
+    }
+    Ok(true)
 }
 
 /// Longest file of settings that is read, in bytes.

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::Project;
+use super::open_file::open_regular;
 
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
@@ -89,8 +90,8 @@ impl RunLock {
     /// Returns whether a process is working on the project. A process may start right after the check.
     pub fn is_held(project: &Project) -> bool {
         // A lock needs no permission to write.
-        match File::open(project.dir().join(MEMBERS)) {
-            Ok(members) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
+        match open_regular(&project.dir().join(MEMBERS)) {
+            Ok((members, _)) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
             Err(_) => false,
         }
     }

@@ -210,6 +210,23 @@ fn a_list_is_read_from_standard_input_and_not_from_a_device() {
     }
 }
 
+#[test]
+fn a_pipe_in_the_place_of_a_project_file_does_not_hang_a_command() {
+    let disk = HangingDisk::new("1");
+    let pipe = |path: PathBuf| {
+        let _ = std::fs::remove_file(&path);
+        let mode = Mode::RUSR | Mode::WUSR;
+        mknodat(CWD, &path, FileType::Fifo, mode, 0).expect("a pipe");
+    };
+    pipe(disk.project.dir().join("run.members"));
+    call(&mut disk.command(&["status"])).expect(0);
+    pipe(disk.project.settings_path());
+    for command in ["status", "run"] {
+        let refused = call(&mut disk.command(&[command])).expect(2);
+        assert!(refused.err.contains("it is a pipe"), "{}", refused.err);
+    }
+}
+
 /// Settings are read by most commands before anything else.
 #[test]
 fn a_file_of_settings_that_became_a_device_is_refused() {
