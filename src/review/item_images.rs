@@ -334,6 +334,18 @@ mod tests {
     }
 
     #[test]
+    fn cached_images_need_at_most_256_mib() {
+        let mut slots = CacheSlots::<()>::default();
+        for number in 0..1000 {
+            let id = number.to_string();
+            slots.entry(&id).set(Arc::new(())).expect("a new entry");
+            slots.add(&id, 1 << 20);
+            assert!(slots.slots.len() <= 256, "{} MiB", slots.slots.len());
+        }
+        assert!(!slots.slots.is_empty());
+    }
+
+    #[test]
     fn an_entry_without_value_is_removed_unless_another_request_waits_for_it() {
         let mut slots = CacheSlots::<()>::default();
         let (first, second) = (slots.entry("a"), slots.entry("a"));
