@@ -1,7 +1,6 @@
 //! `backup`: copies catalog, verdicts and settings to one file. The copy is consistent even during a run.
 
 use std::fs::Metadata;
-use std::io::{ErrorKind, Read as _};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +11,7 @@ use serde_json::{Value, json};
 use super::context::Context;
 use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
-use super::files::{self, metadata};
+use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::store::{
@@ -108,18 +107,4 @@ fn is_same(one: &Path, other: &Path) -> anyhow::Result<bool> {
     };
     let one = identity(one)?;
     Ok(one.is_some() && one == identity(other)?)
-}
-
-/// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
-pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
-    if !std::fs::metadata(file)?.is_file() {
-        return Ok(false);
-    }
-    let mut head = [0; 72];
-    match std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut head)) {
-        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
-        read => {
-            read.map(|()| head.starts_with(b"SQLite format 3\0") && head[68..].starts_with(b"mocb"))
-        }
-    }
 }

@@ -1,13 +1,14 @@
 //! Files and directories named on the command line.
 
-use std::io::Read as _;
+use std::fs::File;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::domain::sanitize;
-use crate::store::{open_regular, read_file_or_pipe, write_atomic};
+use crate::store::{CATALOG_FILE, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic};
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
@@ -49,9 +50,45 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
+/// Refuses to write over a catalog, a backup, or another file by which a project works.
+pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
+    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let name = real.file_name().unwrap_or_default().to_string_lossy();
+    let is_known = name.starts_with(CATALOG_FILE)
+        || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
+    // The parent of a bare file name is empty.
+    let folder = Path::new(".").join(real.parent().unwrap_or(&real));
+    let reason = if is_known && folder.join(CATALOG_FILE).exists() {
+        "is a file of a project"
+    } else if is_backup(&real).unwrap_or(false) {
+        "is a backup"
+    } else {
+        return Ok(());
+    };
+    let shown = path.display();
+    Err(Refusal::Usage(format!(
+        "{shown} {reason}; name another file for the output"
+    )))
+}
+
+/// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
+pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
+    if !std::fs::metadata(file)?.is_file() {
+        return Ok(false);
+    }
+    let mut head = [0; 72];
+    match File::open(file).and_then(|mut file| file.read_exact(&mut head)) {
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(false),
+        read => {
+            read.map(|()| head.starts_with(b"SQLite format 3\0") && head[68..].starts_with(b"mocb"))
+        }
+    }
+}
+
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
 /// complete.
 pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+    refuse_project_file(path)?;
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {

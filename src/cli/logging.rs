@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
+use super::files::refuse_project_file;
 use super::global::{Global, LogFormat};
 use super::screen::{Palette, Screen};
 
@@ -42,6 +43,7 @@ fn writer(
         };
         return Ok((BoxMakeWriter::new(move || writer.clone()), false));
     };
+    refuse_project_file(path)?;
     let file = OpenOptions::new()
         .create(true)
         .append(true)

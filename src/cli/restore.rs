@@ -6,11 +6,11 @@ use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
-use super::backup::{count_rows, is_backup};
+use super::backup::count_rows;
 use super::context::Context;
 use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
-use super::files::{self, metadata};
+use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::store::{

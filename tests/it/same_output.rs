@@ -221,6 +221,33 @@ fn an_export_replaces_no_foreign_folder_with_a_file_of_the_same_name() {
 }
 
 #[test]
+fn an_output_replaces_no_file_of_a_project_and_no_backup() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let backup = dir.path().join("b.sqlite");
+    let link = dir.path().join("link");
+    let settings = project.settings_path();
+    std::fs::write(&settings, "").expect("written");
+    std::os::unix::fs::symlink(project.catalog_path(), &link).expect("a link");
+    at(&project, &["backup", backup.to_str().expect("UTF-8")]).expect(0);
+    for file in [project.catalog_path(), settings, backup, link] {
+        let before = std::fs::read(&file).expect("a file");
+        let name = file.to_str().expect("UTF-8");
+        for args in [
+            &["report", "-o", name][..],
+            &["contact-sheet", "-o", name],
+            &["--log-file", name, "-v", "check"],
+        ] {
+            let refused = at(&project, args).expect(2);
+            let wanted = "name another file for the output";
+            assert!(refused.err.contains(wanted), "{args:?}: {}", refused.err);
+        }
+        assert!(before == std::fs::read(&file).expect("a file"), "{name}");
+    }
+    at(&project, &["check"]).expect(0);
+}
+
+#[test]
 fn outputs_with_the_longest_names_are_written_and_longer_ones_refused_with_the_reason() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
