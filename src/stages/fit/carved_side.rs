@@ -7,9 +7,9 @@
 //! - Manifest: it may state whether the block lay face down in the scan.
 //! - Print: the relief of the carved side resembles the print. This weighs most, as only the print shows the character.
 
+use super::height_samples::quantile;
 use super::print_agreement::InkPyramids;
 use super::side_surface::FittedSide;
-use super::surface::quantile;
 use crate::domain::SideEvidence;
 use crate::stages::zbuffer::IndexedSurface;
 

@@ -10,6 +10,7 @@
 
 mod carved_side;
 mod directions;
+mod height_samples;
 mod least_squares;
 mod params;
 mod part_search;
@@ -22,9 +23,10 @@ mod surface;
 mod upper_surface;
 mod wider_search;
 
+pub(super) use height_samples::quantile;
 pub use params::{FitError, FitParams};
 pub(super) use pca::{Axes, frame};
-pub(super) use surface::quantile;
+
 pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results.

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::height_samples::HeightSamples;
 use super::pca::frame_along;
-use super::surface::{HeightSamples, Surface};
+use super::surface::Surface;
 use crate::domain::{Bow, Rigid3};
 use crate::raster::Grid;
 use crate::stages::binarize;

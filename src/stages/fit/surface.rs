@@ -3,17 +3,13 @@
 //! Stroke tops are the original face of the block: much of the block lies below them and nothing above. Therefore a
 //! point above the surface has a high weight, and a point far below the surface has none.
 
+use super::height_samples::{HeightSamples, quantile};
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
-use crate::domain::Rigid3;
 use crate::raster::{Grid, Mask};
-use crate::stages::binarize;
 use crate::stages::components::ConnectedComponents;
-use crate::stages::face::{Face, HeightSample};
+use crate::stages::face::Face;
 use crate::stages::pose::SoftMask;
-use crate::stages::zbuffer::{NO_HIT, Viewport};
 
-/// Fewer points do not determine a surface.
-const LEAST_POINTS: usize = 16;
 /// Weight of points above the surface in the first passes, which solve a convex problem. Points below weigh
 /// `1 - ENVELOPE`. The resulting surface is the 0.97 expectile of the heights.
 const ENVELOPE: f64 = 0.97;
@@ -34,11 +30,6 @@ const CUT_PX: i64 = 2;
 const OFF_TOP_WEIGHT: f64 = 1e-6;
 /// Least share of the tops that must remain without the tops at the edge.
 const LEAST_OWN: f64 = 0.4;
-/// A carving is at most about this many times as deep as the median of its ground. Lower points are side walls of the
-/// block, its foot, or a table.
-const DEEPEST: f64 = 1.8;
-/// Least share of the points below the carving at which they are left out.
-const DEEP_SHARE: f64 = 0.01;
 /// Errors of neighbouring pixels are correlated: this many pixels count as one independent observation.
 const CORRELATED_PX: f64 = 40.0;
 /// Standard deviation of the heights on rough stroke tops, as a share of the height range.
@@ -63,25 +54,6 @@ const SOFT_SPAN: f64 = 0.5;
 /// Ratio of supports by which a bow must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
-/// Heights of a view as points. Coordinates are divided by the view's longest side: u and v are about -0.5..=0.5.
-#[derive(Debug)]
-pub(super) struct HeightSamples {
-    points: Points,
-    /// Every other row and column: enough for the first, wide windows.
-    few: Points,
-    /// Least-squares plane of all heights.
-    mean_plane: Coefficients,
-    /// Index of each point in the rendering, and the rendering's size.
-    places: Vec<usize>,
-    size: [usize; 2],
-    centre: [f64; 2],
-    extent: f64,
-    /// Range of the heights over the mean plane, without the lowest and the highest 3 %.
-    range: f64,
-    /// Whether points below the carving were left out.
-    pub(super) is_cropped: bool,
-}
-
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
@@ -95,75 +67,6 @@ pub(super) struct Surface {
 }
 
 impl HeightSamples {
-    /// Collects the visible pixels of a rendering. Returns `None` if fewer than [`LEAST_POINTS`] are visible.
-    pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
-        let back = view.px_from_plane.inverse()?;
-        let size = [heights.width(), heights.height()];
-        let extent = view.unit_per_px * size[0].max(size[1]) as f64;
-        let centre = back.apply(size.map(|side| (side - 1) as f64 / 2.0));
-        let (mut points, mut places) = (Points::default(), Vec::new());
-        for y in 0..size[1] {
-            for (x, z) in heights.row(y).iter().enumerate() {
-                if *z != NO_HIT {
-                    let [u, v] = back.apply([x as f64, y as f64]);
-                    places.push(y * size[0] + x);
-                    let offset = [u - centre[0], v - centre[1], f64::from(*z)];
-                    points.push(offset.map(|length| length / extent));
-                }
-            }
-        }
-        (points.len() >= LEAST_POINTS)
-            .then(|| Self::of(points, places, size, centre, extent).without_depths())
-    }
-
-    fn of(
-        points: Points,
-        places: Vec<usize>,
-        size: [usize; 2],
-        centre: [f64; 2],
-        extent: f64,
-    ) -> Self {
-        let mut few = Points::default();
-        for (point, place) in points.iter().zip(&places) {
-            if (place % size[0]).is_multiple_of(2) && (place / size[0]).is_multiple_of(2) {
-                few.push(point);
-            }
-        }
-        let mean_plane = points.solve::<3>(&[0.0; 6], |_| 1.0, &OPEN);
-        let mut residuals = points.residuals(&mean_plane);
-        let mut bound = |share| quantile(&mut residuals, share);
-        Self {
-            range: (bound(0.97) - bound(0.03)).max(1e-9),
-            points,
-            few,
-            mean_plane,
-            places,
-            size,
-            centre,
-            extent,
-            is_cropped: false,
-        }
-    }
-
-    /// Transforms the points to a frame that is only slightly rotated.
-    pub(super) fn turned(&self, other_from_this: &Rigid3) -> Self {
-        let at = |[u, v, z]: [f64; 3]| {
-            let [u, v, z] = [u, v, z].map(|share| share * self.extent);
-            other_from_this.apply([self.centre[0] + u, self.centre[1] + v, z])
-        };
-        let [x, y, _] = at([0.0; 3]);
-        let mut points = Points::default();
-        for point in self.points.iter() {
-            let [u, v, z] = at(point);
-            points.push([u - x, v - y, z].map(|length| length / self.extent));
-        }
-        let turned = Self::of(points, self.places.clone(), self.size, [x, y], self.extent);
-        Self {
-            is_cropped: self.is_cropped,
-            ..turned
-        }
-    }
-
     /// Fits a surface to the stroke tops. Returns a plane, unless `allow_bow` is set and a curved surface fits better.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
@@ -294,44 +197,6 @@ impl HeightSamples {
         Face::of(&samples).heights(&samples)
     }
 
-    fn height_samples(&self, surface: &Coefficients) -> Vec<HeightSample> {
-        let [width, height] = self.size;
-        let residuals = self.points.residuals(surface);
-        let sample = |(residual, place): (&f64, &usize)| HeightSample {
-            x: (place % width) as f32 / width as f32,
-            y: (place / width) as f32 / height as f32,
-            height: (residual * self.extent) as f32,
-        };
-        residuals.iter().zip(&self.places).map(sample).collect()
-    }
-
-    /// Leaves out the points that are deeper below the mean plane than any carving. Does nothing if there are few.
-    fn without_depths(self) -> Self {
-        let samples = self.height_samples(&self.mean_plane);
-        let Some(split) = binarize::split(&mut Face::of(&samples).heights(&samples)) else {
-            return self;
-        };
-        let lowest = split.high - DEEPEST * (split.high - split.low);
-        let is_near = |sample: &HeightSample| f64::from(sample.height) > lowest;
-        let near = samples.iter().filter(|sample| is_near(sample)).count();
-        let deep = samples.len() - near;
-        if near < LEAST_POINTS || (deep as f64) < DEEP_SHARE * samples.len() as f64 {
-            return self;
-        }
-        let (mut points, mut places) = (Points::default(), Vec::new());
-        for ((point, place), sample) in self.points.iter().zip(&self.places).zip(&samples) {
-            if is_near(sample) {
-                points.push(point);
-                places.push(*place);
-            }
-        }
-        let kept = Self::of(points, places, self.size, self.centre, self.extent);
-        Self {
-            is_cropped: true,
-            ..kept
-        }
-    }
-
     /// Returns an image of the nearness to the surface: 1 on or above it, falling to 0 at half the relief below it.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
@@ -409,12 +274,6 @@ impl HeightSamples {
             d,
         ]
     }
-}
-
-/// Returns the quantile `share` (0..=1) of the values. Reorders the values.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let k = ((values.len() - 1) as f64 * share) as usize;
-    *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
 /// Returns the weight of a residual. Below the surface, the weight falls from 1 to 0 at a depth of `window`. Above the
