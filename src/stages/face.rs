@@ -23,7 +23,7 @@ const ROUNDS: usize = 4;
 
 /// A height at a position. `x` and `y` are shares of the map's width and height, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct HeightSample {
+pub(super) struct PositionedHeight {
     pub(super) x: f32,
     pub(super) y: f32,
     pub(super) height: f32,
@@ -35,7 +35,7 @@ pub(super) struct Face([Range<usize>; CELLS]);
 
 impl Face {
     /// Finds the face in a map of heights.
-    pub(super) fn of(samples: &[HeightSample]) -> Self {
+    pub(super) fn of(samples: &[PositionedHeight]) -> Self {
         let mut face = Self([const { 0..CELLS }; CELLS]);
         let mut inside = samples.to_vec();
         for _ in 0..ROUNDS {
@@ -54,19 +54,19 @@ impl Face {
     }
 
     /// Returns the heights of the samples on the face.
-    pub(super) fn heights(&self, samples: &[HeightSample]) -> Vec<f32> {
+    pub(super) fn heights(&self, samples: &[PositionedHeight]) -> Vec<f32> {
         let inside = samples.iter().filter(|sample| self.contains(sample));
         inside.map(|sample| sample.height).collect()
     }
 
-    fn contains(&self, sample: &HeightSample) -> bool {
+    fn contains(&self, sample: &PositionedHeight) -> bool {
         let [column, row] = cell_of(sample);
         self.0[row].contains(&column)
     }
 
     /// Returns the convex hull of the cells in which enough heights lie above a threshold. The hull of a face is
     /// reduced, and the hull of tops is enlarged.
-    fn around(samples: &[HeightSample], threshold: f64) -> Self {
+    fn around(samples: &[PositionedHeight], threshold: f64) -> Self {
         let mut cells = [[[0_u32; 2]; CELLS]; CELLS];
         for sample in samples {
             let [column, row] = cell_of(sample);
@@ -155,7 +155,7 @@ impl Face {
 }
 
 /// Returns the cell of a sample, as column and row.
-fn cell_of(sample: &HeightSample) -> [usize; 2] {
+fn cell_of(sample: &PositionedHeight) -> [usize; 2] {
     [sample.x, sample.y].map(|at| ((at * CELLS as f32) as usize).min(CELLS - 1))
 }
 
@@ -177,14 +177,14 @@ fn across(points: &[[f64; 2]], y: f64) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Face, HeightSample};
+    use super::{Face, PositionedHeight};
     use crate::stages::binarize;
 
     const SIDE: usize = 96;
 
     /// Returns the heights of a block of the given half width, with bars 1 high on ground at 0. Its side walls fall by
     /// 0.5 a pixel.
-    fn block(half_width: f64) -> Vec<HeightSample> {
+    fn block(half_width: f64) -> Vec<PositionedHeight> {
         let mut samples = Vec::new();
         for y in 0..SIDE {
             for x in 0..SIDE {
@@ -200,7 +200,7 @@ mod tests {
                 } else {
                     f64::from(u8::from(is_bar))
                 };
-                samples.push(HeightSample {
+                samples.push(PositionedHeight {
                     x: x as f32 / SIDE as f32,
                     y: y as f32 / SIDE as f32,
                     height: height as f32,

@@ -4,7 +4,7 @@ use super::least_squares::{Coefficients, OPEN, Points};
 use crate::domain::Rigid3;
 use crate::raster::Grid;
 use crate::stages::binarize;
-use crate::stages::face::{Face, HeightSample};
+use crate::stages::face::{Face, PositionedHeight};
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
 /// Fewer points do not determine a surface.
@@ -106,10 +106,10 @@ impl HeightSamples {
     }
 
     /// Returns the position and the height over a surface of every point, in mesh units.
-    pub(super) fn height_samples(&self, surface: &Coefficients) -> Vec<HeightSample> {
+    pub(super) fn positioned_heights(&self, surface: &Coefficients) -> Vec<PositionedHeight> {
         let [width, height] = self.size;
         let residuals = self.points.residuals(surface);
-        let sample = |(residual, place): (&f64, &usize)| HeightSample {
+        let sample = |(residual, place): (&f64, &usize)| PositionedHeight {
             x: (place % width) as f32 / width as f32,
             y: (place / width) as f32 / height as f32,
             height: (residual * self.extent) as f32,
@@ -119,12 +119,12 @@ impl HeightSamples {
 
     /// Leaves out the points that are deeper below the mean plane than any carving. Does nothing if there are few.
     fn without_depths(self) -> Self {
-        let samples = self.height_samples(&self.mean_plane);
+        let samples = self.positioned_heights(&self.mean_plane);
         let Some(split) = binarize::split(&mut Face::of(&samples).heights(&samples)) else {
             return self;
         };
         let lowest = split.high - DEEPEST * (split.high - split.low);
-        let is_near = |sample: &HeightSample| f64::from(sample.height) > lowest;
+        let is_near = |sample: &PositionedHeight| f64::from(sample.height) > lowest;
         let near = samples.iter().filter(|sample| is_near(sample)).count();
         let deep = samples.len() - near;
         if near < LEAST_POINTS || (deep as f64) < DEEP_SHARE * samples.len() as f64 {

@@ -193,7 +193,7 @@ impl HeightSamples {
     /// Returns the heights of the carved face over a surface, in mesh units. Side walls and a protruding foot of the
     /// block may be visible around the face, and are neither tops nor ground.
     pub(super) fn face_residuals(&self, surface: &Surface) -> Vec<f32> {
-        let samples = self.height_samples(&surface.coefficients);
+        let samples = self.positioned_heights(&surface.coefficients);
         Face::of(&samples).heights(&samples)
     }
 

@@ -7,7 +7,7 @@ use crate::domain::ReliefHeights;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
 use crate::stages::binarize::{self, Split};
-use crate::stages::face::{Face, HeightSample};
+use crate::stages::face::{Face, PositionedHeight};
 use crate::stages::pose::SoftMask;
 
 /// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
@@ -91,13 +91,13 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
 }
 
 /// Samples the heights inside a box.
-fn samples(depth: &DepthMap, bounds: PixelBox) -> Vec<HeightSample> {
+fn samples(depth: &DepthMap, bounds: PixelBox) -> Vec<PositionedHeight> {
     let [width, height] = [bounds.width(), bounds.height()].map(|side| side as f32);
     let mut samples = Vec::new();
     for y in sampled(bounds.y0, bounds.y1) {
         let row = depth.levels.row(y);
         for x in sampled(bounds.x0, bounds.x1).filter(|x| row[*x] > 0) {
-            samples.push(HeightSample {
+            samples.push(PositionedHeight {
                 x: (x - bounds.x0) as f32 / width,
                 y: (y - bounds.y0) as f32 / height,
                 height: depth.scale.height(row[x]) as f32,
