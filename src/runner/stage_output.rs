@@ -109,7 +109,7 @@ pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     hash_of_json(&result)
 }
 
-/// Returns the hash of a value's compact JSON text. `serde_json::to_vec` takes half the time of formatting the value.
+/// Returns the hash of a value's compact JSON text.
 fn hash_of_json(value: &Value) -> ContentHash {
     ContentHash::of(&serde_json::to_vec(value).expect("a JSON value has a JSON text"))
 }

@@ -31,11 +31,13 @@ const USUAL: f64 = 0.13;
 
 /// Deviation of the logarithm of the depth on a new block.
 const LEAST_DEVIATION: f64 = 0.1;
-/// Growth of this deviation if the tops are steeper than `FLAT_TOPS`, as a share of the walls' steepness.
-const ROUNDED_DEVIATION: f64 = 2.5;
-/// The depth is reduced by this factor times the same excess, on the logarithmic scale.
-const ROUNDED_SHIFT: f64 = 2.0;
+/// Tops are rounded if their steepness, as a share of the walls' steepness, is above this. The excess makes the depth
+/// uncertain and too large.
 const FLAT_TOPS: f64 = 0.04;
+/// Growth of the deviation with the excess.
+const ROUNDED_DEVIATION: f64 = 2.5;
+/// Decrease of the logarithm of the depth with the excess.
+const ROUNDED_SHIFT: f64 = 2.0;
 /// Growth of the deviation if the surface below the found depth is flatter than `EVEN_WALLS`, as a share of the walls'
 /// steepness. Then the found depth may be the edge of the last unworn tops, and the strokes end at a lower depth.
 const DIP_DEVIATION: f64 = 4.0;

@@ -78,23 +78,32 @@ impl HalfCanvas {
         is_set: impl Fn(usize) -> bool,
         edge: &InkEdge,
     ) -> Vec<f32> {
+        let mut distances = Vec::new();
+        self.each_adjacent_pair(|one, other| {
+            if is_set(one) != is_set(other) {
+                distances.push(edge.at(one).midpoint(edge.at(other)));
+            }
+        });
+        distances
+    }
+
+    /// Calls a function with the indices of each two horizontally or vertically adjacent pixels that both have data.
+    pub(super) fn each_adjacent_pair(&self, mut visit: impl FnMut(usize, usize)) {
         let (width, height) = (self.levels.width(), self.levels.height());
         let levels = self.levels.data();
-        let mut distances = Vec::new();
-        let mut add = |one: usize, other: usize| {
-            if levels[one].min(levels[other]) > 0 && is_set(one) != is_set(other) {
-                distances.push(edge.at(one).midpoint(edge.at(other)));
+        let mut visit_known = |one: usize, other: usize| {
+            if levels[one].min(levels[other]) > 0 {
+                visit(one, other);
             }
         };
         for at in 0..width * height {
             if (at + 1) % width > 0 {
-                add(at, at + 1);
+                visit_known(at, at + 1);
             }
             if at + width < width * height {
-                add(at, at + width);
+                visit_known(at, at + width);
             }
         }
-        distances
     }
 }
 

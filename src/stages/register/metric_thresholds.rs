@@ -29,8 +29,6 @@ struct Candidate {
     /// Depth below the tops, as a share of the relief.
     share: f64,
     level: u16,
-    /// Number of stroke pixels on the canvas.
-    area: f64,
     /// Number of stroke pixels whose ink is not missing.
     area_inked: f64,
     /// Agreement with the corrected ink: 1 if the mask covers all ink and no background.
@@ -91,7 +89,7 @@ pub(super) fn choose(
             score,
             at_bound: k == 0 || k + 1 == candidates.len(),
         },
-        probability_right: edge.probability_right(candidates[k].area),
+        probability_right: edge.probability_right(k),
     };
     Ok(vec![
         choice(ThresholdMetric::NlSsim, best, structure.at(best)),
@@ -143,7 +141,7 @@ fn carved_ink(canvas: &HalfCanvas, corrected: &Mask, deepest: u16) -> f64 {
 /// Measures the candidates. `levels` holds depths and levels, the shallowest first.
 fn candidates(canvas: &HalfCanvas, levels: &[(f64, u16)], spread: f64) -> Vec<Candidate> {
     // What each candidate adds to the mask of the candidate before.
-    let mut added = vec![[0.0; 3]; levels.len() + 1];
+    let mut added = vec![[0.0; 2]; levels.len() + 1];
     let mut all_ink = 0.0;
     for (level, distance) in canvas.levels.data().iter().zip(canvas.edge.distances()) {
         if *level == 0 {
@@ -153,22 +151,20 @@ fn candidates(canvas: &HalfCanvas, levels: &[(f64, u16)], spread: f64) -> Vec<Ca
         let weight = (inside / FULL_PX).clamp(-1.0, 1.0);
         all_ink += weight.max(0.0);
         let first = levels.partition_point(|(_, candidate)| candidate > level);
-        let [area, area_inked, agreement] = &mut added[first];
-        *area += 1.0;
+        let [area_inked, agreement] = &mut added[first];
         *area_inked += f64::from(u8::from(inside > -MISSING_PX));
         *agreement += weight;
     }
-    let mut sum = [0.0; 3];
-    let candidate = |((share, level), added): (&(f64, u16), &[f64; 3])| {
+    let mut sum = [0.0; 2];
+    let candidate = |((share, level), added): (&(f64, u16), &[f64; 2])| {
         for (sum, added) in sum.iter_mut().zip(added) {
             *sum += added;
         }
         Candidate {
             share: *share,
             level: *level,
-            area: sum[0],
-            area_inked: sum[1],
-            agreement: sum[2] / f64::max(all_ink, 1.0),
+            area_inked: sum[0],
+            agreement: sum[1] / f64::max(all_ink, 1.0),
         }
     };
     levels.iter().zip(&added).map(candidate).collect()

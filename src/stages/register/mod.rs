@@ -152,6 +152,7 @@ fn require_tops(
     thresholds: &[ChosenThreshold],
     params: &RegisterParams,
 ) -> Result<(), RegisterError> {
+    // The last threshold is that of the metric `relief`.
     let Some(chosen) = thresholds.last().filter(|_| light_on_dark) else {
         return Ok(());
     };

@@ -75,7 +75,7 @@ impl TopsEdge {
     /// Returns the index of the candidate whose mask has the highest expected intersection over union with the mask of
     /// the true edge.
     pub(super) fn best(&self) -> usize {
-        let expected = |k: &usize| self.expected(self.areas[*k], |iou| iou);
+        let expected = |k: &usize| self.expected(*k, |iou| iou);
         (0..self.areas.len())
             .max_by(|a, b| expected(a).total_cmp(&expected(b)))
             .unwrap_or(0)
@@ -86,15 +86,18 @@ impl TopsEdge {
         self.spreads[candidate]
     }
 
-    /// Returns the probability that a mask with `area` stroke pixels is right.
-    pub(super) fn probability_right(&self, area: f64) -> f64 {
-        self.expected(area, |iou| f64::from(u8::from(BEST_IOU * iou >= RIGHT_IOU)))
+    /// Returns the probability that a candidate's mask is right.
+    pub(super) fn probability_right(&self, candidate: usize) -> f64 {
+        self.expected(candidate, |iou| {
+            f64::from(u8::from(BEST_IOU * iou >= RIGHT_IOU))
+        })
     }
 
-    /// Returns the expected value of a function of the intersection over union of the true mask with a mask of the
-    /// given area. Masks of different depths contain each other, so the ratio of their areas is their intersection
-    /// over union.
-    fn expected(&self, area: f64, value: impl Fn(f64) -> f64) -> f64 {
+    /// Returns the expected value of a function of the intersection over union of the true mask with a candidate's
+    /// mask. Masks of different depths contain each other, so the ratio of their areas is their intersection over
+    /// union.
+    fn expected(&self, candidate: usize, value: impl Fn(f64) -> f64) -> f64 {
+        let area = self.areas[candidate];
         let candidates = self.areas.iter().zip(&self.probabilities);
         let ratio = |other: f64| area.min(other) / area.max(other).max(1.0);
         candidates
@@ -111,29 +114,14 @@ fn heavy_tailed(deviations: f64) -> f64 {
 /// Returns, for each candidate, the distances to the edge of the ink at the edges of the candidate's mask. `firsts`
 /// holds the first candidate whose mask contains each pixel. Edges beside pixels without data are left out.
 fn edge_distances(canvas: &HalfCanvas, firsts: &[usize], candidates: usize) -> Vec<Vec<f32>> {
-    let (width, height) = (canvas.levels.width(), canvas.levels.height());
-    let levels = canvas.levels.data();
     let mut distances = vec![Vec::new(); candidates];
-    let mut add = |one: usize, other: usize| {
-        if levels[one].min(levels[other]) > 0 {
-            let distance = canvas.edge.at(one).midpoint(canvas.edge.at(other));
-            let [from, to] = [
-                firsts[one].min(firsts[other]),
-                firsts[one].max(firsts[other]),
-            ];
-            for of_candidate in &mut distances[from..to] {
-                of_candidate.push(distance);
-            }
+    canvas.each_adjacent_pair(|one, other| {
+        let distance = canvas.edge.at(one).midpoint(canvas.edge.at(other));
+        let [one, other] = [firsts[one], firsts[other]];
+        for of_candidate in &mut distances[one.min(other)..one.max(other)] {
+            of_candidate.push(distance);
         }
-    };
-    for at in 0..width * height {
-        if (at + 1) % width > 0 {
-            add(at, at + 1);
-        }
-        if at + width < width * height {
-            add(at, at + width);
-        }
-    }
+    });
     distances
 }
 
@@ -219,7 +207,7 @@ mod tests {
             .collect();
         let edge = TopsEdge::of(&canvas, &levels, &relief(tops_end, log_deviation));
         let best = edge.best();
-        (levels[best].0, edge.probability_right(edge.areas[best]))
+        (levels[best].0, edge.probability_right(best))
     }
 
     #[test]
