@@ -35,7 +35,7 @@ pub(super) struct HeightSamples {
 }
 
 impl HeightSamples {
-    /// Collects the visible pixels of a rendering, without those that are deeper than any carving. Returns `None` if
+    /// Collects the visible pixels of a rendering, leaving out pixels deeper than any carving. Returns `None` if
     /// fewer than [`LEAST_POINTS`] are visible.
     pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
