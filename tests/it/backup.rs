@@ -54,7 +54,10 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
         .expect(0)
         .json();
     assert_eq!(repaired["pairs"], 3);
-    assert!(repaired["damage"]["file_missing"]["found"].as_u64() >= Some(1));
+    assert!(
+        repaired["damage"]["file_missing"]["found"].as_u64() >= Some(1),
+        "{repaired}"
+    );
     at(&blank, &["run"]).expect(0);
     at(&blank, &["check"]).expect(0);
     assert!(exported(&blank, "restored") == expected, "another export");
