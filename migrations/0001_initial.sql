@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 7;
+PRAGMA user_version = 8;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead.
@@ -138,6 +138,9 @@ CREATE TABLE metric_result (
     dice REAL NOT NULL,
     density_print REAL NOT NULL,
     density_depth REAL NOT NULL,
+    disagreements INTEGER NOT NULL,
+    missing_ink REAL NOT NULL,
+    missing_wood REAL NOT NULL,
     margin REAL NOT NULL,
     confidence REAL CHECK (confidence BETWEEN 0 AND 1),
     at_bound INTEGER NOT NULL CHECK (at_bound IN (0, 1)),

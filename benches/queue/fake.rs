@@ -6,7 +6,7 @@ use mocban::catalog::{
     MetricResult, StageCheckpoint,
 };
 use mocban::domain::{
-    Affine2, ArtifactSet, ContentHash, MetricOutcome, RegisterOutcome, Scores, Stage,
+    Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, RegisterOutcome, Scores, Stage,
     ThresholdMetric, WorkerId,
 };
 use mocban::runner::result_hash;
@@ -133,6 +133,7 @@ fn metrics() -> Vec<MetricResult> {
             density_print: 0.5,
             density_depth: 0.5,
         },
+        disagreement: Disagreement::default(),
         margin: 0.5,
         confidence: Some(0.75),
         at_bound: false,

@@ -35,8 +35,9 @@ UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2
 const METRIC: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
-VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.75, 0, ?4)";
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
+     missing_wood, margin, confidence, at_bound, result_hash)
+VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0, 0.0, 0.0, 0.5, 0.75, 0, ?4)";
 
 /// Runs `pairs` pairs through all stages. Each worker has its own connection.
 pub(super) async fn work(

@@ -26,8 +26,8 @@ use super::{
     RerunPolicy, StageCheckpoint, WorkerInfo,
 };
 use crate::domain::{
-    Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
-    ThresholdMetric, UnixMillis, WorkerId,
+    Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
+    Scores, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };
 
 impl Catalog {
@@ -316,6 +316,11 @@ fn metric(metric: ThresholdMetric) -> MetricOutcome {
             dice: 0.82,
             density_print: 0.3,
             density_depth: 0.31,
+        },
+        disagreement: Disagreement {
+            pieces: 2,
+            missing_ink: 0.1 + 0.2,
+            missing_wood: 0.01,
         },
         margin: 0.2,
         confidence: Some(0.1 + 0.2),

@@ -188,7 +188,7 @@ fn agree(
 }
 
 /// Returns the numbers of a metric's result that are stored in columns of their own.
-fn numbers(outcome: &MetricOutcome) -> [f64; 14] {
+fn numbers(outcome: &MetricOutcome) -> [f64; 17] {
     let scores = &outcome.scores;
     [
         outcome.threshold_depth,
@@ -205,6 +205,9 @@ fn numbers(outcome: &MetricOutcome) -> [f64; 14] {
         scores.dice,
         scores.density_print,
         scores.density_depth,
+        f64::from(outcome.disagreement.pieces),
+        outcome.disagreement.missing_ink,
+        outcome.disagreement.missing_wood,
     ]
 }
 

@@ -128,10 +128,10 @@ impl PairPage<'_> {
         if metrics.is_empty() {
             return String::new();
         }
-        let head = "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,margin,confidence,verdicts";
+        let head = "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,no ink,no wood,margin,confidence,verdicts";
         let head = head.split(',').map(ToOwned::to_owned).collect();
         let rows = std::iter::once(head).chain(metrics.iter().map(metric_row));
-        section("result", rows, "<>>>>>>>>>><", self.palette)
+        section("result", rows, "<>>>>>>>>>>>><", self.palette)
     }
 
     fn files(&self) -> String {
@@ -209,6 +209,11 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
     format!("{}{turned}", texts.join("; or "))
 }
 
+/// Formats a share, such as `1.5 %`.
+fn percent(share: f64) -> String {
+    format!("{:.1} %", share * 100.0)
+}
+
 fn metric_row(record: &MetricRecord) -> Vec<String> {
     let result = &record.outcome;
     let bound = if result.at_bound { " at a limit" } else { "" };
@@ -222,6 +227,8 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
         format!("{:.3}", result.scores.iou),
         format!("{:.3}", result.scores.iou_box),
         format!("{:.3}", result.scores.dice),
+        percent(result.disagreement.missing_ink),
+        percent(result.disagreement.missing_wood),
         format!("{:.3}", result.margin),
         result
             .confidence

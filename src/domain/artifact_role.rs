@@ -17,6 +17,12 @@ pub fn print_mask(ink: usize) -> String {
     }
 }
 
+/// Returns the role of the map of missing ink and missing wood of a metric. Register writes the map on the canvas: 0
+/// where mask and ink agree, 128 where ink is missing, 255 where wood is missing.
+pub fn stroke_map(metric: ThresholdMetric) -> String {
+    format!("stroke_map.{metric}.png")
+}
+
 /// Returns the role of a metric's stroke mask on the canvas. Register writes the mask: 255 is stroke.
 pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {
     format!("canvas_depth_mask.{metric}.png")

@@ -33,9 +33,9 @@ pub use ids::{PairId, PairName, PairNameError, WorkerId};
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
-    Bow, DepthOutcome, DepthScale, FitOutcome, InkHypothesis, MetricOutcome, NormalizeOutcome,
-    PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores, SideEvidence,
-    ThresholdChoice,
+    Bow, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
+    NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
+    SideEvidence, ThresholdChoice,
 };
 pub use print_outline::PrintOutline;
 pub use review_order::ReviewOrder;

@@ -239,6 +239,18 @@ pub struct Scores {
     pub density_depth: f64,
 }
 
+/// Where the mask of a metric and the ink disagree by more than the spread of the ink explains. See
+/// `stages::register::StrokeMap` for the tolerances.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Disagreement {
+    /// Number of connected pieces of stroke tops without ink and of ink without wood.
+    pub pieces: u32,
+    /// Area of the stroke tops without ink, as a share of the mask's area.
+    pub missing_ink: f64,
+    /// Area of the ink without wood, as a share of the ink's area.
+    pub missing_wood: f64,
+}
+
 /// Similarity of relief and print at the best pose, compared with competing poses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseFeatures {
@@ -288,6 +300,8 @@ pub struct MetricOutcome {
     pub shift_px: [f64; 2],
     /// Similarity of the masks on the canvas.
     pub scores: Scores,
+    /// Where mask and ink disagree.
+    pub disagreement: Disagreement,
     /// Score of the best pose minus the score of the best competing pose.
     pub margin: f64,
     /// Calibrated probability, 0..=1, that the alignment is correct: the angle error is at most 5 degrees, and the

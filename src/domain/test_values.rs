@@ -1,6 +1,6 @@
 //! Plausible values for unit tests.
 
-use super::{Affine2, MetricOutcome, Scores, ThresholdMetric};
+use super::{Affine2, Disagreement, MetricOutcome, Scores, ThresholdMetric};
 
 /// Returns an outcome with the given `IoU`, the matching Dice and no confidence.
 pub(crate) fn metric_outcome(metric: ThresholdMetric, iou: f64) -> MetricOutcome {
@@ -20,6 +20,11 @@ pub(crate) fn metric_outcome(metric: ThresholdMetric, iou: f64) -> MetricOutcome
             dice: 2.0 * iou / (1.0 + iou),
             density_print: 0.2,
             density_depth: 0.21,
+        },
+        disagreement: Disagreement {
+            pieces: 3,
+            missing_ink: 0.04,
+            missing_wood: 0.02,
         },
         margin: 0.3,
         confidence: None,

@@ -28,7 +28,7 @@ const FILES: [(&str, &[&str]); 4] = [
 ];
 
 /// Names, without extensions, of the images that an export writes for a pair or for a metric of a pair.
-const IMAGES: [&str; 9] = [
+const IMAGES: [&str; 10] = [
     "print",
     "print_mask",
     "depth",
@@ -37,6 +37,7 @@ const IMAGES: [&str; 9] = [
     "aligned_mask",
     "canvas_depth_mask",
     "canvas_print_mask",
+    "stroke_map",
     "overlay",
 ];
 

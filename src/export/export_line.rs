@@ -85,6 +85,12 @@ pub struct Numbers {
     pub density_print: Option<f64>,
     /// Share of the canvas that is stroke.
     pub density_depth: Option<f64>,
+    /// Number of pieces of missing ink and of missing wood.
+    pub disagreements: Option<u32>,
+    /// Area of the stroke tops without ink near them, as a share of the mask's area.
+    pub missing_ink: Option<f64>,
+    /// Area of the ink without wood near it, as a share of the ink's area.
+    pub missing_wood: Option<f64>,
     /// Calibrated probability that the alignment is right, 0..=1; null for methods without a confidence.
     pub confidence: Option<f64>,
 }
@@ -252,6 +258,9 @@ impl Numbers {
             dice: Some(scores.dice),
             density_print: Some(scores.density_print),
             density_depth: Some(scores.density_depth),
+            disagreements: Some(outcome.disagreement.pieces),
+            missing_ink: Some(outcome.disagreement.missing_ink),
+            missing_wood: Some(outcome.disagreement.missing_wood),
             confidence: outcome.confidence,
         }
     }
@@ -307,7 +316,7 @@ mod tests {
     use serde_json::{Value, json};
 
     /// The fields in the order the interface gives them.
-    const FIELDS: [&str; 30] = [
+    const FIELDS: [&str; 33] = [
         "id",
         "metric",
         "status",
@@ -325,6 +334,9 @@ mod tests {
         "dice",
         "density_print",
         "density_depth",
+        "disagreements",
+        "missing_ink",
+        "missing_wood",
         "confidence",
         "print_from_mesh",
         "plane_from_mesh",

@@ -10,7 +10,7 @@ use super::file_names::PAIRS;
 use super::pictures::PrintView;
 use super::source_print::{SourcePrint, SourcePrintError};
 use crate::catalog::PairResults;
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, stroke_map};
 use crate::domain::{DepthScale, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
     DepthMap, ImageLimits, Mask, png_grey16, png_mask, png_rgb8, warp_depth, warp_mask,
@@ -37,6 +37,8 @@ pub struct Files {
     pub canvas_depth_mask: String,
     /// The ink mask on that canvas.
     pub canvas_print_mask: String,
+    /// Where the two masks on the canvas disagree: 128 where ink is missing, 255 where wood is missing, 0 elsewhere.
+    pub stroke_map: String,
     /// The print with the edges of the strokes, enlarged for viewing.
     pub overlay: String,
 }
@@ -54,6 +56,7 @@ impl Files {
             aligned_mask: own("aligned_mask"),
             canvas_depth_mask: own("canvas_depth_mask"),
             canvas_print_mask: shared("canvas_print_mask.png"),
+            stroke_map: own("stroke_map"),
             overlay: own("overlay"),
         }
     }
@@ -152,9 +155,13 @@ impl<'a> PairFiles<'a> {
         drawn: &EncodedImages,
     ) -> Result<Files, FilesError> {
         let files = self.files(metric);
-        let role = canvas_depth_mask(metric);
-        let canvas = self.artifacts.bytes(Stage::Register, &role)?;
-        write(root, &files.canvas_depth_mask, &canvas)?;
+        for (role, path) in [
+            (canvas_depth_mask(metric), &files.canvas_depth_mask),
+            (stroke_map(metric), &files.stroke_map),
+        ] {
+            let image = self.artifacts.bytes(Stage::Register, &role)?;
+            write(root, path, &image)?;
+        }
         let paths = [
             &files.depth_mask,
             &files.aligned_depth,

@@ -54,6 +54,10 @@ struct MetricSums {
     reasons: FailReasonSums,
     /// Of SSIM, NL-SSIM, `IoU`, `IoU` of boxes, Dice.
     scores: [f64; 5],
+    /// Results with at least one piece of missing ink or missing wood.
+    disagreeing: u64,
+    /// Of the shares of missing ink and of missing wood.
+    missing: [f64; 2],
     truth: Vec<TruthErrors>,
     manual: Vec<ManualErrors>,
     /// Relative heights of the thresholds.
@@ -191,6 +195,10 @@ impl MetricSums {
         for (sum, score) in self.scores.iter_mut().zip(scores) {
             *sum += score;
         }
+        let found = &outcome.disagreement;
+        self.disagreeing += u64::from(found.pieces > 0);
+        self.missing[0] += found.missing_ink;
+        self.missing[1] += found.missing_wood;
         self.n += 1;
         self.rules.add(record);
         self.reasons.add(record);
@@ -220,6 +228,7 @@ impl MetricSums {
 
     fn finish(self, metric: ThresholdMetric, means_ci95: MeanIntervals) -> MetricRow {
         let [ssim, nl_ssim, iou, iou_box, dice] = self.scores.map(|sum| ratio(sum, self.n));
+        let [missing_ink, missing_wood] = self.missing.map(|sum| ratio(sum, self.n));
         let acc = Rate::new(self.passed, self.passed + self.failed);
         let judged = acc.n + self.unsure;
         MetricRow {
@@ -240,6 +249,9 @@ impl MetricSums {
             iou,
             iou_box,
             dice,
+            disagreeing: self.disagreeing,
+            missing_ink,
+            missing_wood,
             means_ci95,
             truth: TruthSummary::of(&self.truth),
             manual_alignment: ManualAlignmentErrors::of(&self.manual),

@@ -116,6 +116,12 @@ pub struct MetricRow {
     pub iou_box: Option<f64>,
     /// Mean Dice coefficient of the masks by pixel.
     pub dice: Option<f64>,
+    /// Results with at least one piece of missing ink or missing wood.
+    pub disagreeing: u64,
+    /// Mean share of the stroke tops that lack ink.
+    pub missing_ink: Option<f64>,
+    /// Mean share of the ink that lacks wood.
+    pub missing_wood: Option<f64>,
     /// Bootstrap intervals of the means.
     pub means_ci95: MeanIntervals,
     /// Errors against ground truth. `None` if no result has ground truth.

@@ -8,7 +8,9 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask};
+use crate::domain::artifact_role::{
+    CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
+};
 use crate::domain::{FailureClass, Stage};
 use crate::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::{NormalizeError, Normalized};
@@ -131,6 +133,9 @@ impl PipelineExecutor {
         let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
         for (metric, mask) in outcome.metrics.iter().zip(&registered.canvas_depths) {
             files.push(png(&canvas_depth_mask(metric.metric), png_mask(mask)));
+        }
+        for (metric, map) in outcome.metrics.iter().zip(&registered.stroke_maps) {
+            files.push(png(&stroke_map(metric.metric), png_grey8(map)));
         }
         Ok(StageOutput {
             outcome: json,

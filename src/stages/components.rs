@@ -113,6 +113,15 @@ impl ConnectedComponents {
         apart.map(|(size, _)| *size).max().unwrap_or(0)
     }
 
+    /// Returns the pixels and the number of the components of at least `size` pixels that are not near `other` or the
+    /// border, as in [`Self::touching`].
+    pub(super) fn apart_from(&self, other: &Mask, distance: i64, size: usize) -> (Mask, usize) {
+        let touches = self.touches(other, distance);
+        let wanted = |label: usize| self.sizes[label] >= size && !touches[label];
+        let count = (0..self.sizes.len()).filter(|label| wanted(*label)).count();
+        (self.select(wanted), count)
+    }
+
     /// Returns for each component whether it is near `other` or the border.
     fn touches(&self, other: &Mask, distance: i64) -> Vec<bool> {
         let mut touches = vec![false; self.sizes.len()];

@@ -10,7 +10,8 @@ use crate::catalog::queue::lease::MetricResult;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{
-    ContentHash, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage, ThresholdMetric,
+    ContentHash, Disagreement, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage,
+    ThresholdMetric,
 };
 
 /// A pair as stored, with unparsed results.
@@ -147,6 +148,11 @@ fn metric(row: &SqliteRow) -> Result<(ThresholdMetric, MetricResult)> {
                 dice: row.try_get("dice")?,
                 density_print: row.try_get("density_print")?,
                 density_depth: row.try_get("density_depth")?,
+            },
+            disagreement: Disagreement {
+                pieces: row.try_get("disagreements")?,
+                missing_ink: row.try_get("missing_ink")?,
+                missing_wood: row.try_get("missing_wood")?,
             },
             margin: row.try_get("margin")?,
             confidence: row.try_get("confidence")?,

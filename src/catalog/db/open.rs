@@ -20,8 +20,8 @@ use crate::domain::FileKind;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
-/// Version of the schema. Versions 1 to 6 were never released.
-const SCHEMA_VERSION: i64 = 7;
+/// Version of the schema. Versions 1 to 7 were never released.
+const SCHEMA_VERSION: i64 = 8;
 /// Read connections per process.
 const READERS: u32 = 4;
 

@@ -50,14 +50,16 @@ DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))"
 const METRICS: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
+     missing_wood, margin, confidence, at_bound, result_hash)
 SELECT value ->> 0, value ->> '$[1].metric', value ->> '$[1].threshold_level',
     value ->> '$[1].threshold_depth', value -> '$[1].print_from_depth', value ->> '$[1].angle_deg',
     value ->> '$[1].scale', value ->> '$[1].shift_px[0]', value ->> '$[1].shift_px[1]',
     value ->> '$[1].scores.ssim', value ->> '$[1].scores.nl_ssim', value ->> '$[1].scores.iou',
     value ->> '$[1].scores.iou_box', value ->> '$[1].scores.dice', value ->> '$[1].scores.density_print',
-    value ->> '$[1].scores.density_depth', value ->> '$[1].margin', value ->> '$[1].confidence',
-    value ->> '$[1].at_bound', unhex(value ->> 2)
+    value ->> '$[1].scores.density_depth', value ->> '$[1].disagreement.pieces',
+    value ->> '$[1].disagreement.missing_ink', value ->> '$[1].disagreement.missing_wood',
+    value ->> '$[1].margin', value ->> '$[1].confidence', value ->> '$[1].at_bound', unhex(value ->> 2)
 FROM jsonb_each(?)";
 
 /// Items: pair, index of the stage, worker, milliseconds, time.

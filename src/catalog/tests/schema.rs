@@ -34,7 +34,7 @@ async fn check_constraints_and_enums_agree() {
         (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
         VALUES ('1', 1, ?1, zeroblob(32), 'mirrored', '{}', zeroblob(32), 'fail', 'me', 1)";
     let scored_metric = "INSERT INTO metric_result VALUES
-        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, zeroblob(32))";
+        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, zeroblob(32))";
     let queue =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', 1, ?1)";

@@ -59,7 +59,7 @@ fn columns() -> CsvColumns {
     columns.add(
         "",
         "",
-        "metric n judged passed failed unsure conflicts stale acc acc_ci95 ssim nl_ssim iou iou_box dice",
+        "metric n judged passed failed unsure conflicts stale disagreeing acc acc_ci95 ssim nl_ssim iou iou_box dice",
     );
     columns.add(
         "truth_",
@@ -81,6 +81,7 @@ fn columns() -> CsvColumns {
     for mean in ["ssim", "iou", "iou_box", "dice", "acc_by_block"] {
         columns.add("", "/means_ci95", &format!("{mean}_ci95={mean}"));
     }
+    columns.add("", "", "missing_ink missing_wood");
     columns.add("", "", "bootstrap_by");
     columns.add(
         "manual_alignment_",
@@ -193,7 +194,7 @@ mod tests {
                 .iter()
                 .all(|line| line.split(',').count() == columns)
         );
-        let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
+        let golden = "nl_ssim,2,1,1,0,0,0,0,2,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
         assert!(lines[1].starts_with(golden), "{}", lines[1]);
         let value = fields(&report, 0);
         let names = [
@@ -220,8 +221,8 @@ mod tests {
     fn a_missing_value_is_an_empty_field() {
         let text = render(&ReportAccumulator::default().finish());
         let line = text.lines().nth(2).expect("density");
-        assert!(line.starts_with("density,0,0,0,0,0,0,0,"), "{line}");
-        assert!(line.split(',').skip(8).all(str::is_empty), "{line}");
+        assert!(line.starts_with("density,0,0,0,0,0,0,0,0,"), "{line}");
+        assert!(line.split(',').skip(9).all(str::is_empty), "{line}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::remove_specks;
 use crate::stages::normalize::Normalized;
 use crate::stages::register::{
-    Alignment, RegisterError, RegisterParams, Registered, canvas_print, score_alignments,
+    Alignment, RegisterError, RegisterParams, Registered, StrokeMap, canvas_print, score_alignments,
 };
 
 /// The paper's method has one interpretation of the print.
@@ -52,7 +52,25 @@ pub(crate) fn register(
         ..better
     };
     let alignments = [structure, density, ensemble];
-    score_alignments(depth, normalized, INK, target, &alignments, params.window)
+    let map = |alignment: &Alignment| {
+        StrokeMap::of_alignment(
+            depth,
+            &normalized.prints[INK],
+            &normalized.outcome.inks[INK].canvas_from_print,
+            &alignment.print_from_depth,
+            normalized.outcome.canvas_px,
+            alignment.level,
+        )
+    };
+    score_alignments(
+        depth,
+        normalized,
+        INK,
+        target,
+        &alignments,
+        map,
+        params.window,
+    )
 }
 
 /// Registers the mask of one metric's threshold and returns the alignment with its IoU.

@@ -4,7 +4,7 @@ use crate::raster::{Grid, Mask};
 use crate::simd::{dispatch, min_f32};
 
 /// Largest distance that is measured, in pixels. Larger distances are set to this.
-const REACH: usize = 8;
+pub(super) const REACH: usize = 8;
 /// `mean_near` averages only distances that differ from its previous estimate by less than this, in pixels.
 const NEAR: f32 = 2.0;
 /// Number of times that `mean_near` improves its estimate.

@@ -15,6 +15,7 @@ mod pose_search;
 mod refine;
 mod scoring;
 mod soft_thresholds;
+mod stroke_map;
 mod tops_edge;
 mod unmatched;
 
@@ -22,6 +23,7 @@ pub use confidence::ConfidenceInputs;
 pub use params::{RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
+pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
 use crate::domain::PoseFeatures;
@@ -32,7 +34,7 @@ use metric_thresholds::ChosenThreshold;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 14;
+pub const REVISION: u32 = 15;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
@@ -114,12 +116,16 @@ pub fn register(
         })
         .collect();
     let canvas_print = canvas_print(normalized, search.ink);
+    let map = |alignment: &Alignment| {
+        StrokeMap::of(&canvas, alignment.level, normalized.outcome.canvas_px)
+    };
     let mut registered = score_alignments(
         depth,
         normalized,
         search.ink,
         canvas_print,
         &alignments,
+        map,
         params.window,
     )?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);

@@ -2,8 +2,11 @@
 
 use super::confidence::ConfidenceInputs;
 use super::params::RegisterError;
-use crate::domain::{Affine2, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric};
-use crate::raster::{DepthMap, Mask, warp_mask};
+use super::stroke_map::StrokeMap;
+use crate::domain::{
+    Affine2, Disagreement, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
+};
+use crate::raster::{DepthMap, Grid, Mask, warp_mask};
 use crate::stages::normalize::Normalized;
 use crate::stages::score::{self, SsimReference, SsimWindow};
 
@@ -31,6 +34,9 @@ pub struct Registered {
     pub canvas_print: Mask,
     /// The depth mask of each metric on the canvas, in the order of `outcome.metrics`.
     pub canvas_depths: Vec<Mask>,
+    /// The map of missing ink and missing wood of each metric on the canvas, see [`StrokeMap::grey`]. In the order of
+    /// `outcome.metrics`.
+    pub stroke_maps: Vec<Grid<u8>>,
     /// Inputs of the confidence model for each metric, in the order of `outcome.metrics`. Empty if the paper's method
     /// was used. `cargo bench --bench accuracy -- --fit-confidence` fits the model to such inputs.
     pub confidence_inputs: Vec<ConfidenceInputs>,
@@ -44,7 +50,7 @@ pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
 }
 
 /// Warps the depth mask of each alignment to the canvas and scores it against `canvas_print`. `canvas_print` shows the
-/// interpretation of the print with the index `ink`.
+/// interpretation of the print with the index `ink`. `map` maps where an alignment's mask and the ink disagree.
 ///
 /// # Errors
 /// Returns an error if a threshold leaves no strokes.
@@ -54,6 +60,7 @@ pub(crate) fn score_alignments(
     ink: usize,
     canvas_print: Mask,
     alignments: &[Alignment],
+    map: impl Fn(&Alignment) -> StrokeMap,
     window: SsimWindow,
 ) -> Result<Registered, RegisterError> {
     let canvas_from_print = normalized.outcome.inks[ink].canvas_from_print;
@@ -69,6 +76,7 @@ pub(crate) fn score_alignments(
         masks.extend(depth.warped_stroke_masks(&canvas_from_depth, [side; 2], &levels));
     }
     let mut metrics: Vec<MetricOutcome> = Vec::new();
+    let mut stroke_maps: Vec<Grid<u8>> = Vec::new();
     for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
         if mask.count() == 0 {
             return Err(RegisterError::EmptyMask(alignment.metric));
@@ -78,11 +86,25 @@ pub(crate) fn score_alignments(
         let twin = before.position(|other| {
             (other.level, other.print_from_depth) == (alignment.level, alignment.print_from_depth)
         });
-        let scores = twin.map_or_else(
-            || score::score_masks(&print_means, mask),
-            |twin| metrics[twin].scores,
-        );
-        metrics.push(outcome(depth, print_size, alignment, scores));
+        let (scores, map) = if let Some(twin) = twin {
+            let MetricOutcome {
+                scores,
+                disagreement,
+                ..
+            } = metrics[twin];
+            let grey = stroke_maps[twin].clone();
+            (scores, StrokeMap { grey, disagreement })
+        } else {
+            (score::score_masks(&print_means, mask), map(alignment))
+        };
+        metrics.push(outcome(
+            depth,
+            print_size,
+            alignment,
+            scores,
+            map.disagreement,
+        ));
+        stroke_maps.push(map.grey);
     }
     Ok(Registered {
         outcome: RegisterOutcome {
@@ -93,6 +115,7 @@ pub(crate) fn score_alignments(
         confidence_inputs: Vec::new(),
         canvas_print,
         canvas_depths: masks,
+        stroke_maps,
     })
 }
 
@@ -101,6 +124,7 @@ fn outcome(
     print_size: [usize; 2],
     alignment: &Alignment,
     scores: Scores,
+    disagreement: Disagreement,
 ) -> MetricOutcome {
     let middle =
         |width: usize, height: usize| [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
@@ -117,6 +141,7 @@ fn outcome(
         scale: alignment.print_from_depth.scale(),
         shift_px: [x - u, y - v],
         scores,
+        disagreement,
         margin: alignment.margin,
         confidence: None,
         at_bound: alignment.at_bound,
