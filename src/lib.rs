@@ -145,7 +145,7 @@
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `raster`, `store`, `catalog`, `report` |
-//! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
+//! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `stages`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |

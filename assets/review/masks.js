@@ -4,10 +4,6 @@ export const INK = [0, 82, 155];
 export const RELIEF = [196, 78, 0];
 /** Colours of the edges at -5 and +5 degrees. */
 const GUIDES = [INK, [130, 60, 150]];
-/** Tolerance for missing strokes relative to the longer side, because edges never match to the pixel. */
-const TOLERANCE = 1 / 90;
-/** Minimum area of a missing stroke relative to the image. */
-const MIN_COMPONENT = 1 / 4000;
 
 export function newCanvas(width, height) {
   const canvas = new OffscreenCanvas(width, height);
@@ -94,10 +90,9 @@ function plain(line, width, height, colour) {
   return paint(width, height, (i) => (line[i] ? drawn : 0));
 }
 
-/** Returns the 4-connected components of a mask, largest first, without the smallest. */
+/** Returns the 4-connected components of a mask, largest first. */
 function components(set, width, height) {
   const seen = new Uint8Array(set.length);
-  const minSize = set.length * MIN_COMPONENT;
   const found = [];
   for (let start = 0; start < set.length; start++) {
     if (!set[start] || seen[start]) continue;
@@ -114,7 +109,7 @@ function components(set, width, height) {
         }
       }
     }
-    if (component.length >= minSize) found.push(component);
+    found.push(component);
   }
   return found.sort((a, b) => b.length - a.length);
 }
@@ -128,17 +123,15 @@ function enclosingCircle(component, width) {
   return { x: (x0 + x1) / 2, y: (y0 + y1) / 2, radius: Math.hypot(x1 - x0, y1 - y0) / 2 + 8 };
 }
 
-/** Returns the map of strokes that only one mask has, hatched, and a ring around the largest one missing in the relief. */
-function strokeMap(ink, strokes, width, height) {
-  const tolerance = Math.max(2, Math.round(Math.max(width, height) * TOLERANCE));
-  const missing = (set, other) => {
-    const covered = dilate(other, width, height, tolerance);
-    return components(set.map((value, i) => value & (1 - covered[i])), width, height);
-  };
-  const [lost, extra] = [missing(ink, strokes), missing(strokes, ink)];
-  const kind = new Uint8Array(width * height);
-  for (const component of lost) for (const at of component) kind[at] = 1;
-  for (const component of extra) for (const at of component) kind[at] = 2;
+/**
+ * Returns the map of strokes that only one mask has, hatched, and a ring around the largest one missing in the relief.
+ * The pixels of `disagreement` are 255 where only the print has a stroke, and 128 where only the relief has one.
+ */
+function strokeMap(disagreement, ink, strokes, width, height) {
+  const { data } = pixels(disagreement);
+  const kindAt = (i) => (data[4 * i] > 191 ? 1 : data[4 * i] > 63 ? 2 : 0);
+  const kind = Uint8Array.from({ length: width * height }, (_, i) => kindAt(i));
+  const lost = components(kind.map((value) => (value === 1 ? 1 : 0)), width, height);
   const [lostColour, extraColour] = [pixel(INK), pixel(RELIEF)];
   const map = paint(width, height, (i) => {
     const x = i % width;
@@ -180,8 +173,8 @@ function difference(print, strokes) {
   return paint(width, height, (i) => GREYS[Math.round(Math.abs(255 - luminance(i) - 255 * strokes[i]))]);
 }
 
-/** Derives everything that the viewer draws from the four images of an item. */
-export function derive({ print, printMask, relief, depthMask }) {
+/** Derives everything that the viewer draws from the images of an item. */
+export function derive({ print, printMask, relief, depthMask, disagreement }) {
   const { width, height } = print;
   const [ink, strokes] = [bits(printMask), bits(depthMask)];
   const line = border(strokes, width, height);
@@ -191,7 +184,7 @@ export function derive({ print, printMask, relief, depthMask }) {
     guides: GUIDES.map((colour) => plain(line, width, height, colour).transferToImageBitmap()),
     overlay: overlay(ink, strokes, width, height).transferToImageBitmap(),
     difference: difference(print, strokes).transferToImageBitmap(),
-    strokeMap: strokeMap(ink, strokes, width, height),
+    strokeMap: strokeMap(disagreement, ink, strokes, width, height),
     centroid: centroid(strokes, width, height),
   };
 }

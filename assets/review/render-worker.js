@@ -2,7 +2,7 @@
 
 import { derive } from "./masks.js";
 
-const LAYERS = ["print", "print-mask", "relief", "depth-mask"];
+const LAYERS = ["print", "print-mask", "relief", "depth-mask", "stroke-map"];
 
 async function bitmap(id, layer) {
   const response = await fetch(`/image/${id}/${layer}`);
@@ -20,8 +20,8 @@ async function bitmaps(id, layers) {
 /** Renderers by kind of request. */
 const renderers = {
   async item(id) {
-    const [print, printMask, relief, depthMask] = await bitmaps(id, LAYERS);
-    return derive({ print, printMask, relief, depthMask });
+    const [print, printMask, relief, depthMask, disagreement] = await bitmaps(id, LAYERS);
+    return derive({ print, printMask, relief, depthMask, disagreement });
   },
   /** Relief and strokes in the depth map's frame, and the ink on the canvas on which scores are computed. */
   async alignment(id) {

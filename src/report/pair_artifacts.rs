@@ -8,11 +8,12 @@ use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
     RegisterOutcome, Stage,
 };
-use crate::raster::{DepthMap, Mask, PngError, decode_grey8, decode_grey16};
+use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
-/// Value of ink in a stored print mask. The background is 0, and unknown pixels are 128.
+/// Values of ink and of unknown pixels in a stored print mask. The background is 0.
 const INK: u8 = 255;
+const UNKNOWN: u8 = 128;
 
 /// Why a stored result cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -123,9 +124,23 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// Returns an error if the mask cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
+        let [ink, _known] = self.print_masks()?;
+        Ok(ink)
+    }
+
+    /// Reads the ink mask of the print, and the mask of the pixels that are ink or background. Both have the frame and
+    /// the size of the print image.
+    ///
+    /// # Errors
+    /// Returns an error if the masks cannot be read.
+    pub fn print_masks(&self) -> Result<[Mask; 2], PairArtifactsError> {
         let register = self.outcome::<RegisterOutcome>(Stage::Register);
-        let ink = register.map_or(0, |outcome| outcome.ink);
-        self.mask(Stage::Normalize, &print_mask(ink))
+        let role = print_mask(register.map_or(0, |outcome| outcome.ink));
+        let grey = self.grey(Stage::Normalize, &role)?;
+        Ok([
+            grey.map(|value| *value == INK),
+            grey.map(|value| *value != UNKNOWN),
+        ])
     }
 
     /// Returns the map from print pixels to pixels of the canvas on which scores are computed.
@@ -152,8 +167,11 @@ impl<'a> PairArtifacts<'a> {
     }
 
     fn mask(&self, stage: Stage, role: &str) -> Result<Mask, PairArtifactsError> {
-        let grey = decode_grey8(&self.bytes(stage, role)?).map_err(undecodable(role))?;
-        Ok(grey.map(|value| *value == INK))
+        Ok(self.grey(stage, role)?.map(|value| *value == INK))
+    }
+
+    fn grey(&self, stage: Stage, role: &str) -> Result<Grid<u8>, PairArtifactsError> {
+        decode_grey8(&self.bytes(stage, role)?).map_err(undecodable(role))
     }
 
     /// Converts `print_from_mesh` to a map from depth-map pixels to print pixels, for points on the fitted plane.

@@ -14,8 +14,10 @@ use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Affine2, Stage};
 use crate::export::pictures::{PrintView, shaded};
 use crate::export::{SourcePrint, SourcePrintError};
-use crate::raster::{self, DepthMap, Mask, MaskOverlap, png_mask, png_rgb8, warp_mask};
+use crate::raster::{self, DepthMap, Mask, MaskOverlap, png_grey8, png_mask, png_rgb8, warp_mask};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use crate::stages::normalize::PrintMasks;
+use crate::stages::register::StrokeMap;
 use crate::store::Project;
 
 /// Longer side of an image in pixels.
@@ -35,6 +37,8 @@ pub(super) enum ImageLayer {
     Relief,
     /// Stroke mask of the relief in the print's frame.
     DepthMask,
+    /// Where mask and ink disagree, in the print's frame; values as in [`StrokeMap`].
+    StrokeMap,
     /// Shaded relief in the depth map's frame, for manual alignment.
     DepthFrameRelief,
     /// Stroke mask in the depth map's frame.
@@ -117,6 +121,7 @@ pub(super) struct ItemImages {
     print_mask: Vec<u8>,
     relief: Vec<u8>,
     depth_mask: Vec<u8>,
+    stroke_map: Vec<u8>,
 }
 
 impl ItemImages {
@@ -134,7 +139,13 @@ impl ItemImages {
             (view, png_rgb8(&view.print(&source.picture)))
         };
         let print_from_depth = &item.view.print_from_depth;
-        let print_mask = view.mask(&aligned.print_mask()?, &Affine2::IDENTITY);
+        let [ink, known] = aligned.print_masks()?;
+        let print_mask = view.mask(&ink, &Affine2::IDENTITY);
+        let masks = PrintMasks {
+            specks: Mask::new(ink.width(), ink.height(), false),
+            ink,
+            known,
+        };
         Ok(Self {
             view,
             canvas_from_print: inputs.canvas_from_print,
@@ -143,13 +154,45 @@ impl ItemImages {
             print_mask: png_mask(&print_mask),
             relief: png_rgb8(&view.relief(&inputs.depth, print_from_depth)),
             depth_mask: png_mask(&view.mask(&inputs.strokes, print_from_depth)),
+            stroke_map: stroke_map(&view, &inputs, &masks, item),
         })
     }
 
     /// Returns the number of bytes of the images.
     const fn bytes(&self) -> usize {
-        self.print.len() + self.print_mask.len() + self.relief.len() + self.depth_mask.len()
+        self.print.len()
+            + self.print_mask.len()
+            + self.relief.len()
+            + self.depth_mask.len()
+            + self.stroke_map.len()
     }
+}
+
+/// Draws where the mask and the ink of an item disagree. The map is computed again from the alignment that the item
+/// shows, because no map of an attention check is stored.
+fn stroke_map(
+    view: &PrintView,
+    inputs: &AlignmentInputs,
+    masks: &PrintMasks,
+    item: &ReviewItem,
+) -> Vec<u8> {
+    let map = StrokeMap::of_alignment(
+        &inputs.depth,
+        masks,
+        &inputs.canvas_from_print,
+        &item.view.print_from_depth,
+        inputs.canvas_mask.width() as u32,
+        item.view.level,
+    );
+    let print_from_canvas = inputs.canvas_from_print.inverse();
+    let print_from_canvas = print_from_canvas.unwrap_or(Affine2::IDENTITY);
+    let drawn = |value: u8| view.mask(&map.grey.map(|grey| *grey == value), &print_from_canvas);
+    let [ink, wood] = [StrokeMap::MISSING_INK, StrokeMap::MISSING_WOOD].map(drawn);
+    png_grey8(&ink.zip_map(&wood, |ink, wood| match (ink, wood) {
+        (true, _) => StrokeMap::MISSING_INK,
+        (false, true) => StrokeMap::MISSING_WOOD,
+        (false, false) => StrokeMap::AGREE,
+    }))
 }
 
 /// Renders the images of items and caches the latest.
@@ -238,6 +281,7 @@ impl ImageCache {
             ImageLayer::PrintMask => self.of(item).await?.print_mask.clone(),
             ImageLayer::Relief => self.of(item).await?.relief.clone(),
             ImageLayer::DepthMask => self.of(item).await?.depth_mask.clone(),
+            ImageLayer::StrokeMap => self.of(item).await?.stroke_map.clone(),
             ImageLayer::DepthFrameRelief => self.alignment_inputs(item).await?.relief(),
             ImageLayer::DepthFrameMask => png_mask(&self.alignment_inputs(item).await?.strokes),
             ImageLayer::CanvasMask => png_mask(&self.alignment_inputs(item).await?.canvas_mask),
