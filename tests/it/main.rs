@@ -69,6 +69,7 @@ mod semi_real;
 mod shim;
 mod snapshots;
 mod source_text;
+mod stroke_map;
 mod style;
 mod terminal;
 mod test_size;
