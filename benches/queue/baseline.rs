@@ -100,7 +100,11 @@ impl Worker {
         let registered = pipeline::register(&depth, &normalized, settings)?;
         let canvases = [&registered.canvas_print].into_iter();
         let canvases = canvases.chain(&registered.canvas_depths);
-        writes.push(self.write(canvases.map(raster::png_mask).collect()));
+        let mut files: Vec<Vec<u8>> = canvases.map(raster::png_mask).collect();
+        let mut maps = registered.stroke_maps;
+        maps.dedup();
+        files.extend(maps.iter().map(raster::png_grey8));
+        writes.push(self.write(files));
         Ok(())
     }
 

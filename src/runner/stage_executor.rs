@@ -134,8 +134,14 @@ impl PipelineExecutor {
         for (metric, mask) in outcome.metrics.iter().zip(&registered.canvas_depths) {
             files.push(png(&canvas_depth_mask(metric.metric), png_mask(mask)));
         }
-        for (metric, map) in outcome.metrics.iter().zip(&registered.stroke_maps) {
-            files.push(png(&stroke_map(metric.metric), png_grey8(map)));
+        let maps = &registered.stroke_maps;
+        let mut encoded: Vec<Vec<u8>> = Vec::new();
+        for (metric, map) in outcome.metrics.iter().zip(maps) {
+            // Metrics often have equal maps, above all empty ones.
+            let twin = maps[..encoded.len()].iter().position(|other| other == map);
+            let image = twin.map_or_else(|| png_grey8(map), |twin| encoded[twin].clone());
+            files.push(png(&stroke_map(metric.metric), image.clone()));
+            encoded.push(image);
         }
         Ok(StageOutput {
             outcome: json,

@@ -91,6 +91,10 @@ impl StrokeMap {
             missing_wood: share(&wood.0, &canvas.ink),
         };
         let side = canvas_px as usize;
+        if disagreement.pieces == 0 {
+            let grey = Grid::new(side, side, Self::AGREE);
+            return Self { grey, disagreement };
+        }
         let at_half = |at: usize, length: usize| (at / 2).min(length - 1);
         let grey = Grid::from_fn(side, side, |x, y| {
             let [x, y] = [at_half(x, mask.width()), at_half(y, mask.height())];
