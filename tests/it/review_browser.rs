@@ -94,7 +94,7 @@ fn current_verdicts(project: &Project, reviewer: &str) -> BTreeMap<i64, (String,
 
 #[test]
 fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
-    // Metrics often choose the same threshold, so 16 pairs have fewer than 50 images.
+    // Metrics often choose the same threshold, so the pairs of `read_project` have fewer than 50 images.
     let made = |dir: &tempfile::TempDir| {
         let project = project(dir.path(), "p", "28");
         call(&mut run(&project, &[])).expect(0);
