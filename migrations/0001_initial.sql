@@ -120,7 +120,8 @@ CREATE TABLE stage_result (
     CHECK (stage < 2 OR print_hash IS NOT NULL)
 ) STRICT;
 
--- The scores of each threshold metric. A verdict refers to a result by its result_hash.
+-- The scores of each threshold metric, and where its mask and the ink disagree: the number of pieces, and their areas as
+-- shares. A verdict refers to a result by its result_hash.
 CREATE TABLE metric_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),

@@ -27,7 +27,7 @@
 //! 10. `src/stages/pipeline.rs`: chooses the method of `fit`, `normalize` and `register`; `depth` has only one. The
 //!     stages start in `fit/upper_surface.rs` (plane, curvature, carved side), `depth.rs` (depth map),
 //!     `normalize/mod.rs` (ink of the print, heights of tops and ground) and `register/mod.rs` (pose, thresholds,
-//!     scores, confidence)
+//!     stroke maps, scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash
 //! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one

@@ -11,9 +11,8 @@ use crate::domain::{
 use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
-/// Values of ink and of unknown pixels in a stored print mask. The background is 0.
+/// Value of ink or strokes in a stored mask.
 const INK: u8 = 255;
-const UNKNOWN: u8 = 128;
 
 /// Why a stored result cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -124,23 +123,17 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// Returns an error if the mask cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
-        let [ink, _known] = self.print_masks()?;
-        Ok(ink)
+        Ok(self.print_grey()?.map(|value| *value == INK))
     }
 
-    /// Reads the ink mask of the print, and the mask of the pixels that are ink or background. Both have the frame and
-    /// the size of the print image.
+    /// Reads the stored image of the masks of the print. For its values, see [`print_mask`].
     ///
     /// # Errors
-    /// Returns an error if the masks cannot be read.
-    pub fn print_masks(&self) -> Result<[Mask; 2], PairArtifactsError> {
+    /// Returns an error if the mask cannot be read.
+    pub fn print_grey(&self) -> Result<Grid<u8>, PairArtifactsError> {
         let register = self.outcome::<RegisterOutcome>(Stage::Register);
-        let role = print_mask(register.map_or(0, |outcome| outcome.ink));
-        let grey = self.grey(Stage::Normalize, &role)?;
-        Ok([
-            grey.map(|value| *value == INK),
-            grey.map(|value| *value != UNKNOWN),
-        ])
+        let ink = register.map_or(0, |outcome| outcome.ink);
+        self.grey(Stage::Normalize, &print_mask(ink))
     }
 
     /// Returns the map from print pixels to pixels of the canvas on which scores are computed.

@@ -139,13 +139,8 @@ impl ItemImages {
             (view, png_rgb8(&view.print(&source.picture)))
         };
         let print_from_depth = &item.view.print_from_depth;
-        let [ink, known] = aligned.print_masks()?;
-        let print_mask = view.mask(&ink, &Affine2::IDENTITY);
-        let masks = PrintMasks {
-            specks: Mask::new(ink.width(), ink.height(), false),
-            ink,
-            known,
-        };
+        let masks = PrintMasks::from_grey(&aligned.print_grey()?);
+        let print_mask = view.mask(&masks.ink, &Affine2::IDENTITY);
         Ok(Self {
             view,
             canvas_from_print: inputs.canvas_from_print,

@@ -13,7 +13,7 @@ use crate::domain::artifact_role::{
 };
 use crate::domain::{FailureClass, Stage};
 use crate::raster::{DepthMap, png_grey8, png_grey16, png_mask};
-use crate::stages::normalize::{NormalizeError, Normalized};
+use crate::stages::normalize::{NormalizeError, Normalized, PrintMasks};
 use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
 use crate::store::Project;
@@ -99,8 +99,7 @@ impl PipelineExecutor {
         })?;
         pair.depth = Some(depth);
         let (outcome, json) = round_trip(&normalized.outcome)?;
-        let masks = normalized.prints.iter();
-        let masks: Vec<_> = masks.map(stage_output::encode_print_masks).collect();
+        let masks: Vec<_> = normalized.prints.iter().map(PrintMasks::to_grey).collect();
         let files = masks.iter().enumerate();
         let output = StageOutput {
             files: files
@@ -110,7 +109,8 @@ impl PipelineExecutor {
         };
         pair.normalized = Some(Normalized {
             outcome,
-            prints: masks.iter().map(stage_output::decode_print_masks).collect(),
+            // Decoded again, so that a resumed run gives the same results.
+            prints: masks.iter().map(PrintMasks::from_grey).collect(),
         });
         Ok(output)
     }

@@ -2,12 +2,12 @@
 
 use super::options::RunOptions;
 use super::pair_context::PairContext;
-use super::stage_output::{self, ExecutionError};
+use super::stage_output::ExecutionError;
 use crate::domain::artifact_role::{DEPTH, print_mask};
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh;
 use crate::raster::{self, DepthMap};
-use crate::stages::normalize::Normalized;
+use crate::stages::normalize::{Normalized, PrintMasks};
 use crate::stages::{Print, Scan};
 use crate::store::{ArtifactError, InputError, Project, open_input, read_input};
 
@@ -90,7 +90,7 @@ impl StageInputs {
         for ink in 0..outcome.inks.len() {
             let bytes = self.artifact(pair, Stage::Normalize, &print_mask(ink))?;
             let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
-            prints.push(stage_output::decode_print_masks(&grey));
+            prints.push(PrintMasks::from_grey(&grey));
         }
         Ok(Normalized { outcome, prints })
     }

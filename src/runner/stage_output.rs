@@ -9,15 +9,8 @@ use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
-use crate::raster::{DepthMap, Grid};
-use crate::stages::normalize::PrintMasks;
+use crate::raster::DepthMap;
 use crate::store::NewArtifact;
-
-/// Grey levels of the print mask.
-const INK: u8 = 255;
-const BACKGROUND: u8 = 0;
-const UNKNOWN: u8 = 128;
-const SPECK: u8 = 64;
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,29 +73,6 @@ pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
     }
 }
 
-/// Encodes ink, specks, background and unknown pixels as one image. Specks lie on known pixels only.
-pub(super) fn encode_print_masks(masks: &PrintMasks) -> Grid<u8> {
-    let PrintMasks { ink, specks, known } = masks;
-    Grid::from_fn(ink.width(), ink.height(), |x, y| {
-        match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
-            (true, _, _) => INK,
-            (false, true, true) => SPECK,
-            (false, true, false) => BACKGROUND,
-            (false, false, _) => UNKNOWN,
-        }
-    })
-}
-
-/// Decodes an image from [`encode_print_masks`]. Also used right after encoding, so that a resumed run gives the same
-/// results.
-pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
-    PrintMasks {
-        ink: grey.map(|grey| *grey == INK),
-        specks: grey.map(|grey| *grey == SPECK),
-        known: grey.map(|grey| *grey != UNKNOWN),
-    }
-}
-
 /// Returns the hash of a stage's numbers and files. Times are not included.
 pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     let result = json!({ "outcome": outcome, "files": files });
@@ -153,27 +123,9 @@ fn without_confidence(outcome: &MetricOutcome) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        BACKGROUND, INK, SPECK, UNKNOWN, decode_print_masks, encode_print_masks, metric_results,
-        result_hash,
-    };
+    use super::{metric_results, result_hash};
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
-    use crate::raster::Mask;
     use crate::runner::tests::values;
-    use crate::stages::normalize::PrintMasks;
-
-    #[test]
-    fn ink_counts_even_where_the_print_is_unknown() {
-        let masks = PrintMasks {
-            ink: Mask::from_fn(4, 1, |x, _| x == 0),
-            specks: Mask::from_fn(4, 1, |x, _| x == 3),
-            known: Mask::from_fn(4, 1, |x, _| x == 1 || x == 3),
-        };
-        let grey = encode_print_masks(&masks);
-        assert_eq!(grey.data(), [INK, BACKGROUND, UNKNOWN, SPECK]);
-        let back = decode_print_masks(&grey);
-        assert_eq!((back.ink, back.specks), (masks.ink, masks.specks));
-    }
 
     #[test]
     fn a_verdict_outlives_another_confidence_but_not_another_alignment() {

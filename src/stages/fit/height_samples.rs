@@ -26,7 +26,9 @@ pub(super) struct HeightSamples {
     /// Index of each point in the rendering, and the rendering's size.
     pub(super) places: Vec<usize>,
     pub(super) size: [usize; 2],
+    /// Middle of the rendering, in plane coordinates.
     pub(super) centre: [f64; 2],
+    /// Longest side of the view, in mesh units.
     pub(super) extent: f64,
     /// Range of the heights over the mean plane, without the lowest and the highest 3 %.
     pub(super) range: f64,

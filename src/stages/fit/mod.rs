@@ -26,7 +26,6 @@ mod wider_search;
 pub(super) use height_samples::quantile;
 pub use params::{FitError, FitParams};
 pub(super) use pca::{Axes, frame};
-
 pub use upper_surface::fit;
 
 /// Raised by every change of the code that may change results.

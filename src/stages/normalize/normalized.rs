@@ -2,7 +2,7 @@
 
 use super::params::{NormalizeError, NormalizeParams};
 use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
-use crate::raster::Mask;
+use crate::raster::{Grid, Mask};
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
 
@@ -18,6 +18,33 @@ pub struct PrintMasks {
 }
 
 impl PrintMasks {
+    const INK: u8 = 255;
+    const BACKGROUND: u8 = 0;
+    const UNKNOWN: u8 = 128;
+    const SPECK: u8 = 64;
+
+    /// Encodes ink, specks, background and unknown pixels as one image. Specks lie on known pixels only.
+    pub(crate) fn to_grey(&self) -> Grid<u8> {
+        let Self { ink, specks, known } = self;
+        Grid::from_fn(ink.width(), ink.height(), |x, y| {
+            match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
+                (true, _, _) => Self::INK,
+                (false, true, true) => Self::SPECK,
+                (false, true, false) => Self::BACKGROUND,
+                (false, false, _) => Self::UNKNOWN,
+            }
+        })
+    }
+
+    /// Decodes an image from [`Self::to_grey`].
+    pub(crate) fn from_grey(grey: &Grid<u8>) -> Self {
+        Self {
+            ink: grey.map(|grey| *grey == Self::INK),
+            specks: grey.map(|grey| *grey == Self::SPECK),
+            known: grey.map(|grey| *grey != Self::UNKNOWN),
+        }
+    }
+
     /// Returns the ink mask as a soft mask of zeros and ones.
     pub(crate) fn soft_ink(&self) -> SoftMask {
         SoftMask {
@@ -88,4 +115,24 @@ pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2>
         scale,
         [middle - scale * x, middle - scale * y],
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PrintMasks;
+    use crate::raster::Mask;
+
+    #[test]
+    fn ink_counts_even_where_the_print_is_unknown() {
+        let masks = PrintMasks {
+            ink: Mask::from_fn(4, 1, |x, _| x == 0),
+            specks: Mask::from_fn(4, 1, |x, _| x == 3),
+            known: Mask::from_fn(4, 1, |x, _| x == 1 || x == 3),
+        };
+        let grey = masks.to_grey();
+        // Ink, background, unknown, speck; the values are documented at `artifact_role::print_mask`.
+        assert_eq!(grey.data(), [255, 0, 128, 64]);
+        let back = PrintMasks::from_grey(&grey);
+        assert_eq!((back.ink, back.specks), (masks.ink, masks.specks));
+    }
 }

@@ -52,7 +52,7 @@ pub(crate) fn register(
         ..better
     };
     let alignments = [structure, density, ensemble];
-    let map = |alignment: &Alignment| {
+    let stroke_map = |alignment: &Alignment| {
         StrokeMap::of_alignment(
             depth,
             &normalized.prints[INK],
@@ -68,7 +68,7 @@ pub(crate) fn register(
         INK,
         target,
         &alignments,
-        map,
+        stroke_map,
         params.window,
     )
 }

@@ -15,6 +15,8 @@ pub(super) struct HalfCanvas {
     pub(super) specks: Mask,
     /// Distances to the edge of the ink.
     pub(super) edge: InkEdge,
+    /// Mean width of the ink's strokes in pixels of this canvas, at least 1.
+    pub(super) stroke_width: f64,
 }
 
 impl HalfCanvas {
@@ -51,6 +53,7 @@ impl HalfCanvas {
             levels,
             ink,
             specks,
+            stroke_width: stroke_width(&edge),
             edge,
         }
     }
@@ -58,16 +61,6 @@ impl HalfCanvas {
     /// Returns the stroke mask of a level above 0.
     pub(super) fn mask(&self, level: u16) -> Mask {
         self.levels.map(|l| *l >= level)
-    }
-
-    /// Returns the mean width of the ink's strokes in pixels of this canvas, at least 1. The mean distance to the edge of
-    /// a stroke is a quarter of its width.
-    pub(super) fn stroke_width(&self) -> f64 {
-        let inside = self.edge.distances().iter().filter(|d| **d > 0.0);
-        let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), d| {
-            (sum + f64::from(*d), count + 1)
-        });
-        (4.0 * sum / f64::from(count.max(1))).max(1.0)
     }
 
     /// Returns the signed distance to `edge`, in pixels, at each boundary between a set and an unset pixel of a mask.
@@ -105,6 +98,16 @@ impl HalfCanvas {
             }
         }
     }
+}
+
+/// Returns the mean width of the strokes with this edge, in pixels, at least 1. The mean distance to the edge of a stroke
+/// is a quarter of its width.
+fn stroke_width(edge: &InkEdge) -> f64 {
+    let inside = edge.distances().iter().filter(|d| **d > 0.0);
+    let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), d| {
+        (sum + f64::from(*d), count + 1)
+    });
+    (4.0 * sum / f64::from(count.max(1))).max(1.0)
 }
 
 /// Returns the canvas pixels in which the centre of at least one set pixel of `mask` lies.

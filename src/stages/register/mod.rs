@@ -116,7 +116,7 @@ pub fn register(
         })
         .collect();
     let canvas_print = canvas_print(normalized, search.ink);
-    let map = |alignment: &Alignment| {
+    let stroke_map = |alignment: &Alignment| {
         StrokeMap::of(&canvas, alignment.level, normalized.outcome.canvas_px)
     };
     let mut registered = score_alignments(
@@ -125,7 +125,7 @@ pub fn register(
         search.ink,
         canvas_print,
         &alignments,
-        map,
+        stroke_map,
         params.window,
     )?;
     let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);

@@ -50,7 +50,7 @@ pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
 }
 
 /// Warps the depth mask of each alignment to the canvas and scores it against `canvas_print`. `canvas_print` shows the
-/// interpretation of the print with the index `ink`. `map` maps where an alignment's mask and the ink disagree.
+/// interpretation of the print with the index `ink`. `stroke_map` returns the map of an alignment.
 ///
 /// # Errors
 /// Returns an error if a threshold leaves no strokes.
@@ -60,7 +60,7 @@ pub(crate) fn score_alignments(
     ink: usize,
     canvas_print: Mask,
     alignments: &[Alignment],
-    map: impl Fn(&Alignment) -> StrokeMap,
+    stroke_map: impl Fn(&Alignment) -> StrokeMap,
     window: SsimWindow,
 ) -> Result<Registered, RegisterError> {
     let canvas_from_print = normalized.outcome.inks[ink].canvas_from_print;
@@ -86,25 +86,15 @@ pub(crate) fn score_alignments(
         let twin = before.position(|other| {
             (other.level, other.print_from_depth) == (alignment.level, alignment.print_from_depth)
         });
-        let (scores, map) = if let Some(twin) = twin {
-            let MetricOutcome {
-                scores,
-                disagreement,
-                ..
-            } = metrics[twin];
-            let grey = stroke_maps[twin].clone();
-            (scores, StrokeMap { grey, disagreement })
+        let (scores, disagreement, grey) = if let Some(twin) = twin {
+            let like = &metrics[twin];
+            (like.scores, like.disagreement, stroke_maps[twin].clone())
         } else {
-            (score::score_masks(&print_means, mask), map(alignment))
+            let StrokeMap { grey, disagreement } = stroke_map(alignment);
+            (score::score_masks(&print_means, mask), disagreement, grey)
         };
-        metrics.push(outcome(
-            depth,
-            print_size,
-            alignment,
-            scores,
-            map.disagreement,
-        ));
-        stroke_maps.push(map.grey);
+        metrics.push(outcome(depth, print_size, alignment, scores, disagreement));
+        stroke_maps.push(grey);
     }
     Ok(Registered {
         outcome: RegisterOutcome {

@@ -2,23 +2,15 @@
 
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
+use super::unmatched::{BORDER_PX, tolerance_px};
 use crate::domain::{Affine2, Disagreement};
 use crate::raster::{DepthMap, Grid, Mask};
 use crate::stages::components::ConnectedComponents;
 use crate::stages::normalize::PrintMasks;
 
-/// Distance from the other image, beyond the spread of the ink, from which a pixel disagrees, as a share of the stroke
-/// width. Smaller distances are due to local misalignment and rough edges.
-const TOLERANCE: f64 = 0.3;
-/// Least tolerance in pixels of the half canvas.
-const TOLERANCE_PX: f64 = 1.5;
 /// Smallest area beyond the tolerance of a piece, in squares of the stroke width. Ends of strokes that are rounded or
 /// printed short have less.
 const SMALLEST_PIECE: f64 = 0.15;
-/// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
-/// lie there.
-const BORDER_PX: i64 = 2;
-
 /// Pixels at which a mask and the ink disagree, with their number of pieces and their areas.
 ///
 /// A piece has pixels that are farther from the other image than the spread of the ink and a tolerance. It extends from
@@ -60,8 +52,8 @@ impl StrokeMap {
         let wood = InkEdge::of(&mask);
         let mut distances = canvas.distances_at_edges(|at| mask.data()[at], &canvas.edge);
         let spread = InkEdge::mean_near(&mut distances);
-        let width = canvas.stroke_width();
-        let tolerance = (TOLERANCE * width).max(TOLERANCE_PX);
+        let width = canvas.stroke_width;
+        let tolerance = tolerance_px(width);
         // Heavy ink lies outside the strokes, and dry ink ends inside them.
         let sides = [
             (&mask, &canvas.edge, (-spread).max(0.0)),

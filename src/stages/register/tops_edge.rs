@@ -50,7 +50,7 @@ impl TopsEdge {
             .iter_mut()
             .map(|distances| InkEdge::mean_near(distances))
             .collect();
-        let width = canvas.stroke_width();
+        let width = canvas.stroke_width;
         let weight = |(k, (share, _)): (usize, &(f64, u16))| {
             if areas[k] == 0.0 {
                 return 0.0;

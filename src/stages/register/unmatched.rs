@@ -17,7 +17,13 @@ const TOLERANCE_PX: f64 = 1.5;
 const NEAR: f64 = 0.5;
 /// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
 /// lie there.
-const BORDER_PX: i64 = 2;
+pub(super) const BORDER_PX: i64 = 2;
+
+/// Returns the distance from the strokes of the other image, in pixels of the half canvas, from which a pixel has no
+/// partner. `stroke_width` is in the same pixels.
+pub(super) fn tolerance_px(stroke_width: f64) -> f64 {
+    (TOLERANCE * stroke_width).max(TOLERANCE_PX)
+}
 
 /// Strokes without a partner.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,8 +42,8 @@ impl Unmatched {
     /// wood above the highest one surely prints, and only ink outside the lowest one surely lies on no wood.
     pub(super) fn of(canvas: &HalfCanvas, [highest, lowest]: [u16; 2]) -> Self {
         let wood = InkEdge::of(&canvas.mask(lowest));
-        let width = canvas.stroke_width();
-        let tolerance = (TOLERANCE * width).max(TOLERANCE_PX) as f32;
+        let width = canvas.stroke_width;
+        let tolerance = tolerance_px(width) as f32;
         let is_far = |distance: &f32| *distance < -tolerance;
         let unknown = canvas.levels.map(|level| *level == 0);
         let squares = |alone: &Mask| {
