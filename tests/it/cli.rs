@@ -5,6 +5,9 @@ use std::process::Command;
 
 use serde_json::Value;
 
+/// Path of the binary.
+const BINARY: &str = env!("CARGO_BIN_EXE_mocban");
+
 /// The outcome of one call of the binary.
 pub(crate) struct Call {
     pub(crate) code: i32,
@@ -46,7 +49,19 @@ pub(crate) fn mocban(dir: &Path, args: &[&str]) -> Call {
 
 /// Returns a command that calls the binary.
 pub(crate) fn binary() -> Command {
-    without_settings(Command::new(env!("CARGO_BIN_EXE_mocban")))
+    without_settings(Command::new(BINARY))
+}
+
+/// Returns a command that runs the binary through a hard link beside `path`, because another user may not be allowed to
+/// enter the build folder. Runs the binary itself if the link would be on another file system.
+pub(crate) fn binary_beside(path: &Path) -> Command {
+    let link = path.with_file_name("mocban-link");
+    let is_linked = link.exists() || std::fs::hard_link(BINARY, &link).is_ok();
+    without_settings(Command::new(if is_linked {
+        &link
+    } else {
+        Path::new(BINARY)
+    }))
 }
 
 /// Returns a command that runs a script in the shell. The script may call the binary.

@@ -7,7 +7,7 @@ use std::path::Path;
 use mocban::store::Project;
 
 use crate::check::{at, below, done, exported, sql};
-use crate::cli::{binary, call, empty, mocban, shell};
+use crate::cli::{binary, binary_beside, call, empty, mocban, shell};
 
 /// Overwrites the catalog from `from` eighths to `to` eighths of its length with garbage. Returns the former content.
 pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<u8> {
@@ -136,7 +136,7 @@ fn wrong_counters_end_a_run_with_a_sentence_that_names_the_repair() {
 
 /// Calls the binary as a user who may read but not write there.
 fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
-    let mut command = binary();
+    let mut command = binary_beside(project.dir());
     command
         .current_dir("/")
         .arg("-C")
