@@ -82,6 +82,11 @@ pub(super) async fn write(
     context: &Context,
 ) -> anyhow::Result<(PathBuf, ContactSheet)> {
     let (project, catalog) = context.open_read_only().await?;
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None => project.dir().join("sheet.png"),
+    };
+    files::refuse_used_file(&path, &project, &catalog).await?;
     let options = ContactSheetOptions {
         metric: args.metric,
         pairs: select::some_or_all(&catalog, &args.pairs).await?,
@@ -97,10 +102,6 @@ pub(super) async fn write(
         let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
         return Err(Refusal::NothingSelected(text).into());
     }
-    let path = match &args.output {
-        Some(path) => path.clone(),
-        None => project.dir().join("sheet.png"),
-    };
     for (pair, why) in &sheet.problems {
         context.warn(&format!("{pair} is not drawn completely: {why}"));
     }

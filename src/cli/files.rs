@@ -7,8 +7,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 
 use super::exit::Refusal;
+use crate::catalog::Catalog;
 use crate::domain::sanitize;
-use crate::store::{CATALOG_FILE, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic};
+use crate::store::{
+    CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
+};
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;
@@ -71,6 +74,38 @@ pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     )))
 }
 
+/// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
+pub(super) async fn refuse_used_file(
+    path: &Path,
+    project: &Project,
+    catalog: &Catalog,
+) -> anyhow::Result<()> {
+    refuse_project_file(path)?;
+    // A file that does not exist is not an input.
+    let Ok(real) = path.canonicalize() else {
+        return Ok(());
+    };
+    // Two inputs may have the same file name in different folders, and an input may be a link.
+    let is_target = |stored: &String| {
+        let input = project.input_path(stored);
+        input == real || input.canonicalize().is_ok_and(|input| input == real)
+    };
+    let inputs = catalog.inputs_named([path, &real].map(file_name)).await?;
+    let Some((pair, _)) = inputs.into_iter().find(|(_, stored)| is_target(stored)) else {
+        return Ok(());
+    };
+    let shown = path.display();
+    Err(Refusal::Usage(format!(
+        "{shown} is an input of {pair}; name another file for the output"
+    ))
+    .into())
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
 pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
     if !std::fs::metadata(file)?.is_file() {
@@ -88,7 +123,6 @@ pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
 /// complete.
 pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
-    refuse_project_file(path)?;
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {

@@ -8,9 +8,11 @@ use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
+use super::exit::Refusal;
 use super::files::refuse_project_file;
 use super::global::{Global, LogFormat};
 use super::screen::{Palette, Screen};
+use crate::manifest::is_named_like_input;
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
@@ -44,6 +46,14 @@ fn writer(
         return Ok((BoxMakeWriter::new(move || writer.clone()), false));
     };
     refuse_project_file(path)?;
+    // Which files are inputs of the project is not known yet.
+    if is_named_like_input(path) && path.exists() {
+        let text = format!(
+            "{} is not a log file; name another file for the log",
+            path.display()
+        );
+        return Err(Refusal::Usage(text).into());
+    }
     let file = OpenOptions::new()
         .create(true)
         .append(true)

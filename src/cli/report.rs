@@ -59,6 +59,9 @@ fn share(text: &str) -> Result<f64, String> {
 
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
+    if let Some(path) = &args.output {
+        files::refuse_used_file(path, &project, &catalog).await?;
+    }
     context.warn_about_stale(&catalog).await?;
     let format = chosen_format(args.format, context);
     let mut pictures = GallerySelection::new(IMAGE_SEED);

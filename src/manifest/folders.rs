@@ -11,6 +11,11 @@ use crate::domain::PairName;
 const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
 const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
+/// Returns whether the extension of a path is that of a mesh or of a print.
+pub fn is_named_like_input(path: &Path) -> bool {
+    has_extension(path, &MESH_EXTENSIONS) || has_extension(path, &PRINT_EXTENSIONS)
+}
+
 /// The content of two directories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FolderPairs {

@@ -11,7 +11,7 @@ mod text;
 
 pub use self::csv::{parse_csv, read_csv};
 pub use error::ManifestError;
-pub use folders::{FolderPairs, pair_folders};
+pub use folders::{FolderPairs, is_named_like_input, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use row::{ManifestRow, RowIds};
 pub use text::{LineCounter, NotText, as_utf8, delimiter};

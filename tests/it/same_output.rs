@@ -248,6 +248,39 @@ fn an_output_replaces_no_file_of_a_project_and_no_backup() {
 }
 
 #[test]
+fn an_output_replaces_no_input_of_the_project() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let data = project.dir().join("data");
+    let of_pair = |path: &std::path::PathBuf| path.to_string_lossy().contains("upright-0001");
+    let paths = files(&data).into_keys().filter(of_pair);
+    let mut inputs: Vec<_> = paths.map(|path| data.join(path)).collect();
+    // The mesh, the print and the true mask.
+    assert_eq!(inputs.len(), 3);
+    let link = dir.path().join("link");
+    std::os::unix::fs::symlink(&inputs[0], &link).expect("a link");
+    inputs.push(link);
+    for file in inputs {
+        let before = std::fs::read(&file).expect("a file");
+        let name = file.to_str().expect("UTF-8");
+        for args in [&["report", "-o", name][..], &["contact-sheet", "-o", name]] {
+            let refused = at(&project, args).expect(2);
+            let wanted = "is an input of upright-0001; name another file";
+            assert!(refused.err.contains(wanted), "{args:?}: {}", refused.err);
+        }
+        if !name.ends_with("link") {
+            let log = at(&project, &["--log-file", name, "-v", "check"]).expect(2);
+            assert!(log.err.contains("is not a log file"), "{}", log.err);
+        }
+        assert!(before == std::fs::read(&file).expect("a file"), "{name}");
+    }
+    // The same file name elsewhere is no input.
+    for command in ["report", "contact-sheet"] {
+        at(&project, &[command, "-o", "../upright-0001.png"]).expect(0);
+    }
+}
+
+#[test]
 fn outputs_with_the_longest_names_are_written_and_longer_ones_refused_with_the_reason() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());

@@ -1,4 +1,4 @@
-//! Replaces the paths of meshes and prints, for a project that is restored at another place.
+//! Finds and replaces the paths of meshes and prints.
 
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
@@ -17,8 +17,28 @@ const UPDATE: &str = "
 UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = '', print_path = item.value ->> 2, print_stat = ''
 FROM json_each(?1) AS item WHERE pair.id = item.value ->> 0";
 
+/// Selects the input files whose paths end with one of two texts.
+const NAMED: &str = "
+SELECT name, path FROM (
+    SELECT id, name, mesh_path AS path FROM pair
+    UNION ALL SELECT id, name, print_path FROM pair
+    UNION ALL SELECT id, name, body ->> 'tops_mask' FROM pair JOIN truth ON truth.pair = pair.id
+) WHERE substr(path, -length(?1)) = ?1 OR substr(path, -length(?2)) = ?2 ORDER BY id";
+
 impl Catalog {
-    /// Replaces the paths of meshes and prints in one transaction. `find` receives a stored path and returns the new
+    /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name of
+    /// its pair.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn inputs_named(&self, file_names: [String; 2]) -> Result<Vec<(String, String)>> {
+        let [one, other] = file_names;
+        let query = sqlx::query_as(NAMED).bind(one).bind(other);
+        let mut conn = self.read_conn().await?;
+        Ok(query.fetch_all(&mut *conn).await?)
+    }
+
+    /// Replaces the paths of meshes and prints in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new
     /// one, or `None` to keep the stored path. Returns the paths that were kept.
     ///
     /// # Errors
