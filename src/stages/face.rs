@@ -20,6 +20,8 @@ const FACE_AREA: f64 = 0.3;
 const ENLARGED_BY: usize = 2;
 /// Number of times that the heights are split. The first splits may find the face, and the last one the tops.
 const ROUNDS: usize = 4;
+/// Thresholds that find the face are computed from every `SPLIT_STEP`-th height. Maps have thousands of heights.
+const SPLIT_STEP: usize = 4;
 
 /// A height at a position. `x` and `y` are shares of the map's width and height, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +41,8 @@ impl Face {
         let mut face = Self([const { 0..CELLS }; CELLS]);
         let mut inside = samples.to_vec();
         for _ in 0..ROUNDS {
-            let mut heights: Vec<f32> = inside.iter().map(|sample| sample.height).collect();
+            let some = inside.iter().step_by(SPLIT_STEP);
+            let mut heights: Vec<f32> = some.map(|sample| sample.height).collect();
             let Some(split) = binarize::split(&mut heights) else {
                 break;
             };
@@ -74,13 +77,11 @@ impl Face {
             *all += 1;
             *high += u32::from(f64::from(sample.height) > threshold);
         }
-        let mut points = Vec::new();
-        for (y, row) in cells.iter().enumerate() {
+        let ends = cells.map(|row| {
             let is_high = |[all, high]: &[u32; 2]| f64::from(*high) > LEAST_SHARE * f64::from(*all);
-            let ends = [row.iter().position(is_high), row.iter().rposition(is_high)];
-            points.extend(ends.into_iter().flatten().map(|x| [x as f64, y as f64]));
-        }
-        let hull = Self::hull(&points);
+            Some(row.iter().position(is_high)?..row.iter().rposition(is_high)? + 1)
+        });
+        let hull = Self::hull(&ends);
         let inner = hull.reduced();
         let (mut all_inside, mut high_inside) = (0, 0);
         for (row, columns) in cells.iter().zip(&inner.0) {
@@ -99,19 +100,25 @@ impl Face {
         }
     }
 
-    /// Returns the convex hull of cells. Returns all cells if there are no points.
-    fn hull(points: &[[f64; 2]]) -> Self {
-        let (Some([_, top]), Some([_, bottom])) = (points.first(), points.last()) else {
+    /// Returns the convex hull of cells, a range of columns for some of the rows. Returns all cells if there are none.
+    fn hull(ends: &[Option<Range<usize>>; CELLS]) -> Self {
+        let rows = || {
+            (0..)
+                .zip(ends)
+                .filter_map(|(y, row)| Some((y, row.as_ref()?)))
+        };
+        let left = left_bounds(rows().map(|(y, row)| [row.start as i64, y]));
+        // The right boundary is the left boundary of the reflected cells.
+        let right = left_bounds(rows().map(|(y, row)| [-(row.end as i64), y]));
+        let Some((top, _)) = rows().next() else {
             return Self([const { 0..CELLS }; CELLS]);
         };
-        Self(std::array::from_fn(|y| {
-            let y = y as f64;
-            if y < *top || y > *bottom {
-                return 0..0;
-            }
-            let [left, right] = across(points, y);
-            left.ceil() as usize..right.floor() as usize + 1
-        }))
+        let mut hull = Self([const { 0..0 }; CELLS]);
+        let of_rows = hull.0.iter_mut().skip(top as usize);
+        for (row, (left, right)) in of_rows.zip(left.into_iter().zip(right)) {
+            *row = left as usize..-right as usize;
+        }
+        hull
     }
 
     /// Returns the cells whose eight neighbours are on the face.
@@ -159,20 +166,29 @@ fn cell_of(sample: &PositionedHeight) -> [usize; 2] {
     [sample.x, sample.y].map(|at| ((at * CELLS as f32) as usize).min(CELLS - 1))
 }
 
-/// Returns the leftmost and the rightmost x of the convex hull of points at the height `y`. The hull must reach `y`.
-///
-/// Every point on the hull's boundary lies on a segment between two of the points, so all segments that cross `y` are
-/// compared. There are at most 64 points.
-fn across(points: &[[f64; 2]], y: f64) -> [f64; 2] {
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for [x0, y0] in points {
-        for [x1, y1] in points.iter().filter(|[_, y1]| *y0 <= y && y <= *y1) {
-            let share = if y1 > y0 { (y - y0) / (y1 - y0) } else { 0.0 };
-            let x = x0 + share * (x1 - x0);
-            range = [range[0].min(x), range[1].max(x)];
+/// Returns the smallest whole x inside the convex hull of points, for each y from the first to the last point. `points`
+/// yields `[x, y]` with increasing y.
+fn left_bounds(points: impl Iterator<Item = [i64; 2]>) -> Vec<i64> {
+    // Corners of the hull's left boundary.
+    let mut corners: Vec<[i64; 2]> = Vec::new();
+    for [x, y] in points {
+        while let [.., [x0, y0], [x1, y1]] = corners[..] {
+            let is_left_of_chord = (x1 - x0) * (y - y0) < (x - x0) * (y1 - y0);
+            if is_left_of_chord {
+                break;
+            }
+            corners.pop();
         }
+        corners.push([x, y]);
     }
-    range
+    let mut bounds: Vec<i64> = corners.first().map(|[x, _]| *x).into_iter().collect();
+    for side in corners.windows(2) {
+        let [[x0, y0], [x1, y1]] = [side[0], side[1]];
+        let height = y1 - y0;
+        // Rounds up.
+        bounds.extend((1..=height).map(|down| x0 - ((x0 - x1) * down).div_euclid(height)));
+    }
+    bounds
 }
 
 #[cfg(test)]
