@@ -23,12 +23,25 @@ const ROUNDS: usize = 4;
 /// Thresholds that find the face are computed from every `SPLIT_STEP`-th height. Maps have thousands of heights.
 const SPLIT_STEP: usize = 4;
 
-/// A height at a position. `x` and `y` are shares of the map's width and height, 0..=1.
+/// A height and the cell in which it lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PositionedHeight {
-    pub(super) x: f32,
-    pub(super) y: f32,
     pub(super) height: f32,
+    column: u8,
+    row: u8,
+}
+
+impl PositionedHeight {
+    /// Returns a height at a position, given as shares of the map's width and height, 0..=1.
+    pub(super) fn new(position: [f32; 2], height: f32) -> Self {
+        let cell = position.map(|at| ((at * CELLS as f32) as u8).min(CELLS as u8 - 1));
+        let [column, row] = cell;
+        Self {
+            height,
+            column,
+            row,
+        }
+    }
 }
 
 /// Cells of a height map that show the carved face: a range of columns for each row.
@@ -63,8 +76,7 @@ impl Face {
     }
 
     fn contains(&self, sample: &PositionedHeight) -> bool {
-        let [column, row] = cell_of(sample);
-        self.0[row].contains(&column)
+        self.0[usize::from(sample.row)].contains(&usize::from(sample.column))
     }
 
     /// Returns the convex hull of the cells in which enough heights lie above a threshold. The hull of a face is
@@ -72,8 +84,7 @@ impl Face {
     fn around(samples: &[PositionedHeight], threshold: f64) -> Self {
         let mut cells = [[[0_u32; 2]; CELLS]; CELLS];
         for sample in samples {
-            let [column, row] = cell_of(sample);
-            let [all, high] = &mut cells[row][column];
+            let [all, high] = &mut cells[usize::from(sample.row)][usize::from(sample.column)];
             *all += 1;
             *high += u32::from(f64::from(sample.height) > threshold);
         }
@@ -161,11 +172,6 @@ impl Face {
     }
 }
 
-/// Returns the cell of a sample, as column and row.
-fn cell_of(sample: &PositionedHeight) -> [usize; 2] {
-    [sample.x, sample.y].map(|at| ((at * CELLS as f32) as usize).min(CELLS - 1))
-}
-
 /// Returns the smallest whole x inside the convex hull of points, for each y from the first to the last point. `points`
 /// yields `[x, y]` with increasing y.
 fn left_bounds(points: impl Iterator<Item = [i64; 2]>) -> Vec<i64> {
@@ -216,11 +222,8 @@ mod tests {
                 } else {
                     f64::from(u8::from(is_bar))
                 };
-                samples.push(PositionedHeight {
-                    x: x as f32 / SIDE as f32,
-                    y: y as f32 / SIDE as f32,
-                    height: height as f32,
-                });
+                let position = [x, y].map(|at| at as f32 / SIDE as f32);
+                samples.push(PositionedHeight::new(position, height as f32));
             }
         }
         samples
@@ -252,7 +255,7 @@ mod tests {
     fn a_single_stroke_keeps_ground_around_it() {
         let mut samples = block(200.0);
         for sample in &mut samples {
-            sample.height = f32::from(u8::from((0.45..0.55).contains(&sample.y)));
+            sample.height = f32::from(u8::from((15..17).contains(&sample.row)));
         }
         let heights = Face::of(&samples).heights(&samples);
         let ground = heights.iter().filter(|height| **height == 0.0).count();

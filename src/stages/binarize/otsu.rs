@@ -53,10 +53,12 @@ fn split_sorted(values: &[f32]) -> Option<Split> {
 const DIGITS: [u32; 3] = [0, 11, 22];
 /// Number of values of a digit.
 const DIGIT_VALUES: usize = 1 << 11;
+/// Fewer values are sorted faster by comparison.
+const SHORT: usize = DIGIT_VALUES / 4;
 
 /// Sorts in the order of `total_cmp`: radix sort with three digits.
 fn sort(values: &mut [f32]) {
-    if values.len() < DIGIT_VALUES {
+    if values.len() < SHORT {
         values.sort_unstable_by(f32::total_cmp);
         return;
     }

@@ -111,10 +111,10 @@ impl HeightSamples {
     pub(super) fn positioned_heights(&self, surface: &Coefficients) -> Vec<PositionedHeight> {
         let [width, height] = self.size;
         let residuals = self.points.residuals(surface);
-        let sample = |(residual, place): (&f64, &usize)| PositionedHeight {
-            x: (place % width) as f32 / width as f32,
-            y: (place / width) as f32 / height as f32,
-            height: (residual * self.extent) as f32,
+        let sample = |(residual, place): (&f64, &usize)| {
+            let x = (place % width) as f32 / width as f32;
+            let y = (place / width) as f32 / height as f32;
+            PositionedHeight::new([x, y], (residual * self.extent) as f32)
         };
         residuals.iter().zip(&self.places).map(sample).collect()
     }

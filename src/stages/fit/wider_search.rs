@@ -258,7 +258,11 @@ pub(super) fn region(
     // Keeps corners of faces on the boundary inside despite rounding.
     let slack = 1e-4 * side.extent;
     // A table that was cut off lies below the lowest corner.
-    let lowest = bounds(mesh, &box_from_mesh)[0][2] - slack;
+    let heights = mesh
+        .vertices
+        .iter()
+        .map(|vertex| box_from_mesh.apply(vertex)[2]);
+    let lowest = heights.fold(f64::INFINITY, f64::min) - slack;
     let down = lowest.max(-DEEPEST * side.relief - side.bow_height);
     let up = HIGHEST * side.relief + side.bow_height;
     ScanRegion {

@@ -97,11 +97,12 @@ fn samples(depth: &DepthMap, bounds: PixelBox) -> Vec<PositionedHeight> {
     for y in sampled(bounds.y0, bounds.y1) {
         let row = depth.levels.row(y);
         for x in sampled(bounds.x0, bounds.x1).filter(|x| row[*x] > 0) {
-            samples.push(PositionedHeight {
-                x: (x - bounds.x0) as f32 / width,
-                y: (y - bounds.y0) as f32 / height,
-                height: depth.scale.height(row[x]) as f32,
-            });
+            let position = [
+                (x - bounds.x0) as f32 / width,
+                (y - bounds.y0) as f32 / height,
+            ];
+            let height = depth.scale.height(row[x]) as f32;
+            samples.push(PositionedHeight::new(position, height));
         }
     }
     samples

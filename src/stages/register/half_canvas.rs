@@ -89,12 +89,14 @@ impl HalfCanvas {
                 visit(one, other);
             }
         };
-        for at in 0..width * height {
-            if (at + 1) % width > 0 {
+        for row in (0..height).map(|y| y * width) {
+            for at in row..row + width - 1 {
                 visit_known(at, at + 1);
             }
-            if at + width < width * height {
-                visit_known(at, at + width);
+            if row + width < width * height {
+                for at in row..row + width {
+                    visit_known(at, at + width);
+                }
             }
         }
     }
