@@ -64,18 +64,18 @@ impl Face {
                 break;
             }
             face = next;
-            inside.retain(|sample| face.contains(sample));
+            inside.retain(|sample| face.contains(*sample));
         }
         face
     }
 
     /// Returns the heights of the samples on the face.
     pub(super) fn heights(&self, samples: &[PositionedHeight]) -> Vec<f32> {
-        let inside = samples.iter().filter(|sample| self.contains(sample));
+        let inside = samples.iter().filter(|sample| self.contains(**sample));
         inside.map(|sample| sample.height).collect()
     }
 
-    fn contains(&self, sample: &PositionedHeight) -> bool {
+    fn contains(&self, sample: PositionedHeight) -> bool {
         self.0[usize::from(sample.row)].contains(&usize::from(sample.column))
     }
 
