@@ -146,13 +146,19 @@ pub(crate) fn attempts(project: &Project) -> Vec<usize> {
 
 /// Returns how many stages of all pairs are completed. A run may be in progress.
 pub(crate) fn stages_done(project: &Project) -> u64 {
+    let done = Stage::ALL.map(|stage| pairs_done(project, stage));
+    done.iter().sum()
+}
+
+/// Returns how many pairs have completed `stage`. A run may be in progress.
+pub(crate) fn pairs_done(project: &Project, stage: Stage) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let path = project.catalog_path();
         let catalog = Catalog::open_read_only(&path).await.expect("a catalog");
         let fingerprints = Fingerprints::new(|_| serde_json::Value::Null);
         let status = catalog.status(&fingerprints).await.expect("a status");
-        status.stages.values().map(|stage| stage.done).sum()
+        status.stages[&stage].done
     })
 }
 
