@@ -5,8 +5,9 @@
 //! low confidence. The pose weights predict whether rotation and landmarks are right. The mask weights predict whether
 //! the mask is right, and are fitted only on examples with a right pose. The character weights predict whether print
 //! and relief show the same character, and are fitted on examples with a right pose and on look-alikes, which the pose
-//! weights leave out. All are fitted by logistic regression with a ridge penalty on standardized inputs, using Newton's
-//! method (iteratively reweighted least squares).
+//! weights leave out. Look-alikes have less weight than pairs there, because they are rarer in practice. All are fitted
+//! by logistic regression with a ridge penalty on standardized inputs, using Newton's method (iteratively reweighted
+//! least squares).
 
 use mocban::report::ground_truth::{
     MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord,
@@ -29,6 +30,11 @@ use super::workers::in_order;
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;
+/// Weight of a result of a look-alike in the fit of the character model. Results of matching pairs have the weight 1.
+const LOOK_ALIKE_WEIGHT: f64 = 0.2;
+/// The fitted weights of the character model are multiplied by this factor. More look-alikes then have a confidence
+/// below 0.5, and hardly more pairs, at a slightly higher calibration error.
+const CHARACTER_FACTOR: f64 = 1.5;
 
 const NOTE: &str = "\
 Pairs and decoys of the held-out seeds, one row for each range of confidence: number of results, mean confidence and \
@@ -44,6 +50,17 @@ struct Example {
     is_look_alike: bool,
 }
 
+impl Example {
+    /// Returns the weight of the example in the fits.
+    fn share(&self) -> f64 {
+        if self.is_look_alike {
+            LOOK_ALIKE_WEIGHT
+        } else {
+            1.0
+        }
+    }
+}
+
 /// A logistic model, one factor of the confidence.
 struct Model {
     /// Name of the constant with the weights.
@@ -54,6 +71,8 @@ struct Model {
     is_used: fn(&Example) -> bool,
     /// Returns what the model predicts.
     label: fn(&Example) -> bool,
+    /// The fitted weights are multiplied by this factor.
+    factor: f64,
 }
 
 /// All factors of the confidence.
@@ -63,18 +82,21 @@ const MODELS: [Model; 3] = [
         inputs: |inputs| &inputs.pose,
         is_used: |example| !example.is_look_alike,
         label: |example| example.is_pose_right,
+        factor: 1.0,
     },
     Model {
         constant: "MASK",
         inputs: |inputs| &inputs.mask,
         is_used: |example| example.is_pose_right,
         label: |example| example.is_mask_right,
+        factor: 1.0,
     },
     Model {
         constant: "CHARACTER",
         inputs: |inputs| &inputs.character,
         is_used: |example| example.is_pose_right || example.is_look_alike,
         label: |example| !example.is_look_alike,
+        factor: CHARACTER_FACTOR,
     },
 ];
 
@@ -154,13 +176,15 @@ fn fit(examples: &[Example]) -> Weights {
         let used: Vec<&Example> = examples.iter().filter(|e| (model.is_used)(e)).collect();
         let inputs: Vec<&[f64]> = used.iter().map(|e| (model.inputs)(&e.inputs)).collect();
         let labels: Vec<bool> = used.iter().map(|e| (model.label)(e)).collect();
-        logistic_regression(&inputs, &labels)
+        let shares: Vec<f64> = used.iter().map(|e| e.share()).collect();
+        let weights = logistic_regression(&inputs, &labels, &shares);
+        weights.iter().map(|weight| weight * model.factor).collect()
     }))
 }
 
 /// Fits a logistic regression with a ridge penalty. The first input of each row is the constant 1, which is not
-/// penalized.
-fn logistic_regression(inputs: &[&[f64]], labels: &[bool]) -> Vec<f64> {
+/// penalized. `shares` are the weights of the rows.
+fn logistic_regression(inputs: &[&[f64]], labels: &[bool], shares: &[f64]) -> Vec<f64> {
     let (count, width) = (inputs.len(), inputs.first().map_or(0, |row| row.len()));
     let column = |k: usize| inputs.iter().map(move |row| row[k]);
     let scale: Vec<(f64, f64)> = (0..width)
@@ -178,14 +202,16 @@ fn logistic_regression(inputs: &[&[f64]], labels: &[bool]) -> Vec<f64> {
         (inputs[i][k] - scale[k].0) / scale[k].1
     });
     let y = DVector::from_fn(count, |i, _| f64::from(u8::from(labels[i])));
+    let shares = DVector::from_column_slice(shares);
     let penalty = DVector::from_fn(width, |k, _| if k == 0 { 1e-9 } else { RIDGE });
     let mut weights = DVector::zeros(width);
     for _ in 0..MAX_STEPS {
         let p = (&x * &weights).map(|sum: f64| 1.0 / (1.0 + (-sum).exp()));
-        let gradient = x.transpose() * (&y - &p) - penalty.component_mul(&weights);
+        let residuals = (&y - &p).component_mul(&shares);
+        let gradient = x.transpose() * residuals - penalty.component_mul(&weights);
         let mut weighted = x.clone();
-        for (mut row, p) in weighted.row_iter_mut().zip(p.iter()) {
-            row *= (p * (1.0 - p)).max(1e-9);
+        for ((mut row, p), share) in weighted.row_iter_mut().zip(&p).zip(&shares) {
+            row *= share * (p * (1.0 - p)).max(1e-9);
         }
         let hessian = x.transpose() * weighted + DMatrix::from_diagonal(&penalty);
         let Some(step) = hessian.cholesky().map(|factor| factor.solve(&gradient)) else {

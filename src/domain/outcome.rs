@@ -279,6 +279,9 @@ pub struct PoseFeatures {
     /// width.
     #[serde(default)]
     pub edge_scatter: f64,
+    /// Area of the ink, in squares of the stroke width: how many strokes the print shows.
+    #[serde(default)]
+    pub ink_area: f64,
 }
 
 /// Alignment and scores of one metric: one row of the catalog and of the export.

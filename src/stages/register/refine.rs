@@ -169,6 +169,7 @@ impl CompetingPoses {
             tops_alone: 0.0,
             ink_alone: 0.0,
             edge_scatter: 0.0,
+            ink_area: 0.0,
         }
     }
 }

@@ -214,6 +214,7 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
         tops_alone: 0.0,
         ink_alone: 0.0,
         edge_scatter: 0.1,
+        ink_area: 25.0,
     };
     assert_eq!(require_match(&alike, &params), Ok(()));
     assert_eq!(require_character(&alike, &params), Ok(()));

@@ -35,6 +35,8 @@ pub(super) struct Unmatched {
     /// Mean absolute deviation of the distances from the ink's edge to the edge of the strokes, from their median, as a
     /// share of the stroke width. The median is the spread of the ink.
     pub(super) edge_scatter: f64,
+    /// Area of the ink, in squares of the stroke width.
+    pub(super) ink_area: f64,
 }
 
 impl Unmatched {
@@ -67,6 +69,7 @@ impl Unmatched {
             tops_alone: squares(&tops),
             ink_alone: squares(&ink),
             edge_scatter: mean_deviation(&mut edge, NEAR * width) / width,
+            ink_area: canvas.ink.count() as f64 / (width * width),
         }
     }
 }
