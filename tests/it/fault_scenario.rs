@@ -92,13 +92,13 @@ fn assert_outcome(result: &Call, end: End, root: &Path, at: &str) {
         assert!(result.err.lines().any(is_warned), "{at}");
         return;
     }
-    // Settings and lists that cannot be read are an error of usage.
-    let is_usage = result.code == 2 && result.err.starts_with("error: cannot read ");
-    assert!(result.code == 1 || is_usage, "{at}");
     // Warnings and log lines are not errors.
     let lines = result.err.lines();
     let mut lines = lines.filter(|line| !line.starts_with("warning: ") && !line.contains(" WARN "));
     let error = lines.next().unwrap_or_default();
+    // Settings and lists that cannot be read are an error of usage.
+    let is_usage = result.code == 2 && error.starts_with("error: cannot read ");
+    assert!(result.code == 1 || is_usage, "{at}");
     assert_eq!(lines.next(), None, "{at}");
     assert!(error.starts_with("error: "), "{at}");
     assert!(has_reason(error, root), "{at}");
