@@ -4,7 +4,7 @@
 //! in both ways: it has a stroke that the relief lacks, and lacks one that the relief has.
 
 use super::half_canvas::HalfCanvas;
-use super::ink_edge::InkEdge;
+use super::ink_edge::{InkEdge, REACH};
 use crate::raster::Mask;
 use crate::stages::components::ConnectedComponents;
 
@@ -20,9 +20,10 @@ const NEAR: f64 = 0.5;
 pub(super) const BORDER_PX: i64 = 2;
 
 /// Returns the distance from the strokes of the other image, in pixels of the half canvas, from which a pixel has no
-/// partner. `stroke_width` is in the same pixels.
+/// partner. `stroke_width` is in the same pixels. Distances of [`REACH`] and more are not measured, so the result is
+/// smaller.
 pub(super) fn tolerance_px(stroke_width: f64) -> f64 {
-    (TOLERANCE * stroke_width).max(TOLERANCE_PX)
+    (TOLERANCE * stroke_width).clamp(TOLERANCE_PX, (REACH - 1) as f64)
 }
 
 /// Strokes without a partner.
@@ -91,7 +92,7 @@ fn mean_deviation(values: &mut [f32], most: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Unmatched, mean_deviation};
+    use super::{TOLERANCE_PX, Unmatched, mean_deviation, tolerance_px};
     use crate::raster::{Grid, Mask};
     use crate::stages::register::half_canvas::HalfCanvas;
 
@@ -129,6 +130,13 @@ mod tests {
         let lost = unmatched(missing, all, 0);
         assert!((6.0..9.0).contains(&lost.ink_alone), "{lost:?}");
         assert_eq!(lost.tops_alone, 0.0);
+    }
+
+    #[test]
+    fn tolerance_grows_with_the_strokes_up_to_the_largest_measured_distance() {
+        assert_eq!(tolerance_px(1.0), TOLERANCE_PX);
+        assert_eq!(tolerance_px(20.0), 6.0);
+        assert_eq!(tolerance_px(30.0), 7.0);
     }
 
     #[test]
