@@ -44,7 +44,8 @@ pub enum FitError {
     NoSurface(usize),
     /// Nothing is carved.
     #[error(
-        "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
+        "no carving found: the likeliest side has a relief of {relief:.4} on an extent of {extent:.4} (mesh units), a \
+         share below fit.min_relief {min_relief}{}", if *searched { "; no other side or part resembles the print" } else { "" }
     )]
     NoRelief {
         /// Relief found, in mesh units.
@@ -53,6 +54,8 @@ pub enum FitError {
         extent: f64,
         /// The setting.
         min_relief: f64,
+        /// The other sides and the parts of the scan were compared with the print.
+        searched: bool,
     },
     /// RANSAC found no plane.
     #[error("plane fit found {inliers} inliers of {taken} selected points, needs {needs}")]

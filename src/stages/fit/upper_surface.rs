@@ -84,6 +84,7 @@ pub fn fit(
             relief: fine.relief,
             extent: fine.extent,
             min_relief: params.min_relief,
+            searched: inks.is_some(),
         });
     }
     // The rest of the scan is not the face: side walls, a foot or a table.

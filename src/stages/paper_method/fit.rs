@@ -42,6 +42,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
             relief,
             extent,
             min_relief: params.min_relief,
+            searched: false,
         });
     }
     let squares: f64 = inliers.iter().map(|p| height(p).powi(2)).sum();
