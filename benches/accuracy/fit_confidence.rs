@@ -4,10 +4,10 @@
 //! look-alike, a mirrored mesh, an uncarved plate). `register.min_confidence` is 0, so that no alignment is refused for
 //! low confidence. The pose weights predict whether rotation and landmarks are right. The mask weights predict whether
 //! the mask is right, and are fitted only on examples with a right pose. The character weights predict whether print
-//! and relief show the same character, and are fitted on examples with a right pose and on look-alikes, which the pose
-//! weights leave out. Look-alikes have less weight than pairs there, because they are rarer in practice. All are fitted
-//! by logistic regression with a ridge penalty on standardized inputs, using Newton's method (iteratively reweighted
-//! least squares).
+//! and relief show the same character, and are fitted on examples with a right pose and on wrong prints. The pose
+//! weights leave out prints of similar characters. Wrong prints have less weight than pairs in the character model,
+//! because they are rarer in practice. All are fitted by logistic regression with a ridge penalty on standardized
+//! inputs, using Newton's method (iteratively reweighted least squares).
 
 use mocban::report::ground_truth::{
     MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord,
@@ -30,9 +30,9 @@ use super::workers::in_order;
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;
-/// Weight of a result of a look-alike in the fit of the character model. Results of matching pairs have the weight 1.
-const LOOK_ALIKE_WEIGHT: f64 = 0.2;
-/// The fitted weights of the character model are multiplied by this factor. More look-alikes then have a confidence
+/// Weight of a result of a wrong print in the fit of the character model. Results of matching pairs have the weight 1.
+const WRONG_PRINT_WEIGHT: f64 = 0.2;
+/// The fitted weights of the character model are multiplied by this factor. More wrong prints then have a confidence
 /// below 0.5, and hardly more pairs, at a slightly higher calibration error.
 const CHARACTER_FACTOR: f64 = 1.5;
 
@@ -46,19 +46,8 @@ struct Example {
     inputs: ConfidenceInputs,
     is_pose_right: bool,
     is_mask_right: bool,
-    /// Whether the print shows a character with nearly the same strokes.
-    is_look_alike: bool,
-}
-
-impl Example {
-    /// Returns the weight of the example in the fits.
-    fn share(&self) -> f64 {
-        if self.is_look_alike {
-            LOOK_ALIKE_WEIGHT
-        } else {
-            1.0
-        }
-    }
+    /// What was changed so that print and relief do not match. `None` for a pair as generated.
+    decoy: Option<Decoy>,
 }
 
 /// A logistic model, one factor of the confidence.
@@ -71,6 +60,8 @@ struct Model {
     is_used: fn(&Example) -> bool,
     /// Returns what the model predicts.
     label: fn(&Example) -> bool,
+    /// Weight of the results of decoys in the fit. Results of matching pairs have the weight 1.
+    decoy_weight: f64,
     /// The fitted weights are multiplied by this factor.
     factor: f64,
 }
@@ -80,8 +71,9 @@ const MODELS: [Model; 3] = [
     Model {
         constant: "POSE",
         inputs: |inputs| &inputs.pose,
-        is_used: |example| !example.is_look_alike,
+        is_used: |example| example.decoy != Some(Decoy::LookAlike),
         label: |example| example.is_pose_right,
+        decoy_weight: 1.0,
         factor: 1.0,
     },
     Model {
@@ -89,13 +81,18 @@ const MODELS: [Model; 3] = [
         inputs: |inputs| &inputs.mask,
         is_used: |example| example.is_pose_right,
         label: |example| example.is_mask_right,
+        decoy_weight: 1.0,
         factor: 1.0,
     },
     Model {
         constant: "CHARACTER",
         inputs: |inputs| &inputs.character,
-        is_used: |example| example.is_pose_right || example.is_look_alike,
-        label: |example| !example.is_look_alike,
+        is_used: |example| {
+            example.is_pose_right
+                || matches!(example.decoy, Some(Decoy::WrongPrint | Decoy::LookAlike))
+        },
+        label: |example| example.decoy.is_none(),
+        decoy_weight: WRONG_PRINT_WEIGHT,
         factor: CHARACTER_FACTOR,
     },
 ];
@@ -142,7 +139,7 @@ fn examples(cases: &[Case], method: &Method, options: &Options) -> anyhow::Resul
                     inputs: *inputs,
                     is_pose_right: false,
                     is_mask_right: false,
-                    is_look_alike: kind == Decoy::LookAlike,
+                    decoy: Some(kind),
                 }));
             }
         }
@@ -166,7 +163,7 @@ fn example(inputs: &ConfidenceInputs, errors: &TruthErrors) -> Example {
         inputs: *inputs,
         is_pose_right: errors.angle_deg <= MAX_ANGLE_DEG && errors.tre_pct <= MAX_TRE_PCT,
         is_mask_right: errors.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU),
-        is_look_alike: false,
+        decoy: None,
     }
 }
 
@@ -176,7 +173,11 @@ fn fit(examples: &[Example]) -> Weights {
         let used: Vec<&Example> = examples.iter().filter(|e| (model.is_used)(e)).collect();
         let inputs: Vec<&[f64]> = used.iter().map(|e| (model.inputs)(&e.inputs)).collect();
         let labels: Vec<bool> = used.iter().map(|e| (model.label)(e)).collect();
-        let shares: Vec<f64> = used.iter().map(|e| e.share()).collect();
+        let share = |example: &&Example| match example.decoy {
+            Some(_) => model.decoy_weight,
+            None => 1.0,
+        };
+        let shares: Vec<f64> = used.iter().map(share).collect();
         let weights = logistic_regression(&inputs, &labels, &shares);
         weights.iter().map(|weight| weight * model.factor).collect()
     }))

@@ -40,11 +40,10 @@ pub const REVISION: u32 = 17;
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
-/// A pair is refused if its pose is less probable than `CLEAR_POSE`, and if the probability of the pose, multiplied by
-/// the probability of the same character, is below this share of `min_confidence`. Damaged blocks and dry prints of the
-/// right character have strokes without a partner too, but a clear pose.
-const UNLIKELY: f64 = 0.06;
-const CLEAR_POSE: f64 = 0.9;
+/// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
+/// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
+/// strokes without a partner too.
+const UNLIKELY: f64 = 0.1;
 
 /// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
 /// a character, so these tops are the carved ground, seen from the back of the scanned surface.
@@ -135,8 +134,7 @@ pub fn register(
     Ok(registered)
 }
 
-/// Refuses pairs with a doubtful pose whose strokes without a partner almost rule out that print and relief show the
-/// same character.
+/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character.
 fn require_character(
     features: &PoseFeatures,
     params: &RegisterParams,
@@ -145,7 +143,7 @@ fn require_character(
         confidence::of_pose(features),
         confidence::of_character(features),
     ];
-    if pose < CLEAR_POSE && pose * character < UNLIKELY * params.min_confidence {
+    if pose * character < UNLIKELY * params.min_confidence {
         return Err(RegisterError::OtherCharacter { pose, character });
     }
     Ok(())

@@ -73,9 +73,9 @@ pub enum RegisterError {
         "the strokes of the print match the valleys of the relief, not its tops; was the mesh mirrored, or does it show the back of the scanned surface?"
     )]
     Inverted,
-    /// The pose is doubtful, and relief and print have strokes that the other one lacks.
+    /// Strokes of the relief or of the print have no partner in the other one.
     #[error(
-        "relief and print both have strokes that the other one lacks, and no pose fits well (confidence in the pose {pose:.2}, in the same character {character:.3}); is it the print of another character?"
+        "relief and print have strokes that the other one lacks (confidence in the pose {pose:.2}, in the same character {character:.3}); is it the print of another character?"
     )]
     OtherCharacter {
         /// Probability that the best pose is right.
