@@ -34,7 +34,7 @@ use metric_thresholds::ChosenThreshold;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 17;
+pub const REVISION: u32 = 18;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
@@ -43,7 +43,7 @@ const MIRROR_WINS: f64 = 1.06;
 /// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
 /// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
 /// strokes without a partner too.
-const UNLIKELY: f64 = 0.1;
+const UNLIKELY: f64 = 0.05;
 
 /// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
 /// a character, so these tops are the carved ground, seen from the back of the scanned surface.
