@@ -1,5 +1,7 @@
 //! Finds the parts of a scan that may be the block. Debris and a table below the block are left out.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
@@ -97,28 +99,39 @@ fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> 
     Some((layer, low + (fullest + 1) as f64 * layer))
 }
 
-/// Returns a mesh without the faces at spikes. A vertex is a spike if in most of its faces the two edges that meet
-/// there are much longer than the third edge.
+/// Returns a mesh without the faces at spikes. A point is a spike if in most of its faces the two edges that meet there
+/// are much longer than the third edge.
 pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
-    // Number of faces at each vertex, and how many of them are narrow there.
+    let points = points(mesh);
+    // Number of faces at each point, and how many of them are narrow there.
     let mut faces = vec![[0_u32; 2]; mesh.vertices.len()];
     for face in &mesh.triangles {
         let at = corners(mesh, face);
         let edge = |from: usize, to: usize| (at[to % 3] - at[from % 3]).norm();
         for k in 0..3 {
-            let [all, narrow] = &mut faces[face[k] as usize];
+            let [all, narrow] = &mut faces[points[face[k] as usize] as usize];
             let opposite = edge(k + 1, k + 2);
             *all += 1;
             *narrow += u32::from(edge(k, k + 1).min(edge(k + 2, k)) > NARROW * opposite);
         }
     }
     let is_spike = |corner: &u32| {
-        let [all, narrow] = faces[*corner as usize];
+        let [all, narrow] = faces[points[*corner as usize] as usize];
         2 * narrow > all
     };
     let is_kept = |face: &&[u32; 3]| !face.iter().any(is_spike);
     let kept: Vec<[u32; 3]> = mesh.triangles.iter().filter(is_kept).copied().collect();
     of_faces(mesh, &kept)
+}
+
+/// Returns, for each vertex, the index of the first vertex at the same position. STL files repeat a vertex in each of
+/// its faces.
+fn points(mesh: &Mesh) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(mesh.vertices.len());
+    let vertices = (0..).zip(mesh.vertices.iter());
+    vertices
+        .map(|(index, vertex)| *first.entry(vertex.map(f64::to_bits)).or_insert(index))
+        .collect()
 }
 
 /// Returns a mesh without distant specks and without connected components that are smaller than [`DEBRIS`] of the
@@ -247,5 +260,55 @@ impl Cells {
     fn label(&self, mesh: &Mesh, face: &[u32; 3]) -> usize {
         let [first, ..] = corners(mesh, face);
         self.labels[self.place(first)] as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_spikes;
+    use crate::mesh::Mesh;
+
+    const SIDE: u32 = 9;
+
+    /// Returns a sheet of narrow triangles, with one vertex pulled far out of the sheet.
+    fn sheet_with_a_spike() -> Mesh {
+        let vertices = (0..SIDE * SIDE).map(|k| {
+            let [x, y] = [k % SIDE, k / SIDE].map(f64::from);
+            let z = if k == SIDE * SIDE / 2 { 400.0 } else { 0.0 };
+            [x, 4.0 * y, z]
+        });
+        let mut triangles = Vec::new();
+        for y in 0..SIDE - 1 {
+            for x in 0..SIDE - 1 {
+                let a = y * SIDE + x;
+                triangles.push([a, a + 1, a + SIDE]);
+                triangles.push([a + 1, a + SIDE + 1, a + SIDE]);
+            }
+        }
+        Mesh {
+            vertices: vertices.collect(),
+            triangles: triangles.into(),
+        }
+    }
+
+    /// Returns a mesh in which each face has vertices of its own, as in an STL file.
+    fn with_unshared_vertices(mesh: &Mesh) -> Mesh {
+        let corners = mesh.triangles.iter().flatten();
+        Mesh {
+            vertices: corners.map(|k| mesh.vertices.at(*k as usize)).collect(),
+            triangles: (0..mesh.triangles.len() as u32)
+                .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn spikes_are_removed_whether_or_not_faces_share_vertices() {
+        let sheet = sheet_with_a_spike();
+        for mesh in [with_unshared_vertices(&sheet), sheet] {
+            let kept = without_spikes(&mesh);
+            // Six faces meet at the spike.
+            assert_eq!(kept.triangles.len(), mesh.triangles.len() - 6);
+        }
     }
 }
