@@ -98,7 +98,7 @@ fn a_second_signal_does_not_wait_for_a_read_that_hangs() {
     let command = run_with_progress(&disk.project, "json", &["-j", "1", "--json"]);
     let mut running = disk.start_hanging("read", MESH, command);
     running.send(Signal::TERM);
-    running.send(Signal::HUP);
+    running.send(Signal::INT);
     let (code, json, stderr) = running.end();
     assert_eq!((code, &json["stages"]), (Some(130), &0.into()), "{stderr}");
     let pair = &pairs(&disk.project)[0];
@@ -115,7 +115,7 @@ fn a_second_signal_does_not_wait_for_the_hash_after_a_read_that_hung() {
     let notes = disk.dir.path().to_owned();
     running.wait_until("the file is hashed", || Fault::injected(&notes) == 2);
     running.send(Signal::TERM);
-    running.send(Signal::HUP);
+    running.send(Signal::INT);
     let (code, _, stderr) = running.end();
     assert_eq!(code, Some(130), "{stderr}");
 }
