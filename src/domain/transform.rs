@@ -92,9 +92,13 @@ impl Affine2 {
         self.determinant().abs().sqrt()
     }
 
-    /// Returns the rotation of the x axis in degrees, in (-180, 180], positive clockwise on the screen.
+    /// Returns the angle of the rotation that is closest to the linear part, in degrees, in (-180, 180], positive
+    /// clockwise on the screen. The linear part of a map with a reflection is compared with rotations after a reflection
+    /// of y. For a similarity, this is the rotation of the x axis.
     pub fn angle_deg(&self) -> f64 {
-        let angle = self.0[1][0].atan2(self.0[0][0]).to_degrees();
+        let [[a, b, _], [c, d, _]] = self.0;
+        let side = self.determinant().signum();
+        let angle = (c - side * b).atan2(a + side * d).to_degrees();
         if angle <= -180.0 {
             angle + 360.0
         } else {

@@ -1,19 +1,28 @@
-//! Fits different scales along two perpendicular axes, because a sheet shrinks by about 1 % across its grain.
+//! Fits different scales along two perpendicular axes, as far as the print shows them: sheets shrink by 1 to 4 % across
+//! their grain, and a photograph taken at an angle is foreshortened.
 
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
-/// Number of rounds of scaling and refining.
-const ROUNDS: usize = 2;
-/// Maximum number of steps of the refinement in each round.
+/// Largest number of rounds of scaling and refining.
+const MAX_ROUNDS: usize = 6;
+/// Number of steps of the refinement in each round.
 const STEPS: usize = 6;
 /// The score is computed at the current scale, and at scales larger and smaller by this share.
 const TRIED: f64 = 0.008;
 /// Largest relative change of scale in one round, along the axes and along the diagonals.
-const MOST: f64 = 0.012;
+const MOST: f64 = 0.016;
+/// If the first round finds a smaller change, the pose keeps one scale, which saves time. Such a change moves no landmark
+/// by more than 0.3 % of the character's height.
+const EVIDENT: f64 = 0.004;
+/// Least share by which the anisotropic scale must bring the correlation closer to 1. Damaged strokes reach 0.04 at most,
+/// sheets that shrank by 2 % or more and photographs 0.06 to 0.8.
+const LEAST_GAIN: f64 = 0.03;
+/// The search ends after a round with a smaller change.
+const CONVERGED: f64 = 0.001;
 
-/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. Tries scales
-/// along the axes and along the diagonals. Together, they produce a scale along any two perpendicular directions.
+/// Returns the pose with the anisotropic scale that fits best, or `pose` if there is no evidence for such a scale. Tries
+/// scales along the axes and along the diagonals. Together, they produce a scale along any two perpendicular directions.
 ///
 /// `middle` is the centre of the scaling, in pixels of the moving image. The score of `pose` must come from `refiner`.
 pub(super) fn with_anisotropic_scale(
@@ -22,18 +31,31 @@ pub(super) fn with_anisotropic_scale(
     middle: [f64; 2],
 ) -> PoseCandidate {
     let mut best = *pose;
-    for _ in 0..ROUNDS {
-        let mut is_judged = true;
-        for along in [[1.0, 0.0], [0.0, 1.0]] {
-            let by = |amount: f64| stretch(&best, middle, along.map(|share| share * amount));
-            let score = |amount: f64| refiner.evaluate(&by(amount)).score;
-            let at = if is_judged { best.score } else { score(0.0) };
-            best = by(summit(score(-TRIED), at, score(TRIED)) * TRIED);
-            is_judged = false;
+    for round in 0..MAX_ROUNDS {
+        let (stretched, change) = best_stretch(refiner, &best, middle);
+        if round == 0 && change < EVIDENT {
+            return *pose;
         }
-        best = refiner.refine(&best, STEPS, Loss::Tukey);
+        best = refiner.refine(&stretched, STEPS, Loss::Tukey);
+        if change < CONVERGED {
+            break;
+        }
     }
-    if best.score > pose.score { best } else { *pose }
+    let gain = (best.score - pose.score) / (1.0 - pose.score).max(1e-6);
+    if gain > LEAST_GAIN { best } else { *pose }
+}
+
+/// Returns a pose with the anisotropic scale at the maximum of the score, and the change of scale.
+fn best_stretch(refiner: &Refiner, pose: &PoseCandidate, middle: [f64; 2]) -> (PoseCandidate, f64) {
+    let mut best = *pose;
+    let changes = [[1.0, 0.0], [0.0, 1.0]].map(|along| {
+        let by = |amount: f64| stretch(&best, middle, along.map(|share| share * amount));
+        let score = |amount: f64| refiner.evaluate(&by(amount)).score;
+        let change = summit(score(-TRIED), score(0.0), score(TRIED)) * TRIED;
+        best = by(change);
+        change
+    });
+    (best, changes[0].hypot(changes[1]))
 }
 
 /// Returns the position of the maximum of the parabola through the values at -1, 0 and 1, clamped to `MOST / TRIED` on
