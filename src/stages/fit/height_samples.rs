@@ -11,7 +11,7 @@ use crate::stages::zbuffer::{NO_HIT, Viewport};
 const LEAST_POINTS: usize = 16;
 /// A carving is at most about this many times as deep as the median of its ground. Lower points are side walls of the
 /// block, its foot, or a table.
-const DEEPEST: f64 = 1.8;
+pub(super) const DEEPEST: f64 = 1.8;
 /// Least share of the points below the carving at which they are left out.
 const DEEP_SHARE: f64 = 0.01;
 

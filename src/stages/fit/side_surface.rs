@@ -16,7 +16,7 @@ const MAX_ROTATIONS: usize = 3;
 const MAX_TOPS: f64 = 0.85;
 /// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
 /// then rests on walls or specks, not on strokes.
-const MIN_TOPS: f64 = 0.05;
+const MIN_TOPS: f64 = 0.02;
 /// When the depth of the carving is measured, one height in this many is ignored at either end.
 const TRIMMED_ONE_IN: usize = 100;
 

@@ -84,17 +84,26 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
 
 /// Adds a square grid of faces to a mesh. `at` maps two coordinates from -1 to 1 to a sheet point in millimetres.
 fn add_patch(mesh: &mut Mesh, world: &SyntheticSheet, at: impl Fn(f64, f64) -> [f64; 3]) {
-    const SIDE: u32 = 40;
+    add_patch_of(mesh, world, 40, at);
+}
+
+/// Like [`add_patch`], with `side` vertices along each side.
+fn add_patch_of(
+    mesh: &mut Mesh,
+    world: &SyntheticSheet,
+    side: u32,
+    at: impl Fn(f64, f64) -> [f64; 3],
+) {
     let first = mesh.vertices.len() as u32;
-    let place = |k: u32| f64::from(2 * k) / f64::from(SIDE - 1) - 1.0;
-    for k in 0..SIDE * SIDE {
-        let [x, y, z] = at(place(k % SIDE), place(k / SIDE));
+    let place = |k: u32| f64::from(2 * k) / f64::from(side - 1) - 1.0;
+    for k in 0..side * side {
+        let [x, y, z] = at(place(k % side), place(k / side));
         mesh.vertices.push(world.place(x, y, z));
-        if k % SIDE > 0 && k / SIDE > 0 {
+        if k % side > 0 && k / side > 0 {
             let corner = first + k;
             mesh.triangles
-                .push([corner - SIDE - 1, corner - SIDE, corner]);
-            mesh.triangles.push([corner - SIDE - 1, corner, corner - 1]);
+                .push([corner - side - 1, corner - side, corner]);
+            mesh.triangles.push([corner - side - 1, corner, corner - 1]);
         }
     }
 }
@@ -160,6 +169,35 @@ fn debris_around_a_block_is_left_out() {
         });
     }
     assert_region_found(&world, mesh);
+}
+
+#[test]
+fn specks_close_above_the_carving_are_left_out() {
+    let world = SyntheticSheet::default();
+    let mut mesh = world.mesh();
+    add_patch(&mut mesh, &world, |u, v| [2.0 + 0.3 * u, 0.3 * v, 3.0]);
+    let region = assert_region_found(&world, mesh);
+    assert!(region.contains(world.place(2.0, 0.0, -0.5)));
+    assert!(!region.contains(world.place(2.0, 0.0, 3.0)));
+}
+
+#[test]
+fn thin_strokes_are_a_carving() {
+    let world = SyntheticSheet::default();
+    let mut mesh = Mesh::default();
+    // A cross of two ridges of 8 x 0.3 mm on ground of 12 x 12 mm: 3 % of the area.
+    add_patch_of(&mut mesh, &world, 120, |u, v| {
+        let [x, y] = [6.0 * u, 6.0 * v];
+        let outside = |along: f64, across: f64| {
+            (along.abs() - 4.0)
+                .max(0.0)
+                .hypot((across.abs() - 0.15).max(0.0))
+        };
+        let ground = 1.2 + 0.1 * (3.0 * x).sin() * (2.0 * y).cos();
+        [x, y, -(2.0 * outside(x, y).min(outside(y, x))).min(ground)]
+    });
+    let found = fit(&mesh.into(), None, None, &settings().fit).expect("a plane");
+    assert!((0.8..1.4).contains(&found.relief), "{found:?}");
 }
 
 #[test]

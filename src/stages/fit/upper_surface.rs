@@ -87,9 +87,9 @@ pub fn fit(
             searched: inks.is_some(),
         });
     }
-    // The rest of the scan is not the face: side walls, a foot or a table.
-    let face = fine.samples.is_cropped;
-    let region = face.then(|| wider_search::region(mesh, indexed, &fine, &start));
+    // The rest of the scan is not the face: side walls, a foot or a table below it, or debris above it.
+    let is_part = fine.samples.is_cropped || wider_search::has_debris_above(&fine);
+    let region = is_part.then(|| wider_search::region(mesh, indexed, &fine, &start));
     Ok(FitOutcome {
         region,
         ..outcome(&fine, usual.evidence, mesh)

@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::carved_side::AGREEMENT;
 use super::directions::{candidates, facets};
+use super::height_samples::DEEPEST;
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
@@ -29,8 +30,6 @@ pub(super) const BETTER: f64 = 1.12;
 const RIVAL: f64 = 0.5;
 /// A lower agreement of the best rival counts as this.
 const LEAST_RIVAL: f64 = 0.1;
-/// A region extends below the surface by this many times the relief. Anything lower is not part of the carving.
-const DEEPEST: f64 = 2.5;
 /// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
 const HIGHEST: f64 = 1.0;
 /// A carving is not deeper than this share of the extent of its side.
@@ -243,6 +242,17 @@ fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
     bounds
 }
 
+/// Returns the height over the plane, in mesh units, above which nothing belongs to the carving.
+fn top(side: &FittedSide) -> f64 {
+    HIGHEST * side.relief + side.bow_height
+}
+
+/// Returns whether a side shows floating debris or spikes above the carving.
+pub(super) fn has_debris_above(side: &FittedSide) -> bool {
+    let heights = side.samples.residuals(&side.surface);
+    heights.iter().any(|height| *height > top(side))
+}
+
 /// Returns the box around a side of a part. Its z is the side's normal, and its x is close to that of `along`.
 pub(super) fn region(
     mesh: &Mesh,
@@ -264,12 +274,11 @@ pub(super) fn region(
         .map(|vertex| box_from_mesh.apply(vertex)[2]);
     let lowest = heights.fold(f64::INFINITY, f64::min) - slack;
     let down = lowest.max(-DEEPEST * side.relief - side.bow_height);
-    let up = HIGHEST * side.relief + side.bow_height;
     ScanRegion {
         box_from_mesh,
         bounds: [
             [low[0] - slack, low[1] - slack, down],
-            [high[0] + slack, high[1] + slack, up],
+            [high[0] + slack, high[1] + slack, top(side)],
         ],
     }
 }
