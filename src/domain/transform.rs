@@ -213,6 +213,16 @@ mod tests {
     }
 
     #[test]
+    fn angle_is_that_of_the_closest_rotation() {
+        let stretch = Affine2([[1.0, 0.08, 0.0], [0.08, 1.0, 0.0]]);
+        let rotated = Affine2::similarity(3.0, 0.5, [0.0; 2]).after(&stretch);
+        let mirrored = rotated.after(&Affine2([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]));
+        for map in [rotated, mirrored] {
+            assert!((map.angle_deg() - 0.5_f64.to_degrees()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
     fn inverse_undoes_the_map() {
         let there = Affine2::similarity(2.5, 0.7, [3.0, -4.0]);
         let back = there.inverse().expect("a similarity has an inverse");

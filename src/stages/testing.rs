@@ -146,13 +146,23 @@ static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
 /// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`. Also returns the true map
 /// from the sheet to the print.
 pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
+    shrunk_print(px_per_mm, turn_deg, 1.0)
+}
+
+/// Like [`print`], for paper whose height is multiplied by `shrunk_by` after printing.
+pub(super) fn shrunk_print(px_per_mm: f64, turn_deg: f64, shrunk_by: f64) -> (Print, Affine2) {
     let size = (SHEET_MM * px_per_mm) as usize;
     let middle = (size - 1) as f64 / 2.0;
-    let print_from_sheet = Affine2::similarity(
+    let as_printed = Affine2::similarity(
         px_per_mm,
         turn_deg.to_radians(),
         [middle + 1.3, middle - 2.1],
     );
+    let shrinkage = Affine2([
+        [1.0, 0.0, 0.0],
+        [0.0, shrunk_by, (1.0 - shrunk_by) * middle],
+    ]);
+    let print_from_sheet = shrinkage.after(&as_printed);
     let back = print_from_sheet.inverse().expect("a similarity");
     let rgb = Grid::from_fn(size, size, |x, y| {
         let looks = 4;
@@ -224,7 +234,7 @@ pub(super) fn settings() -> Settings {
             scale_band: 1.6,
             working_px: 192,
             smoothing_px: 1.2,
-            anisotropic_scale: false,
+            anisotropic_scale: true,
             threshold_min: 0.01,
             threshold_max: 0.6,
             min_confidence: 0.3,

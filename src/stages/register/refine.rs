@@ -143,10 +143,15 @@ impl CompetingPoses {
         Some(())
     }
 
-    /// Computes the `fair_share` of each competitor, or 0 for a missing competitor.
+    /// Computes the `fair_share` of each competitor, or 0 for a missing competitor. The mirrored pose wins only if it
+    /// also wins on all pixels: a symmetric character scores about the same both ways, and damage decides on a part.
     fn fair_shares(&self, thresholds: &SoftThresholds) -> [f64; 2] {
-        [self.other_angle, self.mirrored]
-            .map(|rival| rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best)))
+        let fair = |rival: Option<RefinedPose>| {
+            rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best))
+        };
+        let mirrored = fair(self.mirrored);
+        let on_all_pixels = share(self.mirrored, &self.best);
+        [fair(self.other_angle), mirrored.min(on_all_pixels.max(1.0))]
     }
 
     /// Returns the score of the best pose minus the score of its best competitor.

@@ -8,7 +8,8 @@ use crate::mesh::Mesh;
 use crate::raster::{DepthMap, Grid};
 use crate::stages::StageError;
 use crate::stages::testing::{
-    SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings, some_turn,
+    SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings,
+    shrunk_print, some_turn,
 };
 
 #[test]
@@ -41,6 +42,24 @@ fn a_bent_block_aligns_as_well() {
     let results = run(&world.mesh(), &picture, &settings()).expect("an alignment");
     let error = landmark_error_px(&world, &truth, &results[0].0);
     assert!(error < 0.7, "{error} px");
+}
+
+#[test]
+fn only_a_sheet_that_shrank_along_one_axis_is_scaled_along_two() {
+    let world = SyntheticSheet {
+        turn: some_turn(2),
+        ..SyntheticSheet::default()
+    };
+    for (turn_deg, shrunk_by) in [(4.0, 1.0), (4.0, 0.96), (20.0, 0.97)] {
+        let (picture, truth) = shrunk_print(14.0, turn_deg, shrunk_by);
+        let results = run(&world.mesh(), &picture, &settings()).expect("an alignment");
+        let (found, outcome) = &results[0];
+        let error = landmark_error_px(&world, &truth, found);
+        assert!(error < 0.3, "{error} px at {shrunk_by}");
+        let [[a, b, _], [c, d, _]] = outcome.print_from_depth.0;
+        let is_similarity = (a - d).hypot(b + c) < 1e-9;
+        assert_eq!(is_similarity, shrunk_by == 1.0, "{outcome:?}");
+    }
 }
 
 #[test]
