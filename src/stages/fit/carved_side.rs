@@ -15,6 +15,8 @@ use crate::stages::zbuffer::IndexedSurface;
 
 /// If the relief of a side is below this share of the other side's relief, the side is the back of the block.
 const BACK: f64 = 0.35;
+/// Log-odds against the back. Spikes and debris can hide the relief of the carved side, so the print may outweigh them.
+const BACK_ODDS: f64 = 4.0;
 /// Weight of the winding, from -1 (inward) to 1 (outward).
 const WINDING: f64 = 2.0;
 /// Weight of the logarithm of the ratio of the two layer widths.
@@ -41,16 +43,6 @@ pub(super) struct SideInputs<'a> {
 struct SideOdds {
     odds: f64,
     agreements: [Option<f64>; 2],
-}
-
-impl SideOdds {
-    /// Returns odds that were found without the print.
-    const fn of(odds: f64) -> Self {
-        Self {
-            odds,
-            agreements: [None; 2],
-        }
-    }
 }
 
 /// The chosen side.
@@ -105,22 +97,24 @@ fn log_odds(
     winding: Option<f64>,
     inputs: SideInputs<'_>,
 ) -> SideOdds {
-    if first.relief < BACK * second.relief {
-        return SideOdds::of(-10.0);
-    }
-    if second.relief < BACK * first.relief {
-        return SideOdds::of(10.0);
-    }
     let winding = winding.map_or(0.0, |out| 2.0 * out - 1.0);
     let sharpness = (layer_width(second) / layer_width(first)).ln();
     let up = first.plane_from_mesh.0[2][2];
     let manifest = inputs
         .scanned_face_down
         .map_or(0.0, |down| if down { -up } else { up });
-    let mesh_only =
-        WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest;
+    let mesh_only = if first.relief < BACK * second.relief {
+        -BACK_ODDS
+    } else if second.relief < BACK * first.relief {
+        BACK_ODDS
+    } else {
+        WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest
+    };
     let Some(inks) = inputs.inks else {
-        return SideOdds::of(mesh_only);
+        return SideOdds {
+            odds: mesh_only,
+            agreements: [None; 2],
+        };
     };
     let (likelier, other) = if mesh_only >= 0.0 {
         (first, second)

@@ -8,14 +8,11 @@ use super::part_search;
 use super::pca::{Axes, frame};
 use super::print_agreement::InkPyramids;
 use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
-use super::wider_search::{self, BETTER};
+use super::wider_search::{self, BETTER, LEAST};
 use crate::domain::{FitOutcome, SideEvidence};
 use crate::mesh::Mesh;
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
-
-/// If the agreement of the carved side with the print is lower, the wider search begins.
-const CONVINCING: f64 = 0.5;
 
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
 ///
@@ -62,7 +59,7 @@ pub fn fit(
         .filter(|_| fine.as_ref().is_some_and(is_carved));
     let agreement = carved.map_or(0.0, |carved| carved.agreement.unwrap_or(1.0));
     if let (Some(print), Some(inks)) = (print, &inks)
-        && agreement < CONVINCING
+        && agreement < LEAST
     {
         let parts = part_search::search(indexed, &start, print, params);
         let parts = parts.filter(|found| found.agreement > agreement * BETTER);

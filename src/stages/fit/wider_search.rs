@@ -21,11 +21,15 @@ use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// Least agreement with the print at which a side is accepted. On generated scans, carved sides reached 0.65 to 0.93
+/// Least agreement with the print at which a side is accepted. The search begins if the usual side has a lower one. On generated scans, carved sides reached 0.65 to 0.93
 /// and other sides at most 0.51.
 pub(super) const LEAST: f64 = 0.58;
 /// Factor by which the agreement of a side must exceed the agreement of the usual side.
 pub(super) const BETTER: f64 = 1.12;
+/// A side is also accepted if its agreement is at least [`LEAST_BY_FAR`], and at least this many times that of the usual
+/// side. A wrong side is refused later, by the confidence in the pose.
+const MUCH_BETTER: f64 = 2.0;
+const LEAST_BY_FAR: f64 = 0.45;
 /// Sides whose normals differ by a larger angle, in radians, are rivals.
 const RIVAL: f64 = 0.5;
 /// A lower agreement of the best rival counts as this.
@@ -62,8 +66,7 @@ struct JudgedSide {
 }
 
 /// Returns the side that resembles the print best. `usual` is the agreement of the usual side with the print. Returns
-/// `None` if the best agreement is below [`LEAST`] or below `usual` times [`BETTER`], or if the finer fit of the side
-/// finds no carving.
+/// `None` if the best agreement is below [`least_agreement`], or if the finer fit of the side finds no carving.
 pub(super) fn search(
     mesh: &Mesh,
     indexed: &IndexedSurface,
@@ -90,7 +93,7 @@ pub(super) fn search(
     let best = found
         .iter()
         .max_by(|a, b| a.agreement.total_cmp(&b.agreement))?;
-    if best.agreement < LEAST.max(usual * BETTER) {
+    if best.agreement < least_agreement(usual) {
         return None;
     }
     let normal = |of: &Rigid3| Vector3::new(of.0[2][0], of.0[2][1], of.0[2][2]);
@@ -112,6 +115,13 @@ pub(super) fn search(
         agreement: best.agreement,
         side,
     })
+}
+
+/// Returns the least agreement of a side that replaces the usual side, which has the agreement `usual`.
+fn least_agreement(usual: f64) -> f64 {
+    (usual * MUCH_BETTER)
+        .clamp(LEAST_BY_FAR, LEAST)
+        .max(usual * BETTER)
 }
 
 /// Returns the evidence for a side. `agreement` is the agreement of the side, and `rival` the best other agreement.
