@@ -144,7 +144,7 @@
 //! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `raster`, `store`, `catalog`, `report` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `stages`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |

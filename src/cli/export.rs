@@ -1,48 +1,150 @@
 //! `export`: writes the aligned pairs for other tools.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 
 use super::context::Context;
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
 use super::table::count;
-use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
+use crate::domain::ThresholdMetric;
+use crate::export::{
+    ExportFormat, ExportOptions, ExportSummary, InputFileLimits, ResultFilter, SplitBy,
+    SplitSettings, SplitShares,
+};
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
-    /// Format of the export
-    #[arg(long, value_name = "FORMAT", default_value = "jsonl")]
-    pub(super) to: ExportFormat,
-    /// The directory to write; an earlier export there is replaced
+    /// Formats, separated by commas. One format is written to DIR itself, several each to DIR/FORMAT
+    #[arg(
+        long,
+        value_name = "FORMAT",
+        default_value = "jsonl",
+        value_delimiter = ',',
+        value_parser = one_of::<ExportFormat>(ExportFormat::ALL.map(ExportFormat::name))
+    )]
+    pub(super) to: Vec<ExportFormat>,
+    /// The directory to write; an earlier export there is replaced as a whole
     #[arg(short, long, value_name = "DIR")]
     pub(super) output: PathBuf,
+    /// Export only these metrics, separated by commas
+    #[arg(
+        long,
+        value_name = "METRIC",
+        value_delimiter = ',',
+        value_parser = one_of::<ThresholdMetric>(ThresholdMetric::ALL.map(ThresholdMetric::name))
+    )]
+    pub(super) metric: Vec<ThresholdMetric>,
+    /// Export only results that the reviewers passed, or whose confidence is not low
+    #[arg(
+        long,
+        value_name = "WHICH",
+        default_value = "all",
+        value_parser = one_of::<ResultFilter>(ResultFilter::ALL.map(ResultFilter::name))
+    )]
+    pub(super) only: ResultFilter,
+    /// Export only results with at least this confidence, from 0 to 1
+    #[arg(long, value_name = "P", value_parser = share)]
+    pub(super) min_confidence: Option<f64>,
+    /// Warp the print and all aligned pictures to a square of PX pixels with the ink centred
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
+    pub(super) canvas: Option<u32>,
+    /// Divide the pairs: percent of train, validation and test, such as 80/10/10
+    #[arg(long, value_name = "PERCENT")]
+    pub(super) split: Option<SplitShares>,
+    /// What keeps pairs in one part of the split
+    #[arg(
+        long,
+        value_name = "GROUP",
+        requires = "split",
+        default_value = "block",
+        value_parser = one_of::<SplitBy>(SplitBy::ALL.map(SplitBy::name))
+    )]
+    pub(super) by: SplitBy,
+    /// Seed of the split
+    #[arg(long, value_name = "N", requires = "split", default_value_t = 0)]
+    pub(super) seed: u64,
+    /// Begin CSV files with a byte order mark, so that Excel reads them as UTF-8
+    #[arg(long)]
+    pub(super) csv_bom: bool,
     /// Include computing times; the output then differs from run to run
     #[arg(long)]
     pub(super) with_times: bool,
 }
 
-/// Format of an export.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ExportFormat {
-    /// One line per pair and metric, with masks and images in files.
-    Jsonl,
+/// Returns a parser of names, which lists them in help, in errors and for completion.
+fn one_of<T: FromStr<Err = String> + Clone + Send + Sync + 'static>(
+    names: impl IntoIterator<Item = &'static str>,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+/// Parses a number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| format!("{text:?} is not a number from 0 to 1"))
+}
+
+impl ExportArgs {
+    /// Returns the formats, each once, in the order given.
+    fn formats(&self) -> Vec<ExportFormat> {
+        let mut formats = Vec::new();
+        for format in &self.to {
+            if !formats.contains(format) {
+                formats.push(*format);
+            }
+        }
+        formats
+    }
 }
 
 pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
-    let config = context.settings()?.config;
-    context.warn_about_stale(&catalog).await?;
-    let options = JsonlOptions {
-        metrics: config.stages.pipeline.method.metrics(),
+    let loaded = context.settings()?;
+    let (config, formats) = (&loaded.config, args.formats());
+    let computed = config.stages.pipeline.method.metrics();
+    let unknown = args.metric.iter().find(|metric| !computed.contains(metric));
+    if let Some(metric) = unknown {
+        let names: Vec<&str> = computed.iter().map(|metric| metric.name()).collect();
+        let text = format!(
+            "the settings compute no {metric}; choose from {}",
+            names.join(", ")
+        );
+        return Err(Refusal::Usage(text).into());
+    }
+    let selected =
+        |metric: &&ThresholdMetric| args.metric.is_empty() || args.metric.contains(*metric);
+    let options = ExportOptions {
+        metrics: computed.iter().filter(selected).copied().collect(),
+        only: args.only,
+        min_confidence: args.min_confidence,
+        canvas_px: args.canvas,
+        split: args.split.map(|shares| SplitSettings {
+            shares,
+            by: args.by,
+            seed: args.seed,
+        }),
         with_times: args.with_times,
-        limits: config.limits.image,
+        csv_bom: args.csv_bom,
+        settings: serde_json::to_value(config)?,
+        limits: InputFileLimits {
+            mesh: config.limits.mesh,
+            image: config.limits.image,
+        },
     };
-    let summary = match args.to {
-        ExportFormat::Jsonl => to_jsonl(&catalog, &project, &args.output, options).await?,
-    };
+    if let Err(unused) = options.check(&formats) {
+        return Err(Refusal::Usage(unused.to_string()).into());
+    }
+    context.warn_about_stale(&catalog).await?;
+    let summary =
+        crate::export::export(&catalog, &project, &args.output, &formats, options).await?;
     catalog.close().await;
     print_summary(&summary, &args, context)?;
     Ok(if summary.unreadable.is_empty() {
@@ -61,8 +163,9 @@ fn print_summary(
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     context.print_json(&json!({
         "schema": 1,
-        "done": summary.done,
-        "without_result": summary.without_result,
+        "done": summary.pairs.done,
+        "without_result": summary.pairs.without_result,
+        "left_out": summary.pairs.left_out,
         "unreadable": unreadable.collect::<Vec<_>>(),
         "kept_earlier": summary.kept_earlier,
     }))?;
@@ -97,10 +200,14 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         0 => String::new(),
         lost => format!(", {lost} with missing or changed files"),
     };
+    let left_out = match summary.pairs.left_out {
+        0 => String::new(),
+        left_out => format!(", {left_out} left out"),
+    };
     context.info(&format!(
-        "{} exported to {}, {} without a result{unreadable}",
-        count(summary.done, "pair"),
+        "{} exported to {}, {} without a result{left_out}{unreadable}",
+        count(summary.pairs.done, "pair"),
         args.output.display(),
-        summary.without_result
+        summary.pairs.without_result
     ));
 }

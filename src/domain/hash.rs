@@ -1,5 +1,6 @@
 //! BLAKE3 hashes that identify contents: input files, artifacts, fingerprints, results.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A 256-bit BLAKE3 hash; 64 lower-case hexadecimal digits in text.
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!(hash.to_hex().parse(), Ok(hash));
 /// assert!(hash.to_hex().starts_with(&hash.short()));
 /// ```
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 pub struct ContentHash([u8; 32]);
 

@@ -1,5 +1,6 @@
 //! Identifiers: the user's id of a pair, and row ids of the catalog.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sanitize;
@@ -20,7 +21,9 @@ pub struct WorkerId(pub i64);
 /// assert_eq!(PairName::new("b01_0002").map(|name| name.to_string()), Ok("b01_0002".to_owned()));
 /// assert!(PairName::new("b01/0002").is_err());
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(try_from = "String", into = "String")]
 pub struct PairName(String);
 

@@ -1,5 +1,6 @@
 //! The metrics that choose the depth threshold: the paper's three metrics, and one that measures the relief.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::enum_names;
@@ -19,7 +20,9 @@ use super::enum_names;
 ///
 /// The paper's three metrics match the print. [`Self::Relief`] follows the relief, and uses the print only where the
 /// relief leaves the depth uncertain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdMetric {
     /// Maximizes `mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))`, from the local variances and the covariance of `P'` and

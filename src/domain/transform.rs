@@ -3,6 +3,7 @@
 //! Matrices are row-major and act on column vectors. In pixel frames, x points right, y points down, and (0, 0) is the
 //! centre of the top-left pixel. A positive angle is therefore a clockwise rotation on the screen.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An affine map of the plane as a 2x3 matrix.
@@ -22,7 +23,7 @@ use serde::{Deserialize, Serialize};
 /// let [x, y] = plane_from_print.apply([x, y]);
 /// assert!(x.abs() < 1e-9 && y.abs() < 1e-9);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Affine2(pub [[f64; 3]; 2]);
 
 impl Affine2 {
@@ -118,7 +119,7 @@ impl Affine2 {
 /// assert_eq!(plane_from_mesh.apply([1.0, 2.5, 3.0]), [0.5, 0.0, 0.0]);
 /// assert_eq!(plane_from_mesh.inverse().apply([0.5, 0.0, 0.0]), [1.0, 2.5, 3.0]);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rigid3(pub [[f64; 4]; 4]);
 
 impl Rigid3 {
@@ -167,7 +168,7 @@ impl Rigid3 {
 
 /// The result of the pipeline: a 3x4 matrix that is applied to a mesh point `[X Y Z 1]`. The rows give the x and y of
 /// the point's print pixel, and the point's height over the character plane in mesh units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PrintFromMesh(pub [[f64; 4]; 3]);
 
 impl PrintFromMesh {

@@ -1,5 +1,6 @@
 //! Length units of meshes.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::enum_names;
@@ -13,7 +14,7 @@ use super::enum_names;
 /// assert_eq!(unit.mm(), 25.4);
 /// # Ok::<(), String>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum LengthUnit {
     /// Millimetres.

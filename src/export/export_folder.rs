@@ -1,11 +1,10 @@
 //! The folder of an export, which is replaced as a whole.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::earlier_export;
-use super::file_names::LINES;
+use super::manifest::{self, MANIFEST};
 use crate::store::{Leftover, ReplaceError, ReplacementFolder};
 
 /// An export that is written next to its target and then replaces the target.
@@ -53,8 +52,8 @@ impl Folder {
     /// # Errors
     /// Returns an error if the disk fails.
     pub(super) fn replaces(&self) -> Result<bool, FolderError> {
-        let lines = self.0.target().join(LINES);
-        lines.try_exists().map_err(at(&lines))
+        let manifest = self.0.target().join(MANIFEST);
+        manifest.try_exists().map_err(at(&manifest))
     }
 
     /// Syncs the folder to disk and replaces the target with it.
@@ -75,7 +74,7 @@ fn refuse_foreign(target: &Path) -> Result<(), FolderError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         found => found.map_err(at(target))?,
     };
-    match earlier_export::foreign_entry(target).map_err(at(target))? {
+    match manifest::foreign_entry(target).map_err(at(target))? {
         Some(entry) => Err(FolderError::NotAnExport(entry)),
         None => Ok(()),
     }
@@ -90,18 +89,65 @@ pub(super) fn at(path: &Path) -> impl Fn(io::Error) -> FolderError {
     }
 }
 
+/// Writes a file below a folder, and creates its parent folders.
+pub(super) fn write_below(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FolderError> {
+    let path = root.join(below);
+    match path.parent().map_or(Ok(()), fs::create_dir_all) {
+        // `AlreadyExists` means that the folder exists but cannot be inspected. The write below reports the cause.
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(at(&path)(error)),
+        Ok(()) | Err(_) => {}
+    }
+    fs::write(&path, bytes).map_err(at(&path))
+}
+
+/// A file that pairs share, written in the order of the catalog.
+#[derive(Debug)]
+pub(super) struct SharedFile {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl SharedFile {
+    /// Creates an empty file below a folder.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be created.
+    pub(super) fn create(root: &Path, below: &str) -> Result<Self, FolderError> {
+        let path = root.join(below);
+        let file = BufWriter::new(File::create(&path).map_err(at(&path))?);
+        Ok(Self { path, file })
+    }
+
+    /// Appends bytes.
+    ///
+    /// # Errors
+    /// Returns an error if they cannot be written.
+    pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), FolderError> {
+        self.file.write_all(bytes).map_err(at(&self.path))
+    }
+
+    /// Writes what is buffered.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be written.
+    pub(super) fn flush(&mut self) -> Result<(), FolderError> {
+        self.file.flush().map_err(at(&self.path))
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Folder, FolderError, LINES};
-    use crate::export::file_names::VERDICTS;
+    use super::{Folder, FolderError, MANIFEST};
     use std::fs;
     use std::path::Path;
 
-    const LINE: &str = r#"{"id":"a","metric":"nl_ssim","status":"done","result_hash":null}"#;
+    const LINES: &str = "pairs.jsonl";
+    const LIST: &str = r#"{"mocban_export":1,"files":["export.json","pairs.jsonl"]}"#;
 
     fn write(target: &Path, text: &str) -> Folder {
         let folder = Folder::begin(target).expect("the target is free");
         fs::write(folder.path().join(LINES), text).expect("written");
+        fs::write(folder.path().join(MANIFEST), LIST).expect("written");
         folder
     }
 
@@ -109,7 +155,7 @@ mod tests {
     fn an_earlier_export_is_replaced() {
         let dir = tempfile::tempdir().expect("a folder");
         let target = dir.path().join("deep/out");
-        for text in ["", LINE, &format!("{LINE}\n{LINE}\n")] {
+        for text in ["", "one", "two"] {
             let folder = write(&target, text);
             assert_eq!(folder.replaces().expect("known"), target.exists());
             assert!(folder.finish().expect("renamed").is_none());
@@ -120,7 +166,7 @@ mod tests {
     #[test]
     fn a_foreign_folder_is_refused_and_unchanged() {
         let dir = tempfile::tempdir().expect("a folder");
-        fs::write(dir.path().join(VERDICTS), "").expect("written");
+        fs::write(dir.path().join(LINES), "").expect("written");
         fs::write(dir.path().join("thesis.tex"), "").expect("written");
         let refused = Folder::begin(dir.path());
         assert!(matches!(refused, Err(FolderError::NotAnExport(_))));
@@ -133,13 +179,13 @@ mod tests {
     fn a_file_that_arrives_during_the_export_keeps_the_target() {
         let dir = tempfile::tempdir().expect("a folder");
         let target = dir.path().join("out");
-        write(&target, LINE).finish().expect("renamed");
+        write(&target, "one").finish().expect("renamed");
         let second = write(&target, "");
         fs::write(target.join("thesis.tex"), "ten years").expect("written");
         assert!(
             matches!(second.finish(), Err(FolderError::NotAnExport(path)) if path.ends_with("thesis.tex"))
         );
-        assert_eq!(fs::read_to_string(target.join(LINES)).expect("read"), LINE);
+        assert_eq!(fs::read_to_string(target.join(LINES)).expect("read"), "one");
         assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 1);
     }
 }

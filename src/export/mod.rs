@@ -1,22 +1,40 @@
 //! Exports results for other tools, and images for people.
 
 mod contact_sheet;
-mod earlier_export;
 mod export_folder;
-mod export_line;
-mod file_names;
+mod export_logs;
+mod exporter;
+mod exporter_error;
+mod format;
+mod format_writer;
+mod formats;
 mod gallery_selection;
-mod jsonl;
+mod manifest;
+mod options;
 mod pair_files;
+mod pair_pictures;
 pub mod pictures;
+mod readme;
+mod record;
+mod record_fields;
 mod source_print;
+mod split;
+mod stage_outcomes;
 
 pub use contact_sheet::{
     ContactSheet, ContactSheetOptions, ContactSheetOrder, DrawError, draw_contact_sheet,
 };
 pub use export_folder::FolderError;
-pub use export_line::{ExportLine, Hashes, LineManualAlignment, LineStatus, Maps, Numbers};
+pub use exporter::{ExportSummary, export};
+pub use exporter_error::ExportError;
+pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
-pub use jsonl::{ExportError, ExportSummary, JsonlOptions, json_lines, to_jsonl};
-pub use pair_files::{Files, FilesError};
+pub use manifest::PairCounts;
+pub use options::{ExportOptions, ResultFilter, UnusedOption};
+pub use pair_pictures::{InputFileLimits, PictureError};
+pub use record::{
+    ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
+    SplitName,
+};
 pub use source_print::{SourcePrint, SourcePrintError};
+pub use split::{SplitBy, SplitSettings, SplitShares};

@@ -1,221 +1,225 @@
-//! The files of one exported pair.
+//! The picture files of a pair. Pictures that several metrics share are written once.
 
-use std::io::ErrorKind;
-use std::path::Path;
-
+use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::export_folder::{FolderError, at};
-use super::file_names::PAIRS;
-use super::pictures::PrintView;
-use super::source_print::{SourcePrint, SourcePrintError};
-use crate::catalog::PairResults;
+use super::format_writer::EncodedPair;
+use super::pair_pictures::{PairPictures, PictureError};
+use crate::catalog::MetricRecord;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, stroke_map};
-use crate::domain::{DepthScale, MetricOutcome, Stage, ThresholdMetric};
-use crate::raster::{
-    DepthMap, ImageLimits, Mask, png_grey16, png_mask, png_rgb8, warp_depth, warp_mask,
-};
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
-use crate::store::Project;
+use crate::domain::{DepthScale, LengthUnit, MetricOutcome, Stage, ThresholdMetric};
+use crate::raster::{png_grey16, png_mask, png_rgb8};
+use crate::report::pair_artifacts::same_alignment;
 
-/// Paths of the files of one line, relative to the export folder. Masks are 8-bit PNG images in which 255 is stroke.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Files {
-    /// The print image as given.
-    pub print: String,
-    /// Its ink mask, in the print's frame and size.
-    pub print_mask: String,
-    /// The depth map, 16 bits; `depth.json` next to it holds the scale.
-    pub depth: String,
-    /// Its strokes at this metric's threshold, in the depth map's frame.
-    pub depth_mask: String,
-    /// The depth map in the print image's frame and size.
-    pub aligned_depth: String,
-    /// The strokes in the print image's frame and size.
-    pub aligned_mask: String,
-    /// The strokes on the canvas the scores were computed on.
-    pub canvas_depth_mask: String,
+/// Folder of the files of a pair; `*` stands for its id.
+const PAIR: &str = "pairs/*";
+
+/// Files of one line, as paths below the folder of the format. Masks are 8-bit PNG images in which 255 is stroke.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub(super) struct Files {
+    /// The print image: the original file, or a PNG if it was turned upright or warped to a canvas.
+    pub(super) print: String,
+    /// Ink mask of the print.
+    pub(super) print_mask: String,
+    /// Depth map, 16 bits: 0 = no data, 1 to 65535 linear in height. `depth.json` beside it holds the scale.
+    pub(super) depth: String,
+    /// Strokes at this metric's threshold.
+    pub(super) depth_mask: String,
+    /// The depth map warped onto the print; a level means the same height as in `depth`.
+    pub(super) aligned_depth: String,
+    /// The strokes warped onto the print.
+    pub(super) aligned_mask: String,
+    /// The strokes on the canvas from which the scores were computed.
+    pub(super) canvas_depth_mask: String,
     /// The ink mask on that canvas.
-    pub canvas_print_mask: String,
-    /// Where the two masks on the canvas disagree: 128 where ink is missing, 255 where wood is missing, 0 elsewhere.
-    pub stroke_map: String,
+    pub(super) canvas_print_mask: String,
+    /// Where the canvas masks disagree: 128 = stroke without ink, 255 = ink without wood, 0 = elsewhere.
+    pub(super) stroke_map: String,
     /// The print with the edges of the strokes, enlarged for viewing.
-    pub overlay: String,
+    pub(super) overlay: String,
 }
 
 impl Files {
-    fn of(pair: &str, metric: ThresholdMetric, print_ext: &str) -> Self {
-        let shared = |name: &str| format!("{PAIRS}/{pair}/{name}");
-        let own = |name: &str| format!("{PAIRS}/{pair}/{metric}/{name}.png");
+    /// Returns the paths of a pair: replaces `*` by its id.
+    pub(super) fn of_pair(self, id: &str) -> Self {
+        let path = |pattern: String| pattern.replace('*', id);
         Self {
-            print: shared(&format!("print.{print_ext}")),
-            print_mask: shared("print_mask.png"),
-            depth: shared("depth.png"),
-            depth_mask: own("depth_mask"),
-            aligned_depth: own("aligned_depth"),
-            aligned_mask: own("aligned_mask"),
-            canvas_depth_mask: own("canvas_depth_mask"),
-            canvas_print_mask: shared("canvas_print_mask.png"),
-            stroke_map: own("stroke_map"),
-            overlay: own("overlay"),
+            print: path(self.print),
+            print_mask: path(self.print_mask),
+            depth: path(self.depth),
+            depth_mask: path(self.depth_mask),
+            aligned_depth: path(self.aligned_depth),
+            aligned_mask: path(self.aligned_mask),
+            canvas_depth_mask: path(self.canvas_depth_mask),
+            canvas_print_mask: path(self.canvas_print_mask),
+            stroke_map: path(self.stroke_map),
+            overlay: path(self.overlay),
         }
     }
 }
 
-/// Why the files of a pair cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum FilesError {
-    /// A result or artifact cannot be read; the other pairs go on.
-    #[error(transparent)]
-    Artifacts(#[from] PairArtifactsError),
-    /// The print cannot be used; the other pairs go on.
-    #[error(transparent)]
-    Print(#[from] SourcePrintError),
-    /// The export folder cannot be written to; the export stops.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-}
-
-/// The meaning of a depth PNG's levels; written next to it.
+/// The meaning of a depth PNG's levels; written next to it as `depth.json`.
 #[derive(Debug, Serialize)]
-struct Sidecar<'a> {
+struct DepthSidecar<'a> {
     /// Level of pixels without data.
     no_data: u16,
     #[serde(flatten)]
     scale: &'a DepthScale,
+    /// `[c0, cx, cy, cxx, cxy, cyy]`: the curved surface over the plane, all zero for a flat block.
+    curvature: [f64; 6],
     /// Millimetres per mesh unit, where the unit is known.
     mm_per_mesh_unit: Option<f64>,
 }
 
-/// The inputs and artifacts of a pair from which its files are made.
-pub(super) struct PairFiles<'a> {
-    pub(super) artifacts: PairArtifacts<'a>,
-    name: &'a str,
-    print: SourcePrint,
-    print_mask: Mask,
-    depth: DepthMap,
+/// Encodes the files of a finished pair. Returns the patterns of each selected metric.
+pub(super) fn write_files(
+    pictures: &PairPictures<'_>,
+    encoded: &mut EncodedPair,
+) -> Result<Vec<Files>, PictureError> {
+    let shared = |name: &str| format!("{PAIR}/{name}");
+    let artifacts = pictures.artifacts();
+    let (print, extension) = pictures.print_file()?;
+    let print_name = shared(&format!("print.{extension}"));
+    encoded.add_file(&print_name, print);
+    encoded.add_file(shared("print_mask.png"), png_mask(&pictures.print_mask()?));
+    encoded.add_file(shared("depth.png"), artifacts.bytes(Stage::Depth, DEPTH)?);
+    encoded.add_file(
+        shared("depth.json"),
+        sidecar(&pictures.outcomes.depth.scale).into_bytes(),
+    );
+    let canvas = artifacts.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
+    encoded.add_file(shared("canvas_print_mask.png"), canvas);
+
+    let mut each = EachMetric { pictures, encoded };
+    let same_level = |a: &MetricOutcome, b: &MetricOutcome| a.threshold_level == b.threshold_level;
+    let same_pose = |a: &MetricOutcome, b: &MetricOutcome| a.print_from_depth == b.print_from_depth;
+    let depth_masks = each.add("depth_mask", same_level, |metric| {
+        Ok(png_mask(&pictures.depth_mask(metric)?))
+    })?;
+    let aligned_depths = each.add("aligned_depth", same_pose, |metric| {
+        Ok(png_grey16(&pictures.aligned_depth(metric)?))
+    })?;
+    let aligned_masks = each.add("aligned_mask", same_alignment, |metric| {
+        Ok(png_mask(&pictures.aligned_mask(metric)?))
+    })?;
+    let overlays = each.add("overlay", same_alignment, |metric| {
+        Ok(png_rgb8(&pictures.overlay(metric)?))
+    })?;
+    let canvas_masks = each.add_artifact("canvas_depth_mask", canvas_depth_mask)?;
+    let stroke_maps = each.add_artifact("stroke_map", stroke_map)?;
+    let files = (0..pictures.metrics.len()).map(|i| Files {
+        print: print_name.clone(),
+        print_mask: shared("print_mask.png"),
+        depth: shared("depth.png"),
+        depth_mask: depth_masks[i].clone(),
+        aligned_depth: aligned_depths[i].clone(),
+        aligned_mask: aligned_masks[i].clone(),
+        canvas_depth_mask: canvas_masks[i].clone(),
+        canvas_print_mask: shared("canvas_print_mask.png"),
+        stroke_map: stroke_maps[i].clone(),
+        overlay: overlays[i].clone(),
+    });
+    Ok(files.collect())
 }
 
-/// PNG images that metrics with the same threshold and alignment share: depth mask, aligned depth, aligned mask,
-/// overlay.
-pub(super) type EncodedImages = [Vec<u8>; 4];
+/// Adds the pictures that may differ from metric to metric.
+struct EachMetric<'a, 'b> {
+    pictures: &'a PairPictures<'b>,
+    encoded: &'a mut EncodedPair,
+}
 
-impl<'a> PairFiles<'a> {
-    /// Reads the inputs and artifacts.
-    pub(super) fn read(
-        project: &'a Project,
-        pair: &'a PairResults,
-        limits: &ImageLimits,
-    ) -> Result<Self, FilesError> {
-        let artifacts = PairArtifacts::new(project, pair);
-        Ok(Self {
-            artifacts,
-            name: pair.attributes.name.as_str(),
-            print: SourcePrint::read(project, pair, limits)?,
-            print_mask: artifacts.print_mask()?,
-            depth: artifacts.depth()?,
+impl EachMetric<'_, '_> {
+    /// Adds one file for each group of metrics with the same picture. Returns the pattern of each metric.
+    fn add(
+        &mut self,
+        name: &str,
+        is_same: impl Fn(&MetricOutcome, &MetricOutcome) -> bool,
+        draw: impl Fn(&MetricOutcome) -> Result<Vec<u8>, PictureError>,
+    ) -> Result<Vec<String>, PictureError> {
+        let outcomes: Vec<_> = self
+            .pictures
+            .metrics
+            .iter()
+            .map(|record| &record.outcome)
+            .collect();
+        let first = first_of_each(&outcomes, |a, b| is_same(a, b));
+        self.add_groups(name, &first, |i| draw(outcomes[i]))
+    }
+
+    /// Adds a stored picture of each metric; equal ones are written once.
+    fn add_artifact(
+        &mut self,
+        name: &str,
+        role: impl Fn(ThresholdMetric) -> String,
+    ) -> Result<Vec<String>, PictureError> {
+        let pictures = self.pictures;
+        let artifacts = pictures.metrics.iter().map(|record: &&MetricRecord| {
+            pictures.artifact(Stage::Register, &role(record.outcome.metric))
+        });
+        let artifacts: Vec<_> = artifacts.collect::<Result<_, _>>()?;
+        let first = first_of_each(&artifacts, |a, b| a.hash == b.hash);
+        self.add_groups(name, &first, |i| {
+            let role = role(pictures.metrics[i].outcome.metric);
+            Ok(pictures.artifacts().bytes(Stage::Register, &role)?)
         })
     }
 
-    /// Writes the files shared by all metrics.
-    pub(super) fn write_shared(&self, root: &Path) -> Result<(), FilesError> {
-        let files = self.files(ThresholdMetric::NlSsim);
-        let canvas = self.artifacts.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
-        let depth = self.artifacts.bytes(Stage::Depth, DEPTH)?;
-        write(root, &files.print, &self.print.upright_file())?;
-        write(root, &files.print_mask, &png_mask(&self.print_mask))?;
-        write(root, &files.depth, &depth)?;
-        let sidecar = format!("{PAIRS}/{}/depth.json", self.name);
-        write(root, &sidecar, self.sidecar().as_bytes())?;
-        write(root, &files.canvas_print_mask, &canvas)
-    }
-
-    /// Draws the images of an alignment.
-    pub(super) fn draw(&self, outcome: &MetricOutcome) -> EncodedImages {
-        let (width, height) = (self.print_mask.width(), self.print_mask.height());
-        let print_from_depth = &outcome.print_from_depth;
-        let strokes = self.depth.stroke_mask(outcome.threshold_level);
-        let aligned = warp_mask(&strokes, print_from_depth, width, height);
-        let heights = warp_depth(&self.depth, print_from_depth, width, height);
-        let view = PrintView::enlarged(&self.print.picture);
-        [
-            png_mask(&strokes),
-            png_grey16(&heights),
-            png_mask(&aligned),
-            png_rgb8(&view.overlay(&self.print.picture, &self.depth, outcome)),
-        ]
-    }
-
-    /// Writes the files of one metric. Returns the paths for the metric's line, including the paths of files shared by
-    /// all metrics.
-    pub(super) fn write_metric(
-        &self,
-        root: &Path,
-        metric: ThresholdMetric,
-        drawn: &EncodedImages,
-    ) -> Result<Files, FilesError> {
-        let files = self.files(metric);
-        for (role, path) in [
-            (canvas_depth_mask(metric), &files.canvas_depth_mask),
-            (stroke_map(metric), &files.stroke_map),
-        ] {
-            let image = self.artifacts.bytes(Stage::Register, &role)?;
-            write(root, path, &image)?;
-        }
-        let paths = [
-            &files.depth_mask,
-            &files.aligned_depth,
-            &files.aligned_mask,
-            &files.overlay,
-        ];
-        for (path, image) in paths.into_iter().zip(drawn) {
-            write(root, path, image)?;
-        }
-        Ok(files)
-    }
-
-    fn files(&self, metric: ThresholdMetric) -> Files {
-        Files::of(self.name, metric, self.print.extension())
-    }
-
-    fn sidecar(&self) -> String {
-        let scale = &self.depth.scale;
-        let sidecar = Sidecar {
-            no_data: 0,
-            scale,
-            mm_per_mesh_unit: scale.unit.map(crate::domain::LengthUnit::mm),
+    /// Adds the file of each group, given the first member of each metric's group.
+    fn add_groups(
+        &mut self,
+        name: &str,
+        first: &[usize],
+        draw: impl Fn(usize) -> Result<Vec<u8>, PictureError>,
+    ) -> Result<Vec<String>, PictureError> {
+        let is_shared = first.iter().all(|index| *index == 0);
+        let pattern = |index: usize| {
+            if is_shared {
+                return format!("{PAIR}/{name}.png");
+            }
+            let metric = self.pictures.metrics[index].outcome.metric;
+            format!("{PAIR}/{metric}/{name}.png")
         };
-        let text = serde_json::to_string_pretty(&sidecar)
-            .expect("a scale holds only numbers, lists and names");
-        text + "\n"
+        let patterns: Vec<String> = first.iter().map(|index| pattern(*index)).collect();
+        for (i, index) in first.iter().enumerate() {
+            if i == *index {
+                self.encoded.add_file(&patterns[i], draw(i)?);
+            }
+        }
+        Ok(patterns)
     }
 }
 
-/// Writes a file below the export folder, and creates its parent folders.
-fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
-    let path = root.join(below);
-    match path.parent().map_or(Ok(()), std::fs::create_dir_all) {
-        // `AlreadyExists` means that the folder exists but cannot be inspected. The write below reports the cause.
-        Err(error) if error.kind() != ErrorKind::AlreadyExists => {
-            return Err(at(&path)(error).into());
-        }
-        Ok(()) | Err(_) => {}
-    }
-    Ok(std::fs::write(&path, bytes).map_err(at(&path))?)
+/// Returns for each item the index of the first item that is the same.
+fn first_of_each<T>(items: &[T], is_same: impl Fn(&T, &T) -> bool) -> Vec<usize> {
+    let first = |item| items.iter().position(|earlier| is_same(earlier, item));
+    let found = items
+        .iter()
+        .enumerate()
+        .map(|(i, item)| first(item).unwrap_or(i));
+    found.collect()
+}
+
+fn sidecar(scale: &DepthScale) -> String {
+    let sidecar = DepthSidecar {
+        no_data: 0,
+        scale,
+        curvature: scale.bow.map_or([0.0; 6], |bow| bow.0),
+        mm_per_mesh_unit: scale.unit.map(LengthUnit::mm),
+    };
+    let text = serde_json::to_string_pretty(&sidecar)
+        .expect("a scale holds only numbers, lists and names");
+    text + "\n"
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Files;
-    use crate::domain::ThresholdMetric;
+    use super::first_of_each;
 
     #[test]
-    fn metrics_share_files_that_do_not_depend_on_them() {
-        let density = Files::of("b01-2", ThresholdMetric::Density, "jpg");
-        let ensemble = Files::of("b01-2", ThresholdMetric::Ensemble, "jpg");
-        assert_eq!(density.print, "pairs/b01-2/print.jpg");
-        assert_eq!(density.depth, ensemble.depth);
-        assert_eq!(density.aligned_mask, "pairs/b01-2/density/aligned_mask.png");
-        assert_ne!(density.canvas_depth_mask, ensemble.canvas_depth_mask);
+    fn equal_items_share_the_first() {
+        let same = |a: &i32, b: &i32| a == b;
+        assert_eq!(first_of_each(&[7, 7, 7], same), [0, 0, 0]);
+        assert_eq!(first_of_each(&[7, 8, 7, 8], same), [0, 1, 0, 1]);
+        assert_eq!(first_of_each(&[], same), []);
     }
 }

@@ -10,6 +10,7 @@ mod resample;
 mod supersample;
 mod warp_depth;
 mod warp_mask;
+mod warp_rgb;
 
 pub use decode::{DecodeError, ImageLimits, PrintImage, decode, header_pixel_count};
 pub use depth_map::DepthMap;
@@ -22,3 +23,4 @@ pub use mask::{Mask, MaskOverlap, PixelBox};
 pub use resample::{resample, resample_transposed};
 pub use warp_depth::warp_depth;
 pub use warp_mask::warp_mask;
+pub use warp_rgb::warp_rgb;

@@ -38,7 +38,7 @@ impl Supersampler {
 
     /// Calls `visit` with the source position of each sample of an output pixel, row by row.
     #[inline(always)]
-    fn for_each_sample(&self, x: usize, y: usize, mut visit: impl FnMut([f64; 2])) {
+    pub(super) fn for_each_sample(&self, x: usize, y: usize, mut visit: impl FnMut([f64; 2])) {
         let offsets = &self.offsets[..self.per_side];
         for down in offsets {
             for across in offsets {

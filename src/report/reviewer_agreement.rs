@@ -256,6 +256,7 @@ mod tests {
 
     fn answer(pair: &str, check: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
         AttentionCheckAnswer {
+            id: 0,
             pair: PairName::new(pair).expect("test names are ids"),
             metric: ThresholdMetric::Density,
             result_hash: ContentHash::of(pair.as_bytes()),

@@ -9,9 +9,11 @@ use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
 use mocban::export::pictures::SHEET_WIDTH;
 use mocban::export::{
-    ContactSheetOptions, ContactSheetOrder, JsonlOptions, draw_contact_sheet, to_jsonl,
+    ContactSheetOptions, ContactSheetOrder, ExportFormat, ExportOptions, InputFileLimits,
+    draw_contact_sheet,
 };
 use mocban::manifest::parse_csv;
+use mocban::mesh::MeshLimits;
 use mocban::raster::{self, Grid, decode_grey8, decode_grey16};
 use mocban::report::{Report, build};
 use mocban::runner::{self, RunOptions, Stop};
@@ -111,16 +113,18 @@ impl FinishedRun {
 
     async fn export(&self, to: &str) -> PathBuf {
         let target = self.dir.path().join(to);
-        let options = JsonlOptions {
-            metrics: &ThresholdMetric::ALL,
-            with_times: false,
-            limits: raster::ImageLimits::SUGGESTED,
+        let limits = InputFileLimits {
+            mesh: MeshLimits::SUGGESTED,
+            image: raster::ImageLimits::SUGGESTED,
         };
-        let summary = to_jsonl(&self.catalog, &self.project, &target, options)
-            .await
-            .expect("the folder is new");
+        let options = ExportOptions::all_of(&ThresholdMetric::ALL, limits);
+        let formats = [ExportFormat::Jsonl];
+        let summary =
+            mocban::export::export(&self.catalog, &self.project, &target, &formats, options)
+                .await
+                .expect("the folder is new");
         assert_eq!(
-            (summary.done, summary.without_result),
+            (summary.pairs.done, summary.pairs.without_result),
             (2, 1),
             "{summary:?}"
         );

@@ -41,6 +41,9 @@ pub struct ManualAlignment {
 /// A stored manual alignment.
 #[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct StoredAlignment {
+    /// Number in the log.
+    #[serde(skip)]
+    pub id: i64,
     /// The alignment.
     #[serde(flatten)]
     #[sqlx(flatten)]
@@ -62,16 +65,36 @@ SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13
 WHERE NOT EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1)
 RETURNING id";
 
-const LOG: &str = "
-SELECT a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash,
+/// Selects manual alignments with their undo and whether they hold; the tables are in the order of the join.
+macro_rules! select_alignments {
+    ($from:literal, $condition:literal) => {
+        concat!(
+            "
+SELECT a.id, a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash,
     a.depth_hash, a.seen, a.iou, a.dice, a.note, a.at, u.at AS undone_at,
     coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, 0) AS holds,
     coalesce(d.result_hash = a.depth_hash, 0) AS on_current_depth
-FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
+FROM ",
+            $from,
+            "
     LEFT JOIN manual_alignment_undo AS u ON u.alignment = a.id
     LEFT JOIN stage_result AS d ON d.pair = a.pair AND d.stage = 1
     LEFT JOIN stage_result AS n ON n.pair = a.pair AND n.stage = 2
-ORDER BY a.id";
+WHERE ",
+            $condition
+        )
+    };
+}
+
+const LOG: &str = select_alignments!(
+    "manual_alignment AS a JOIN pair AS p ON p.id = a.pair",
+    "a.id > ?1 ORDER BY a.id LIMIT ?2"
+);
+
+const OF_NAMES: &str = select_alignments!(
+    "pair AS p CROSS JOIN manual_alignment AS a ON a.pair = p.id",
+    "p.name BETWEEN ?1 AND ?2 ORDER BY a.id"
+);
 
 impl Catalog {
     /// Appends a manual alignment durably. Returns `false`, and stores nothing, if an alignment with this event exists.
@@ -115,8 +138,23 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
+        self.manual_alignment_page(0, usize::MAX).await
+    }
+
+    /// Returns up to `limit` manual alignments with ids above `after`, including undone ones, oldest first.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn manual_alignment_page(
+        &self,
+        after: i64,
+        limit: usize,
+    ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
+        let query = sqlx::query_as(LOG).bind(after);
+        // As SQLite's limit, a negative number means none.
+        let query = query.bind(limit as i64);
+        Ok(query.fetch_all(&mut *conn).await?)
     }
 
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
@@ -124,11 +162,31 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
-        let stored = self.manual_alignments().await?.into_iter();
-        let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
-        // The alignments are sorted oldest first, so the newest one stays.
-        Ok(valid
-            .map(|stored| (stored.made.pair.clone(), stored))
-            .collect())
+        Ok(newest(self.manual_alignments().await?))
     }
+
+    /// Returns the newest manual alignment of each pair with a name from `first` to `last`, like
+    /// [`Self::newest_manual_alignments`].
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn newest_manual_alignments_between(
+        &self,
+        first: &PairName,
+        last: &PairName,
+    ) -> Result<BTreeMap<PairName, StoredAlignment>> {
+        let mut conn = self.read_conn().await?;
+        let query = sqlx::query_as(OF_NAMES);
+        let query = query.bind(first.as_str()).bind(last.as_str());
+        Ok(newest(query.fetch_all(&mut *conn).await?))
+    }
+}
+
+/// Returns the newest alignment of each pair that holds and is not undone.
+fn newest(oldest_first: Vec<StoredAlignment>) -> BTreeMap<PairName, StoredAlignment> {
+    let valid =
+        (oldest_first.into_iter()).filter(|stored| stored.holds && stored.undone_at.is_none());
+    valid
+        .map(|stored| (stored.made.pair.clone(), stored))
+        .collect()
 }

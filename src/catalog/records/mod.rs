@@ -6,6 +6,7 @@ pub(crate) mod import;
 pub(crate) mod input_paths;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
+pub(crate) mod pair_groups;
 pub(crate) mod pair_results;
 pub(crate) mod pair_work;
 pub(crate) mod review_answers;

@@ -72,6 +72,9 @@ impl FromRow<'_, SqliteRow> for AnsweredOn {
 /// An answer to an attention check, undone or not.
 #[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
 pub struct AttentionCheckAnswer {
+    /// Number in the log.
+    #[serde(skip)]
+    pub id: i64,
     /// The pair.
     pub pair: PairName,
     /// The metric whose result the check was made from.
@@ -120,10 +123,10 @@ WHERE c.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WH
 ORDER BY v.at, is_check, v.id";
 
 const CHECK_ANSWERS: &str = r#"
-SELECT c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "check", c.seen, c.shown_ms, c.angle_read_deg,
+SELECT c.id, c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "check", c.seen, c.shown_ms, c.angle_read_deg,
     NULL AS review_order, c.verdict, c.reviewer, c.reason, c.note, c.at, u.at AS undone_at
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
-ORDER BY c.id"#;
+WHERE c.id > ?1 ORDER BY c.id LIMIT ?2"#;
 
 /// Statements that undo what a reviewer stored under an event id, with their tables. A second undo has no effect.
 const UNDO: [(ChecksummedTable, &str); 3] = [
@@ -237,8 +240,22 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
+        self.attention_check_page(0, usize::MAX).await
+    }
+
+    /// Returns up to `limit` answers to attention checks with ids above `after`, including undone ones, oldest first.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn attention_check_page(
+        &self,
+        after: i64,
+        limit: usize,
+    ) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(CHECK_ANSWERS);
+        let query = sqlx::query_as(CHECK_ANSWERS).bind(after);
+        // As SQLite's limit, a negative number means none.
+        let query = query.bind(limit as i64);
         Ok(query.fetch_all(&mut *conn).await?)
     }
 

@@ -112,13 +112,15 @@ SELECT EXISTS (SELECT 1 FROM verdict AS v
     AND v.verdict = ?7 AND v.reason IS ?8 AND v.note IS ?9
     AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act))";
 
-/// Selects the verdict log. If not NULL, `?1` limits it to one action and `?2` to one pair.
+/// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
+/// that many rows.
 const LOG: &str = "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
     v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
-WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) ORDER BY v.id";
+WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0)
+ORDER BY v.id LIMIT coalesce(?4, -1)";
 
 pub(crate) const COUNTED: &str = "
 SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
@@ -178,7 +180,11 @@ impl Catalog {
                     .execute(&mut *conn)
                     .await?;
                 checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
-                let query = sqlx::query_as(LOG).bind(act).bind(None::<&str>);
+                let query = sqlx::query_as(LOG)
+                    .bind(act)
+                    .bind(None::<&str>)
+                    .bind(None::<i64>)
+                    .bind(None::<i64>);
                 Ok(query.fetch_all(conn).await?)
             })
         })
@@ -192,6 +198,17 @@ impl Catalog {
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair).await
+    }
+
+    /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
+        let mut conn = self.read_conn().await?;
+        let query = sqlx::query_as(LOG).bind(None::<i64>).bind(None::<&str>);
+        let query = query.bind(after).bind(limit as i64);
+        Ok(query.fetch_all(&mut *conn).await?)
     }
 }
 
@@ -293,6 +310,7 @@ pub(crate) async fn log(
 ) -> Result<Vec<VerdictEvent>> {
     let query = sqlx::query_as(LOG).bind(None::<i64>);
     let query = query.bind(pair.map(PairName::as_str));
+    let query = query.bind(None::<i64>).bind(None::<i64>);
     Ok(query.fetch_all(conn).await?)
 }
 

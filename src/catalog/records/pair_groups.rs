@@ -1,0 +1,48 @@
+//! Groups of pairs and columns of the user, for exports.
+
+use std::collections::BTreeMap;
+
+use sqlx::Row as _;
+
+use crate::catalog::{Catalog, Result};
+
+const META_COLUMNS: &str = "
+SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m ORDER BY m.key";
+
+const GROUPS: &str = "
+SELECT CASE ?1 WHEN 'block' THEN nullif(p.block, '') WHEN 'character' THEN nullif(p.character, '') END AS shared,
+    p.name, count(*) AS pairs
+FROM pair AS p GROUP BY shared, CASE WHEN shared IS NULL THEN p.name END";
+
+impl Catalog {
+    /// Returns the names of the user's columns of all pairs, sorted.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn meta_columns(&self) -> Result<Vec<String>> {
+        let mut conn = self.read_conn().await?;
+        Ok(sqlx::query_scalar(META_COLUMNS)
+            .fetch_all(&mut *conn)
+            .await?)
+    }
+
+    /// Counts the pairs with equal values of an attribute, which is `block`, `character` or another text for none. A
+    /// pair without a value is counted alone. A key is whether the pair is alone, then the value or the pair's name.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn pair_groups(&self, attribute: &str) -> Result<BTreeMap<(bool, String), u64>> {
+        let mut conn = self.read_conn().await?;
+        let query = sqlx::query(GROUPS).bind(attribute);
+        let found = query.fetch_all(&mut *conn).await?;
+        let groups = found.iter().map(|row| {
+            let shared: Option<String> = row.try_get("shared")?;
+            let key = match shared {
+                Some(value) => (false, value),
+                None => (true, row.try_get("name")?),
+            };
+            Ok((key, row.try_get("pairs")?))
+        });
+        groups.collect()
+    }
+}

@@ -1,0 +1,96 @@
+//! The logs of the reviewers: verdicts, answers to attention checks and manual alignments.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::export_folder::SharedFile;
+use super::exporter_error::ExportError;
+use crate::catalog::Catalog;
+
+/// The logs with their meaning.
+pub(super) const LOG_FILES: [[&str; 2]; 3] = [
+    [
+        "verdicts.jsonl",
+        "all verdicts with reviewer, time and hash of the judged result, oldest first, including undone ones",
+    ],
+    [
+        "attention_checks.jsonl",
+        "answers to attention checks and duplicates, if any",
+    ],
+    ["manual_alignments.jsonl", "manual alignments, if any"],
+];
+
+/// Lines in memory at a time.
+const PAGE: usize = 1000;
+
+/// Returns values as JSON lines.
+pub(super) fn json_lines<T: Serialize>(values: &[T]) -> String {
+    let line = |value| {
+        let text = serde_json::to_string(value);
+        text.expect("lines hold only strings, finite numbers, lists and fields") + "\n"
+    };
+    values.iter().map(line).collect()
+}
+
+/// Writes the logs page by page, oldest first, including undone entries. Leaves out empty logs except that of verdicts.
+/// Returns the names of the files.
+///
+/// # Errors
+/// Returns an error if the catalog cannot be read or a file cannot be written.
+pub(super) async fn write_logs(
+    catalog: &Catalog,
+    root: &Path,
+) -> Result<impl Iterator<Item = &'static str>, ExportError> {
+    let [[verdicts, _], [checks, _], [alignments, _]] = LOG_FILES;
+    let mut written = vec![verdicts];
+    let (mut file, mut after) = (SharedFile::create(root, verdicts)?, 0);
+    while let page = catalog.verdict_log_page(after, PAGE).await?
+        && let Some(last) = page.last()
+    {
+        after = last.id;
+        file.append(json_lines(&page).as_bytes())?;
+    }
+    file.flush()?;
+    let (mut file, mut after) = (None, 0);
+    while let page = catalog.attention_check_page(after, PAGE).await?
+        && let Some(last) = page.last()
+    {
+        after = last.id;
+        append(&mut file, root, checks, &page)?;
+    }
+    written.extend(flush(file)?.then_some(checks));
+    let (mut file, mut after) = (None, 0);
+    while let page = catalog.manual_alignment_page(after, PAGE).await?
+        && let Some(last) = page.last()
+    {
+        after = last.id;
+        append(&mut file, root, alignments, &page)?;
+    }
+    written.extend(flush(file)?.then_some(alignments));
+    Ok(written.into_iter())
+}
+
+/// Appends lines to a file, which is created for the first ones.
+fn append<T: Serialize>(
+    file: &mut Option<SharedFile>,
+    root: &Path,
+    name: &str,
+    lines: &[T],
+) -> Result<(), ExportError> {
+    if file.is_none() {
+        *file = Some(SharedFile::create(root, name)?);
+    }
+    if let Some(file) = file {
+        file.append(json_lines(lines).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Flushes a file. Returns whether there is one.
+fn flush(file: Option<SharedFile>) -> Result<bool, ExportError> {
+    match file {
+        None => Ok(false),
+        Some(mut file) => Ok(file.flush().map(|()| true)?),
+    }
+}

@@ -1,0 +1,357 @@
+//! Exports the pairs of a project in one or several formats: reads them page by page, encodes each page on all cores,
+//! and appends the pairs in the order of the catalog.
+//!
+//! Equal results give equal bytes. Times differ from run to run, so they are left out unless requested.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::export_folder::{Folder, FolderError, write_below};
+use super::export_logs::write_logs;
+use super::exporter_error::ExportError;
+use super::format::ExportFormat;
+use super::format_writer::{
+    EncodedFile, EncodedPair, ExportContext, FormatFolder, FormatWriter, PairView,
+};
+use super::formats;
+use super::manifest::{ExportManifest, MANIFEST, PairCounts};
+use super::options::ExportOptions;
+use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
+use super::readme;
+use super::record::{ManualAlignmentFields, PairRecord};
+use super::split::SplitPlan;
+use super::stage_outcomes::StageOutcomes;
+use crate::catalog::{Catalog, MetricRecord, PairResults, StoredAlignment};
+use crate::domain::{Affine2, Failure, FailureClass, PairName};
+use crate::report::pair_artifacts::PairArtifacts;
+use crate::store::Project;
+
+/// Pairs in memory at a time.
+const PAGE: usize = 32;
+
+/// What was exported.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ExportSummary {
+    /// Numbers of pairs.
+    pub pairs: PairCounts,
+    /// Pairs whose result cannot be read, and why.
+    pub unreadable: Vec<(PairName, String)>,
+    /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs cannot be read.
+    pub kept_earlier: bool,
+    /// The path of an earlier export that could not be removed after it was replaced, and why.
+    pub leftover: Option<(PathBuf, String)>,
+}
+
+/// Exports the pairs of a project to a folder, which must be new, empty or an earlier export. Replaces an earlier
+/// export. One format is written to the folder itself; of several, each is written to a folder of its name in it.
+///
+/// If the files of a pair cannot be read, its record and the summary state so, and the other pairs are exported. Such an
+/// incomplete export never replaces an earlier export: the new one is discarded.
+///
+/// # Errors
+/// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. If the error
+/// occurs before the earlier export is replaced, that export is kept.
+pub async fn export(
+    catalog: &Catalog,
+    project: &Project,
+    dir: &Path,
+    formats: &[ExportFormat],
+    options: ExportOptions,
+) -> Result<ExportSummary, ExportError> {
+    catalog.verify_checksums().await?;
+    let plan = match options.split {
+        Some(split) => Some(SplitPlan::new(
+            &split,
+            &catalog.pair_groups(split.by.name()).await?,
+        )),
+        None => None,
+    };
+    let context = ExportContext {
+        program: format!("mocban {}", env!("CARGO_PKG_VERSION")),
+        metrics: options.metrics.clone(),
+        meta_columns: catalog.meta_columns().await?,
+        options,
+    };
+    let mut run = ExportRun::begin(project, dir, formats, context, plan)?;
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
+        let manual_alignments = match (page.first(), page.last()) {
+            (Some(first), Some(last)) => {
+                let [first, last] = [first, last].map(|pair| &pair.attributes.name);
+                catalog
+                    .newest_manual_alignments_between(first, last)
+                    .await?
+            }
+            _ => BTreeMap::new(),
+        };
+        let task = move || {
+            let added = run.add_page(page, manual_alignments);
+            added.map(|()| run)
+        };
+        run = tokio::task::spawn_blocking(task).await??;
+    }
+    for (root, prefix) in run.roots_with_logs() {
+        let written = write_logs(catalog, &root).await?;
+        run.files
+            .extend(written.map(|name| format!("{prefix}{name}")));
+    }
+    Ok(tokio::task::spawn_blocking(move || run.finish()).await??)
+}
+
+/// One format of an export.
+struct FormatOutput {
+    format: ExportFormat,
+    /// Path of its folder below the folder of the export: empty, or its name and a slash.
+    prefix: String,
+    writer: Box<dyn FormatWriter>,
+}
+
+/// An export in progress.
+struct ExportRun {
+    project: Project,
+    folder: Folder,
+    outputs: Vec<FormatOutput>,
+    context: Arc<ExportContext>,
+    plan: Option<SplitPlan>,
+    /// Paths of files below the folder, with `*` in place of ids.
+    files: BTreeSet<String>,
+    summary: ExportSummary,
+}
+
+/// A pair that was encoded and whose own files were written.
+struct WrittenPair {
+    record: PairRecord,
+    /// What each format appends to shared files.
+    shared: Vec<Vec<Vec<u8>>>,
+    /// Patterns of the written files.
+    files: BTreeSet<String>,
+    /// Why its files are missing although it is finished.
+    unreadable: Option<String>,
+}
+
+impl ExportRun {
+    fn begin(
+        project: &Project,
+        dir: &Path,
+        formats: &[ExportFormat],
+        context: ExportContext,
+        plan: Option<SplitPlan>,
+    ) -> Result<Self, FolderError> {
+        let folder = Folder::begin(dir)?;
+        let context = Arc::new(context);
+        let mut outputs = Vec::new();
+        for format in formats {
+            let prefix = match formats {
+                [_] => String::new(),
+                _ => format!("{format}/"),
+            };
+            let root = folder.path().join(&prefix);
+            std::fs::create_dir_all(&root).map_err(super::export_folder::at(&root))?;
+            let context = Arc::clone(&context);
+            outputs.push(FormatOutput {
+                format: *format,
+                prefix,
+                writer: formats::begin(*format, FormatFolder { root, context })?,
+            });
+        }
+        Ok(Self {
+            project: project.clone(),
+            folder,
+            outputs,
+            context,
+            plan,
+            files: BTreeSet::new(),
+            summary: ExportSummary::default(),
+        })
+    }
+
+    /// Encodes a page of pairs on all cores, then appends them in order.
+    fn add_page(
+        &mut self,
+        pairs: Vec<PairResults>,
+        mut manual_alignments: BTreeMap<PairName, StoredAlignment>,
+    ) -> Result<(), FolderError> {
+        let pairs: Vec<_> = pairs
+            .into_iter()
+            .map(|pair| {
+                let alignment = manual_alignments.remove(&pair.attributes.name);
+                (pair, alignment.map(ManualAlignmentFields::from))
+            })
+            .collect();
+        let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
+            .into_par_iter()
+            .map(|(pair, alignment)| self.write_pair(&pair, alignment.as_ref()))
+            .collect();
+        for pair in written? {
+            match pair {
+                None => self.summary.pairs.left_out += 1,
+                Some(pair) => self.append(pair)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Encodes a pair in every format and writes its own files. Returns `None` if the pair is left out.
+    fn write_pair(
+        &self,
+        pair: &PairResults,
+        alignment: Option<&ManualAlignmentFields>,
+    ) -> Result<Option<WrittenPair>, FolderError> {
+        let options = &self.context.options;
+        let kept: Vec<_> = pair
+            .metrics
+            .iter()
+            .filter(|record| options.keeps(record))
+            .collect();
+        if options.is_filtered() && kept.is_empty() {
+            return Ok(None);
+        }
+        let complete = |mut record: PairRecord| {
+            record.pair.manual_alignment = alignment.cloned();
+            record.pair.split = self
+                .plan
+                .as_ref()
+                .and_then(|plan| plan.part(&pair.attributes));
+            record
+        };
+        let (record, encoded, unreadable) = match self.encode_result(pair, &kept, complete) {
+            Ok((record, encoded)) => (record, encoded, None),
+            Err(error) => {
+                let failure = Failure::new(FailureClass::Io, error.to_string());
+                let record = complete(PairRecord::unreadable(pair, &failure));
+                let encoded = self.encode(&record, None).expect("nothing is read");
+                (record, encoded, Some(failure.message))
+            }
+        };
+        let mut written = WrittenPair {
+            record,
+            shared: Vec::new(),
+            files: BTreeSet::new(),
+            unreadable,
+        };
+        let id = pair.attributes.name.as_str();
+        for (output, EncodedPair { files, shared }) in self.outputs.iter().zip(encoded) {
+            for EncodedFile { pattern, bytes } in files {
+                let pattern = format!("{}{pattern}", output.prefix);
+                write_below(self.folder.path(), &pattern.replace('*', id), &bytes)?;
+                written.files.insert(pattern);
+            }
+            written.shared.push(shared);
+        }
+        Ok(Some(written))
+    }
+
+    /// Reads the outcomes of a pair and encodes it in every format.
+    fn encode_result(
+        &self,
+        pair: &PairResults,
+        kept: &[&MetricRecord],
+        complete: impl Fn(PairRecord) -> PairRecord,
+    ) -> Result<(PairRecord, Vec<EncodedPair>), PictureError> {
+        let options = &self.context.options;
+        if kept.is_empty() {
+            let record = complete(PairRecord::of(pair, None, &[]));
+            let encoded = self.encode(&record, None)?;
+            return Ok((record, encoded));
+        }
+        let outcomes = StageOutcomes::read(&PairArtifacts::new(&self.project, pair))?;
+        let mut record = complete(PairRecord::of(pair, Some(&outcomes), kept));
+        record.pair.seconds = options.with_times.then(|| pair.seconds());
+        record.pair.picture_from_print = Some(match options.canvas_px {
+            None => Affine2::IDENTITY,
+            Some(side) => canvas_from_print(&outcomes, side).unwrap_or(Affine2::IDENTITY),
+        });
+        let kept = kept.to_vec();
+        let (limits, canvas) = (options.limits, options.canvas_px);
+        let pictures = PairPictures::new(&self.project, pair, &outcomes, kept, limits, canvas);
+        let encoded = self.encode(&record, Some(&pictures))?;
+        Ok((record, encoded))
+    }
+
+    /// Encodes a pair in every format.
+    fn encode(
+        &self,
+        record: &PairRecord,
+        result: Option<&PairPictures<'_>>,
+    ) -> Result<Vec<EncodedPair>, PictureError> {
+        let view = PairView { record, result };
+        let outputs = self.outputs.iter();
+        outputs.map(|output| output.writer.encode(&view)).collect()
+    }
+
+    fn append(&mut self, mut pair: WrittenPair) -> Result<(), FolderError> {
+        for (output, shared) in self.outputs.iter_mut().zip(pair.shared) {
+            output.writer.append(&pair.record, shared)?;
+        }
+        self.files.append(&mut pair.files);
+        if let Some(why) = pair.unreadable {
+            self.summary.unreadable.push((pair.record.pair.id, why));
+        } else if pair.record.metrics.is_empty() {
+            self.summary.pairs.without_result += 1;
+        } else {
+            self.summary.pairs.done += 1;
+        }
+        Ok(())
+    }
+
+    /// Returns the folders of the formats that hold the logs of the reviewers, with their prefixes.
+    fn roots_with_logs(&self) -> Vec<(PathBuf, String)> {
+        let with_logs = self
+            .outputs
+            .iter()
+            .filter(|output| output.format == ExportFormat::Jsonl);
+        with_logs
+            .map(|output| {
+                (
+                    self.folder.path().join(&output.prefix),
+                    output.prefix.clone(),
+                )
+            })
+            .collect()
+    }
+
+    /// Completes the shared files, writes the READMEs and the manifest, and replaces the target.
+    fn finish(mut self) -> Result<ExportSummary, FolderError> {
+        let root = self.folder.path().to_owned();
+        let mut summary = self.summary;
+        for output in &mut self.outputs {
+            let mut names = output.writer.finish()?;
+            let guide = output.writer.guide();
+            let text = readme::render(&guide, output.format, &self.context, summary.pairs);
+            let mut own = vec![(readme::README, text)];
+            own.extend(
+                guide
+                    .schema
+                    .map(|schema| (readme::SCHEMA, format!("{schema:#}\n"))),
+            );
+            for (name, text) in own {
+                write_below(&root, &format!("{}{name}", output.prefix), text.as_bytes())?;
+                names.push(name.to_owned());
+            }
+            let paths = names.iter().map(|name| format!("{}{name}", output.prefix));
+            self.files.extend(paths);
+        }
+        self.files.insert(MANIFEST.to_owned());
+        let formats: Vec<_> = self.outputs.iter().map(|output| output.format).collect();
+        let (context, files) = (&self.context, &self.files);
+        let manifest = ExportManifest::new(
+            &context.program,
+            &formats,
+            &context.options,
+            summary.pairs,
+            files,
+        );
+        write_below(&root, MANIFEST, manifest.text().as_bytes())?;
+        // Open files would keep the folder from being removed on some file systems.
+        self.outputs.clear();
+        summary.kept_earlier = !summary.unreadable.is_empty() && self.folder.replaces()?;
+        if !summary.kept_earlier {
+            let leftover = self.folder.finish()?;
+            summary.leftover = leftover.map(|(path, error)| (path, error.to_string()));
+        }
+        Ok(summary)
+    }
+}

@@ -1,0 +1,18 @@
+//! Why an export fails.
+
+use super::export_folder::FolderError;
+use crate::catalog::CatalogError;
+
+/// Why nothing was exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The catalog cannot be read.
+    #[error("{0}")]
+    Catalog(#[from] CatalogError),
+    /// The folder cannot be used, or a file in it not written.
+    #[error("{0}")]
+    Folder(#[from] FolderError),
+    /// A worker task panicked or was cancelled.
+    #[error("the export stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}

@@ -1,0 +1,37 @@
+//! The formats of `export --to`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::enum_names;
+
+/// A format of `export --to`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ExportFormat {
+    /// One line per pair and metric, with masks and images in files.
+    Jsonl,
+    /// One row per pair and metric, for spreadsheets and R.
+    Csv,
+}
+
+enum_names! {
+    pub ExportFormat, "an export format":
+    Jsonl = "jsonl", Csv = "csv",
+}
+
+impl ExportFormat {
+    /// Returns whether the format writes pictures in the frame of the print, so that it can use a canvas.
+    pub const fn writes_pictures(self) -> bool {
+        match self {
+            Self::Jsonl => true,
+            Self::Csv => false,
+        }
+    }
+
+    /// Returns whether the format writes the part of the dataset that a pair belongs to.
+    pub const fn writes_splits(self) -> bool {
+        match self {
+            Self::Jsonl | Self::Csv => true,
+        }
+    }
+}

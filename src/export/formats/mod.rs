@@ -1,0 +1,22 @@
+//! One file for each format of exports.
+
+mod csv;
+mod jsonl;
+
+use super::export_folder::FolderError;
+use super::format::ExportFormat;
+use super::format_writer::{FormatFolder, FormatWriter};
+
+/// Creates the writer of a format for an empty folder.
+///
+/// # Errors
+/// Returns an error if a file cannot be created.
+pub(super) fn begin(
+    format: ExportFormat,
+    folder: FormatFolder,
+) -> Result<Box<dyn FormatWriter>, FolderError> {
+    Ok(match format {
+        ExportFormat::Jsonl => Box::new(jsonl::JsonlWriter::begin(folder)?),
+        ExportFormat::Csv => Box::new(csv::CsvWriter::begin(folder)?),
+    })
+}

@@ -1,0 +1,136 @@
+//! What to export: metrics, results, pictures and splits.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::format::ExportFormat;
+use super::pair_pictures::InputFileLimits;
+use super::split::SplitSettings;
+use crate::catalog::MetricRecord;
+use crate::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
+use crate::report::Consensus;
+
+/// Which results are exported.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ResultFilter {
+    /// All pairs, also those without a result.
+    #[default]
+    All,
+    /// Results whose confidence is not low.
+    Confident,
+    /// Results that the reviewers passed.
+    Passed,
+}
+
+enum_names! {
+    pub ResultFilter, "a selection of results":
+    All = "all", Confident = "confident", Passed = "passed",
+}
+
+/// What to export, and how.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExportOptions {
+    /// Metrics to export. A pair without a result still has one line for each of these metrics.
+    pub metrics: Vec<ThresholdMetric>,
+    /// Which results are exported.
+    pub only: ResultFilter,
+    /// Lowest confidence of exported results, 0..=1.
+    pub min_confidence: Option<f64>,
+    /// Side in pixels of all pictures. `None` keeps the size of the print.
+    pub canvas_px: Option<u32>,
+    /// How pairs are divided into train, validation and test.
+    pub split: Option<SplitSettings>,
+    /// Whether to write computing times, which make the bytes differ from run to run.
+    pub with_times: bool,
+    /// Whether CSV files begin with a byte order mark, which Excel needs to read them as UTF-8.
+    pub csv_bom: bool,
+    /// All settings of the project, for the manifest of the export.
+    #[serde(skip)]
+    pub settings: Value,
+    /// Limits of the input files.
+    #[serde(skip)]
+    pub limits: InputFileLimits,
+}
+
+/// An option that no chosen format can use.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{option} has no effect on {formats}, which {lack}; leave it out")]
+pub struct UnusedOption {
+    option: &'static str,
+    formats: String,
+    lack: &'static str,
+}
+
+impl ExportOptions {
+    /// Returns options that export everything about `metrics`.
+    pub fn all_of(metrics: &[ThresholdMetric], limits: InputFileLimits) -> Self {
+        Self {
+            metrics: metrics.to_vec(),
+            only: ResultFilter::All,
+            min_confidence: None,
+            canvas_px: None,
+            split: None,
+            with_times: false,
+            csv_bom: false,
+            settings: Value::Null,
+            limits,
+        }
+    }
+
+    /// Checks that at least one of the formats can use each option.
+    ///
+    /// # Errors
+    /// Returns an error that names the option and the formats.
+    pub fn check(&self, formats: &[ExportFormat]) -> Result<(), UnusedOption> {
+        let given = [
+            (
+                "--canvas",
+                self.canvas_px.is_some(),
+                ExportFormat::writes_pictures as fn(ExportFormat) -> bool,
+                "writes no pictures of the print's frame",
+            ),
+            (
+                "--split",
+                self.split.is_some(),
+                ExportFormat::writes_splits,
+                "has no splits",
+            ),
+            (
+                "--csv-bom",
+                self.csv_bom,
+                |format| format == ExportFormat::Csv,
+                "writes no CSV",
+            ),
+        ];
+        for (option, is_given, uses, lack) in given {
+            if is_given && !formats.iter().any(|format| uses(*format)) {
+                let names: Vec<&str> = formats.iter().map(|format| format.name()).collect();
+                return Err(UnusedOption {
+                    option,
+                    formats: names.join(", "),
+                    lack,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether pairs and results may be left out.
+    pub fn is_filtered(&self) -> bool {
+        self.only != ResultFilter::All || self.min_confidence.is_some()
+    }
+
+    /// Returns whether a result is exported.
+    pub(super) fn keeps(&self, record: &MetricRecord) -> bool {
+        let confidence = record.outcome.confidence;
+        let reaches = |least: f64| confidence.is_some_and(|found| found >= least);
+        let is_wanted = match self.only {
+            ResultFilter::All => true,
+            ResultFilter::Confident => reaches(MetricOutcome::LOW_CONFIDENCE),
+            ResultFilter::Passed => Consensus::of(record).verdict() == Some(Verdict::Pass),
+        };
+        let is_selected = self.metrics.contains(&record.outcome.metric);
+        is_selected && is_wanted && self.min_confidence.is_none_or(reaches)
+    }
+}

@@ -1,0 +1,238 @@
+//! Reads the inputs and artifacts of a finished pair when they are needed, and draws its pictures.
+
+use std::cell::OnceCell;
+use std::path::PathBuf;
+
+use super::pictures::{PrintView, Rgb, eight_bits};
+use super::source_print::{SourcePrint, SourcePrintError};
+use super::stage_outcomes::StageOutcomes;
+use crate::catalog::{MetricRecord, PairResults};
+use crate::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
+use crate::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
+use crate::raster::{DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb};
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use crate::store::{InputError, Project, open_input};
+
+/// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// A result or artifact cannot be read.
+    #[error(transparent)]
+    Artifacts(#[from] PairArtifactsError),
+    /// The print cannot be used.
+    #[error(transparent)]
+    Print(#[from] SourcePrintError),
+    /// The mesh file cannot be read.
+    #[error(transparent)]
+    MeshFile(#[from] InputError),
+    /// The mesh file is not valid, for example because limits were lowered.
+    #[error("{path}: {source}")]
+    Mesh {
+        /// The mesh file.
+        path: PathBuf,
+        /// Why.
+        source: MeshError,
+    },
+    /// The mesh is not the one that was aligned.
+    #[error("{0} has changed since it was aligned; run again")]
+    MeshChanged(PathBuf),
+}
+
+/// Limits of the input files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InputFileLimits {
+    /// Limits of mesh files.
+    pub mesh: MeshLimits,
+    /// Limits of print images.
+    pub image: ImageLimits,
+}
+
+/// The frame of the exported pictures of a pair: the print's, or the square canvas that was requested.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PictureFrame {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Maps print pixels to pixels of the pictures.
+    pub(super) from_print: Affine2,
+}
+
+/// The inputs and artifacts of a finished pair. Each is read and decoded when it is first needed.
+pub(super) struct PairPictures<'a> {
+    project: &'a Project,
+    pair: &'a PairResults,
+    limits: InputFileLimits,
+    /// Map of a square canvas of the given side, if all pictures have this size.
+    canvas: Option<(usize, Affine2)>,
+    /// The parsed outcomes of the stages.
+    pub(super) outcomes: &'a StageOutcomes,
+    /// The selected results, in the order of `ThresholdMetric::ALL`; parallel to the metrics of the record.
+    pub(super) metrics: Vec<&'a MetricRecord>,
+    print: OnceCell<SourcePrint>,
+    print_mask: OnceCell<Mask>,
+    depth: OnceCell<DepthMap>,
+}
+
+impl<'a> PairPictures<'a> {
+    pub(super) fn new(
+        project: &'a Project,
+        pair: &'a PairResults,
+        outcomes: &'a StageOutcomes,
+        metrics: Vec<&'a MetricRecord>,
+        limits: InputFileLimits,
+        canvas_px: Option<u32>,
+    ) -> Self {
+        Self {
+            project,
+            pair,
+            limits,
+            canvas: canvas_px
+                .and_then(|side| Some((side as usize, canvas_from_print(outcomes, side)?))),
+            outcomes,
+            metrics,
+            print: OnceCell::new(),
+            print_mask: OnceCell::new(),
+            depth: OnceCell::new(),
+        }
+    }
+
+    /// Returns the reader of stored artifacts.
+    pub(super) const fn artifacts(&self) -> PairArtifacts<'a> {
+        PairArtifacts::new(self.project, self.pair)
+    }
+
+    /// Returns an artifact of a stage by its role. Equal artifacts have equal hashes.
+    pub(super) fn artifact(
+        &self,
+        stage: Stage,
+        role: &str,
+    ) -> Result<&'a ArtifactRef, PictureError> {
+        Ok(self.artifacts().artifact(stage, role)?)
+    }
+
+    /// Returns the print as given, decoded.
+    pub(super) fn source_print(&self) -> Result<&SourcePrint, PictureError> {
+        let read = || SourcePrint::read(self.project, self.pair, &self.limits.image);
+        get_or_read(&self.print, || Ok(read()?))
+    }
+
+    /// Returns the ink mask in the frame of the print.
+    fn source_mask(&self) -> Result<&Mask, PictureError> {
+        get_or_read(&self.print_mask, || Ok(self.artifacts().print_mask()?))
+    }
+
+    /// Returns the depth map, in its own frame.
+    pub(super) fn depth(&self) -> Result<&DepthMap, PictureError> {
+        get_or_read(&self.depth, || Ok(self.artifacts().depth()?))
+    }
+
+    /// Returns the frame that the print, the ink mask and the aligned pictures share.
+    pub(super) fn frame(&self) -> Result<PictureFrame, PictureError> {
+        if let Some((side, from_print)) = self.canvas {
+            return Ok(PictureFrame {
+                width: side,
+                height: side,
+                from_print,
+            });
+        }
+        let mask = self.source_mask()?;
+        Ok(PictureFrame {
+            width: mask.width(),
+            height: mask.height(),
+            from_print: Affine2::IDENTITY,
+        })
+    }
+
+    /// Returns the print in the frame of the pictures, 8 bits per channel.
+    pub(super) fn print_rgb(&self) -> Result<Rgb, PictureError> {
+        let print = eight_bits(&self.source_print()?.picture);
+        Ok(match self.canvas {
+            None => print,
+            Some((side, from_print)) => warp_rgb(&print, &from_print, side, side),
+        })
+    }
+
+    /// Returns the print as an image file with its extension: the original where possible, otherwise a PNG.
+    pub(super) fn print_file(&self) -> Result<(Vec<u8>, &'static str), PictureError> {
+        if self.canvas.is_some() {
+            return Ok((png_rgb8(&self.print_rgb()?), "png"));
+        }
+        let print = self.source_print()?;
+        Ok((print.upright_file().into_owned(), print.extension()))
+    }
+
+    /// Returns the ink mask in the frame of the pictures.
+    pub(super) fn print_mask(&self) -> Result<Mask, PictureError> {
+        let (mask, frame) = (self.source_mask()?, self.frame()?);
+        Ok(match self.canvas {
+            None => mask.clone(),
+            Some(_) => warp_mask(mask, &frame.from_print, frame.width, frame.height),
+        })
+    }
+
+    /// Returns the strokes at the metric's threshold, in the frame of the depth map.
+    pub(super) fn depth_mask(&self, outcome: &MetricOutcome) -> Result<Mask, PictureError> {
+        Ok(self.depth()?.stroke_mask(outcome.threshold_level))
+    }
+
+    /// Returns the levels of the depth map in the frame of the pictures. Level 0 is no data; a level means the same
+    /// height as in the depth map.
+    pub(super) fn aligned_depth(&self, outcome: &MetricOutcome) -> Result<Grid<u16>, PictureError> {
+        let (depth, frame) = (self.depth()?, self.frame()?);
+        let to_depth = frame.from_print.after(&outcome.print_from_depth);
+        Ok(warp_depth(depth, &to_depth, frame.width, frame.height))
+    }
+
+    /// Returns the strokes at the metric's threshold, in the frame of the pictures.
+    pub(super) fn aligned_mask(&self, outcome: &MetricOutcome) -> Result<Mask, PictureError> {
+        let (strokes, frame) = (self.depth_mask(outcome)?, self.frame()?);
+        let to_depth = frame.from_print.after(&outcome.print_from_depth);
+        Ok(warp_mask(&strokes, &to_depth, frame.width, frame.height))
+    }
+
+    /// Returns the print with the edges of the strokes, enlarged for viewing.
+    pub(super) fn overlay(&self, outcome: &MetricOutcome) -> Result<Rgb, PictureError> {
+        let (print, depth) = (&self.source_print()?.picture, self.depth()?);
+        Ok(PrintView::enlarged(print).overlay(print, depth, outcome))
+    }
+
+    #[expect(dead_code, reason = "the formats with meshes call it")]
+    /// Reads the mesh file, and checks that it is the one that was aligned.
+    pub(super) fn mesh(&self) -> Result<Mesh, PictureError> {
+        let stored = &self.pair.attributes.mesh_path;
+        let (path, limits) = (self.project.input_path(stored), &self.limits.mesh);
+        let mut file = open_input(&path, limits.max_bytes, "limits.mesh.max_bytes")?;
+        let size = file.size();
+        let mesh = match mesh::read_from(&mut file, size, stored, limits) {
+            Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
+            Err(MeshReadError::Mesh(source)) => Err(source),
+            Ok(mesh) => Ok(mesh),
+        };
+        let digest = file.finish()?;
+        let aligned = self.pair.stage(Stage::Fit).map(|record| record.mesh_hash);
+        if aligned.is_some_and(|hash| hash != digest.hash) {
+            return Err(PictureError::MeshChanged(path));
+        }
+        mesh.map_err(|source| PictureError::Mesh { path, source })
+    }
+}
+
+/// Returns the map from print pixels to a square canvas of `side` pixels. `None` if the print's interpretation is not
+/// stored.
+pub(super) fn canvas_from_print(outcomes: &StageOutcomes, side: u32) -> Option<Affine2> {
+    let scale = f64::from(side) / f64::from(outcomes.normalize.canvas_px);
+    // Pixel centres are integers, so both canvases share the corner (-0.5, -0.5).
+    let resize = Affine2::scale_shift(scale, [(scale - 1.0) / 2.0; 2]);
+    Some(resize.after(&outcomes.ink()?.canvas_from_print))
+}
+
+/// Returns the value of a cell, which is read when it is first needed.
+fn get_or_read<T>(
+    cell: &OnceCell<T>,
+    read: impl FnOnce() -> Result<T, PictureError>,
+) -> Result<&T, PictureError> {
+    if let Some(found) = cell.get() {
+        return Ok(found);
+    }
+    let value = read()?;
+    Ok(cell.get_or_init(|| value))
+}
