@@ -6,9 +6,9 @@ use serde::Serialize;
 use super::format_writer::EncodedPair;
 use super::pair_pictures::{PairPictures, PictureError};
 use crate::catalog::MetricRecord;
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, stroke_map};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
 use crate::domain::{DepthScale, LengthUnit, MetricOutcome, Stage, ThresholdMetric};
-use crate::raster::{png_grey16, png_mask, png_rgb8};
+use crate::raster::{compact_grey16, compact_mask, compact_rgb8};
 use crate::report::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
@@ -81,8 +81,12 @@ pub(super) fn write_files(
     let (print, extension) = pictures.print_file()?;
     let print_name = shared(&format!("print.{extension}"));
     encoded.add_file(&print_name, print);
-    encoded.add_file(shared("print_mask.png"), png_mask(&pictures.print_mask()?));
-    encoded.add_file(shared("depth.png"), artifacts.bytes(Stage::Depth, DEPTH)?);
+    encoded.add_file(
+        shared("print_mask.png"),
+        compact_mask(&pictures.print_mask()?),
+    );
+    let depth = compact_grey16(&pictures.depth()?.levels);
+    encoded.add_file(shared("depth.png"), depth);
     encoded.add_file(
         shared("depth.json"),
         sidecar(&pictures.outcomes.depth.scale).into_bytes(),
@@ -94,16 +98,16 @@ pub(super) fn write_files(
     let same_level = |a: &MetricOutcome, b: &MetricOutcome| a.threshold_level == b.threshold_level;
     let same_pose = |a: &MetricOutcome, b: &MetricOutcome| a.print_from_depth == b.print_from_depth;
     let depth_masks = each.add("depth_mask", same_level, |metric| {
-        Ok(png_mask(&pictures.depth_mask(metric)?))
+        Ok(compact_mask(&pictures.depth_mask(metric)?))
     })?;
     let aligned_depths = each.add("aligned_depth", same_pose, |metric| {
-        Ok(png_grey16(&pictures.aligned_depth(metric)?))
+        Ok(compact_grey16(&pictures.aligned_depth(metric)?))
     })?;
     let aligned_masks = each.add("aligned_mask", same_alignment, |metric| {
-        Ok(png_mask(&pictures.aligned_mask(metric)?))
+        Ok(compact_mask(&pictures.aligned_mask(metric)?))
     })?;
     let overlays = each.add("overlay", same_alignment, |metric| {
-        Ok(png_rgb8(&pictures.overlay(metric)?))
+        Ok(compact_rgb8(&pictures.overlay(metric)?))
     })?;
     let canvas_masks = each.add_artifact("canvas_depth_mask", canvas_depth_mask)?;
     let stroke_maps = each.add_artifact("stroke_map", stroke_map)?;
@@ -220,6 +224,6 @@ mod tests {
         let same = |a: &i32, b: &i32| a == b;
         assert_eq!(first_of_each(&[7, 7, 7], same), [0, 0, 0]);
         assert_eq!(first_of_each(&[7, 8, 7, 8], same), [0, 1, 0, 1]);
-        assert_eq!(first_of_each(&[], same), []);
+        assert!(first_of_each(&[], same).is_empty());
     }
 }

@@ -9,7 +9,9 @@ use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
 use crate::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
-use crate::raster::{DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb};
+use crate::raster::{
+    DepthMap, Grid, ImageLimits, Mask, compact_rgb8, warp_depth, warp_mask, warp_rgb,
+};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::{InputError, Project, open_input};
 
@@ -154,7 +156,7 @@ impl<'a> PairPictures<'a> {
     /// Returns the print as an image file with its extension: the original where possible, otherwise a PNG.
     pub(super) fn print_file(&self) -> Result<(Vec<u8>, &'static str), PictureError> {
         if self.canvas.is_some() {
-            return Ok((png_rgb8(&self.print_rgb()?), "png"));
+            return Ok((compact_rgb8(&self.print_rgb()?), "png"));
         }
         let print = self.source_print()?;
         Ok((print.upright_file().into_owned(), print.extension()))

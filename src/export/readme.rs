@@ -50,11 +50,9 @@ pub(super) fn render(
     let _ = writeln!(text, "\n{}", guide.usage);
     let _ = writeln!(text, "\n{}", guide.fields);
     let _ = writeln!(text, "## Settings of the export\n\n{}", settings(context));
-    let _ = writeln!(
-        text,
-        "{}",
-        COORDINATES.replacen("# Coordinates", "## Coordinates", 1)
-    );
+    // The headings become those of a section.
+    let coordinates = COORDINATES.replace("\n## ", "\n### ");
+    let _ = writeln!(text, "#{coordinates}");
     let _ = write!(text, "## How to cite\n\n{CITATION}");
     text
 }

@@ -199,3 +199,86 @@ fn name_of(name: &Value, schema: &Value) -> String {
         None => "any".to_owned(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::Value;
+
+    use super::{
+        FILE_FIELDS, METRIC_FIELDS, PAIR_FIELDS, RecordField, find_properties, markdown_table,
+        property, schema_of,
+    };
+    use crate::export::pair_files::Files;
+    use crate::export::record::{MetricFields, PairFields, PairRecord};
+
+    fn names(properties: &Value) -> BTreeSet<String> {
+        properties
+            .as_object()
+            .expect("properties")
+            .keys()
+            .cloned()
+            .collect()
+    }
+
+    fn listed(fields: &[&[RecordField]]) -> BTreeSet<String> {
+        let fields = fields.iter().flat_map(|fields| fields.iter());
+        fields.map(|field| field.name.to_owned()).collect()
+    }
+
+    #[test]
+    fn the_table_lists_exactly_the_fields_of_the_schema() {
+        #[derive(schemars::JsonSchema)]
+        struct Line {
+            #[serde(flatten)]
+            _pair: PairFields,
+            #[serde(flatten)]
+            _metric: MetricFields,
+        }
+        let schema = schema_of::<Line>();
+        assert_eq!(
+            listed(&[&PAIR_FIELDS, &METRIC_FIELDS]),
+            names(&schema["properties"])
+        );
+        let files = schema_of::<Files>();
+        assert_eq!(
+            listed(&[&FILE_FIELDS]),
+            names(find_properties(&files).expect("fields"))
+        );
+        for field in PAIR_FIELDS.iter().chain(&METRIC_FIELDS) {
+            let described = property(&schema, field.name).expect(field.name);
+            assert!(described["description"].is_string(), "{}", field.name);
+        }
+    }
+
+    #[test]
+    fn matrices_and_choices_are_named_in_the_table() {
+        let schema = schema_of::<PairRecord>();
+        let table = markdown_table(&schema, &[("Fields", &PAIR_FIELDS)]);
+        assert!(
+            table.contains(
+                "| `plane_from_mesh` | number[4][4] or null | mesh unit | mesh to plane |"
+            ),
+            "{table}"
+        );
+        assert!(
+            table.contains("| `status` | `done` or `failed` or `pending` |"),
+            "{table}"
+        );
+    }
+
+    #[test]
+    fn the_documentation_holds_the_same_table() {
+        let schema = schema_of::<crate::export::formats::ExportLine<'_>>();
+        let tables = [
+            ("", &PAIR_FIELDS[..]),
+            ("", &METRIC_FIELDS[..]),
+            ("", &FILE_FIELDS[..]),
+        ];
+        let docs = include_str!("../../docs/data.md");
+        for row in markdown_table(&schema, &tables).lines() {
+            assert!(docs.contains(row), "docs/data.md lacks the line\n{row}");
+        }
+    }
+}

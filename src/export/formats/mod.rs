@@ -3,6 +3,9 @@
 mod csv;
 mod jsonl;
 
+#[cfg(test)]
+pub(super) use jsonl::ExportLine;
+
 use super::export_folder::FolderError;
 use super::format::ExportFormat;
 use super::format_writer::{FormatFolder, FormatWriter};
