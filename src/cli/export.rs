@@ -71,6 +71,15 @@ pub(super) struct ExportArgs {
     /// Begin CSV files with a byte order mark, so that Excel reads them as UTF-8
     #[arg(long)]
     pub(super) csv_bom: bool,
+    /// Include pictures in Parquet tables
+    #[arg(long)]
+    pub(super) images: bool,
+    /// Size in MiB at which the next shard of webdataset or huggingface begins; 256 by default
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=16384))]
+    pub(super) shard_mib: Option<u64>,
+    /// Licence of the data in the dataset card, such as cc-by-4.0
+    #[arg(long, value_name = "LICENCE")]
+    pub(super) license: Option<String>,
     /// Include computing times; the output then differs from run to run
     #[arg(long)]
     pub(super) with_times: bool,
@@ -133,6 +142,9 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         }),
         with_times: args.with_times,
         csv_bom: args.csv_bom,
+        images: args.images,
+        shard_mib: args.shard_mib,
+        license: args.license.clone(),
         settings: serde_json::to_value(config)?,
         limits: InputFileLimits {
             mesh: config.limits.mesh,

@@ -12,18 +12,24 @@ pub enum ExportFormat {
     Jsonl,
     /// One row per pair and metric, for spreadsheets and R.
     Csv,
+    /// One row per pair and metric with typed columns.
+    Parquet,
+    /// A dataset with image columns, for `datasets.load_dataset`.
+    HuggingFace,
+    /// Tar shards with one sample per pair.
+    WebDataset,
 }
 
 enum_names! {
     pub ExportFormat, "an export format":
-    Jsonl = "jsonl", Csv = "csv",
+    Jsonl = "jsonl", Csv = "csv", Parquet = "parquet", HuggingFace = "huggingface", WebDataset = "webdataset",
 }
 
 impl ExportFormat {
     /// Returns whether the format writes pictures in the frame of the print, so that it can use a canvas.
     pub const fn writes_pictures(self) -> bool {
         match self {
-            Self::Jsonl => true,
+            Self::Jsonl | Self::Parquet | Self::HuggingFace | Self::WebDataset => true,
             Self::Csv => false,
         }
     }
@@ -31,7 +37,7 @@ impl ExportFormat {
     /// Returns whether the format writes the part of the dataset that a pair belongs to.
     pub const fn writes_splits(self) -> bool {
         match self {
-            Self::Jsonl | Self::Csv => true,
+            Self::Jsonl | Self::Csv | Self::Parquet | Self::HuggingFace | Self::WebDataset => true,
         }
     }
 }

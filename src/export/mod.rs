@@ -13,13 +13,17 @@ mod manifest;
 mod options;
 mod pair_files;
 mod pair_pictures;
+mod parquet_columns;
+mod parquet_table;
 pub mod pictures;
 mod readme;
 mod record;
 mod record_fields;
+mod sample;
 mod source_print;
 mod split;
 mod stage_outcomes;
+mod table_columns;
 
 pub use contact_sheet::{
     ContactSheet, ContactSheetOptions, ContactSheetOrder, DrawError, draw_contact_sheet,

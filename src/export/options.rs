@@ -10,6 +10,9 @@ use crate::catalog::MetricRecord;
 use crate::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
 use crate::report::Consensus;
 
+/// Default size of shards in MiB.
+const SHARD_MIB: u64 = 256;
+
 /// Which results are exported.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -45,6 +48,12 @@ pub struct ExportOptions {
     pub with_times: bool,
     /// Whether CSV files begin with a byte order mark, which Excel needs to read them as UTF-8.
     pub csv_bom: bool,
+    /// Whether Parquet tables hold the pictures.
+    pub images: bool,
+    /// Size in MiB at which the next shard or table begins.
+    pub shard_mib: Option<u64>,
+    /// Licence of the data, for the dataset card.
+    pub license: Option<String>,
     /// All settings of the project, for the manifest of the export.
     #[serde(skip)]
     pub settings: Value,
@@ -73,6 +82,9 @@ impl ExportOptions {
             split: None,
             with_times: false,
             csv_bom: false,
+            images: false,
+            shard_mib: None,
+            license: None,
             settings: Value::Null,
             limits,
         }
@@ -102,6 +114,24 @@ impl ExportOptions {
                 |format| format == ExportFormat::Csv,
                 "writes no CSV",
             ),
+            (
+                "--images",
+                self.images,
+                |format| format == ExportFormat::Parquet,
+                "has its own pictures or none",
+            ),
+            (
+                "--shard-mib",
+                self.shard_mib.is_some(),
+                |format| matches!(format, ExportFormat::HuggingFace | ExportFormat::WebDataset),
+                "writes no shards",
+            ),
+            (
+                "--license",
+                self.license.is_some(),
+                |format| format == ExportFormat::HuggingFace,
+                "has no dataset card",
+            ),
         ];
         for (option, is_given, uses, lack) in given {
             if is_given && !formats.iter().any(|format| uses(*format)) {
@@ -114,6 +144,11 @@ impl ExportOptions {
             }
         }
         Ok(())
+    }
+
+    /// Returns the size at which the next shard or table begins, in bytes.
+    pub(super) fn shard_bytes(&self) -> u64 {
+        self.shard_mib.unwrap_or(SHARD_MIB) << 20
     }
 
     /// Returns whether pairs and results may be left out.

@@ -1,7 +1,10 @@
 //! One file for each format of exports.
 
 mod csv;
+mod huggingface;
 mod jsonl;
+mod parquet;
+mod webdataset;
 
 #[cfg(test)]
 pub(super) use jsonl::ExportLine;
@@ -21,5 +24,8 @@ pub(super) fn begin(
     Ok(match format {
         ExportFormat::Jsonl => Box::new(jsonl::JsonlWriter::begin(folder)?),
         ExportFormat::Csv => Box::new(csv::CsvWriter::begin(folder)?),
+        ExportFormat::Parquet => Box::new(parquet::ParquetWriter::begin(folder)?),
+        ExportFormat::HuggingFace => Box::new(huggingface::HuggingFaceWriter::begin(folder)?),
+        ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
     })
 }

@@ -1,0 +1,130 @@
+//! One sample a pair for training: the fields of the pair, the results of its metrics, and pictures under one metric.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::pair_pictures::{PairPictures, PictureError};
+use super::record::{MetricFields, PairFields, PairRecord};
+use super::record_fields::{RecordField, schema_of};
+use crate::catalog::MetricRecord;
+use crate::domain::ThresholdMetric;
+use crate::raster::{compact_grey16, compact_mask, png_rgb8};
+
+/// The fields of a sample.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct SampleFields<'a> {
+    /// What all metrics of the pair share.
+    #[serde(flatten)]
+    pair: &'a PairFields,
+    /// The metric whose pictures the sample has.
+    #[serde(flatten)]
+    metric: &'a MetricFields,
+    /// Results of all selected metrics.
+    metrics: &'a [MetricFields],
+}
+
+/// Names of the pictures of a sample, in the order of [`pictures`].
+pub(super) const PICTURES: [&str; 5] = [
+    "print",
+    "print_mask",
+    "depth",
+    "aligned_depth",
+    "aligned_mask",
+];
+
+/// The pictures of a sample, for tables of fields.
+pub(super) const PICTURE_FIELDS: [(RecordField, &str); 5] = [
+    (
+        picture("print", "", "pictures"),
+        "The print image, upright.",
+    ),
+    (
+        picture("print_mask", "255 = ink", "pictures"),
+        "Ink mask of the print, 8 bits.",
+    ),
+    (
+        picture("depth", "level", "depth map"),
+        "Depth map, 16 bits: 0 = no data, 1 to 65535 linear in height.",
+    ),
+    (
+        picture("aligned_depth", "level", "pictures"),
+        "The depth map warped onto the print.",
+    ),
+    (
+        picture("aligned_mask", "255 = stroke", "pictures"),
+        "The strokes at the metric's threshold, warped onto the print.",
+    ),
+];
+
+const fn picture(name: &'static str, unit: &'static str, frame: &'static str) -> RecordField {
+    RecordField { name, unit, frame }
+}
+
+/// A picture of a sample as a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct SamplePicture {
+    /// Name of the picture, such as `print_mask`.
+    pub(super) name: &'static str,
+    /// Extension of the file name.
+    pub(super) extension: &'static str,
+    /// The file.
+    pub(super) bytes: Vec<u8>,
+}
+
+/// Returns the index of the metric whose pictures a sample has: `ensemble` if it was selected, otherwise the first.
+pub(super) fn chosen(metrics: &[MetricFields]) -> Option<usize> {
+    let ensemble = |fields: &MetricFields| fields.metric == ThresholdMetric::Ensemble;
+    let first = (!metrics.is_empty()).then_some(0);
+    metrics.iter().position(ensemble).or(first)
+}
+
+/// Returns the fields of a sample. `None` if the pair has no result.
+pub(super) fn fields(record: &PairRecord) -> Option<Value> {
+    let metric = &record.metrics[chosen(&record.metrics)?];
+    let fields = SampleFields {
+        pair: &record.pair,
+        metric,
+        metrics: &record.metrics,
+    };
+    Some(serde_json::to_value(&fields).expect("a record is JSON"))
+}
+
+/// Returns the JSON Schema of the fields of a sample.
+pub(super) fn schema() -> Value {
+    schema_of::<SampleFields<'_>>()
+}
+
+/// Draws the pictures of a sample under one metric. The print is the original file if it is PNG or JPEG of 8 bits and
+/// `keep_print`, otherwise an 8-bit PNG.
+///
+/// # Errors
+/// Returns an error if an input or artifact cannot be read.
+pub(super) fn pictures(
+    result: &PairPictures<'_>,
+    record: &MetricRecord,
+    keep_print: bool,
+) -> Result<Vec<SamplePicture>, PictureError> {
+    let outcome = &record.outcome;
+    let (mut print, mut extension) = (Vec::new(), "png");
+    if keep_print {
+        (print, extension) = result.print_file()?;
+    }
+    if !keep_print || !matches!(extension, "png" | "jpg") {
+        (print, extension) = (png_rgb8(&result.print_rgb()?), "png");
+    }
+    let files = [
+        print,
+        compact_mask(&result.print_mask()?),
+        compact_grey16(&result.depth()?.levels),
+        compact_grey16(&result.aligned_depth(outcome)?),
+        compact_mask(&result.aligned_mask(outcome)?),
+    ];
+    let files = PICTURES.into_iter().zip(files).enumerate();
+    let pictures = files.map(|(i, (name, bytes))| SamplePicture {
+        name,
+        extension: if i == 0 { extension } else { "png" },
+        bytes,
+    });
+    Ok(pictures.collect())
+}
