@@ -112,7 +112,7 @@
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
-//! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
+//! - `src/export/sample.rs`: the metric whose pictures a training sample has; no change needed
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
@@ -122,6 +122,13 @@
 //! help text of `--metric` in `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
 //! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
+//!
+//! ## An export
+//!
+//! `src/export/exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog.
+//! `record.rs` defines the record of a pair that all formats share, `record_fields.rs` its fields with unit and frame,
+//! `pair_pictures.rs` reads inputs and artifacts when a format needs them, and `format_writer.rs` says what a format must
+//! implement; the formats are in `formats/`. `manifest.rs` recognizes earlier exports, which are replaced as a whole.
 //!
 //! ## Rooms
 //!

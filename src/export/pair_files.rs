@@ -77,7 +77,6 @@ pub(super) fn write_files(
     encoded: &mut EncodedPair,
 ) -> Result<Vec<Files>, PictureError> {
     let shared = |name: &str| format!("{PAIR}/{name}");
-    let artifacts = pictures.artifacts();
     let (print, extension) = pictures.print_file()?;
     let print_name = shared(&format!("print.{extension}"));
     encoded.add_file(&print_name, print);
@@ -91,7 +90,7 @@ pub(super) fn write_files(
         shared("depth.json"),
         sidecar(&pictures.outcomes.depth.scale).into_bytes(),
     );
-    let canvas = artifacts.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
+    let canvas = pictures.stored_picture(Stage::Register, CANVAS_PRINT_MASK)?;
     encoded.add_file(shared("canvas_print_mask.png"), canvas);
 
     let mut each = EachMetric { pictures, encoded };
@@ -164,7 +163,7 @@ impl EachMetric<'_, '_> {
         let first = first_of_each(&artifacts, |a, b| a.hash == b.hash);
         self.add_groups(name, &first, |i| {
             let role = role(pictures.metrics[i].outcome.metric);
-            Ok(pictures.artifacts().bytes(Stage::Register, &role)?)
+            pictures.stored_picture(Stage::Register, &role)
         })
     }
 

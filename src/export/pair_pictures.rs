@@ -10,7 +10,7 @@ use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
 use crate::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use crate::raster::{
-    DepthMap, Grid, ImageLimits, Mask, compact_rgb8, warp_depth, warp_mask, warp_rgb,
+    DepthMap, Grid, ImageLimits, Mask, compact_grey8, compact_rgb8, warp_depth, warp_mask, warp_rgb,
 };
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::{InputError, Project, open_input};
@@ -72,6 +72,8 @@ pub(super) struct PairPictures<'a> {
     print: OnceCell<SourcePrint>,
     print_mask: OnceCell<Mask>,
     depth: OnceCell<DepthMap>,
+    /// The print, enlarged for overlays.
+    enlarged: OnceCell<Rgb>,
 }
 
 impl<'a> PairPictures<'a> {
@@ -94,6 +96,7 @@ impl<'a> PairPictures<'a> {
             print: OnceCell::new(),
             print_mask: OnceCell::new(),
             depth: OnceCell::new(),
+            enlarged: OnceCell::new(),
         }
     }
 
@@ -109,6 +112,11 @@ impl<'a> PairPictures<'a> {
         role: &str,
     ) -> Result<&'a ArtifactRef, PictureError> {
         Ok(self.artifacts().artifact(stage, role)?)
+    }
+
+    /// Returns a stored 8-bit grey picture as a compact PNG.
+    pub(super) fn stored_picture(&self, stage: Stage, role: &str) -> Result<Vec<u8>, PictureError> {
+        Ok(compact_grey8(&self.artifacts().grey(stage, role)?))
     }
 
     /// Returns the print as given, decoded.
@@ -194,7 +202,9 @@ impl<'a> PairPictures<'a> {
     /// Returns the print with the edges of the strokes, enlarged for viewing.
     pub(super) fn overlay(&self, outcome: &MetricOutcome) -> Result<Rgb, PictureError> {
         let (print, depth) = (&self.source_print()?.picture, self.depth()?);
-        Ok(PrintView::enlarged(print).overlay(print, depth, outcome))
+        let view = PrintView::enlarged(print);
+        let enlarged = get_or_read(&self.enlarged, || Ok(view.print(print)))?;
+        Ok(view.overlay_on(enlarged.clone(), depth, outcome))
     }
 
     #[expect(dead_code, reason = "the formats with meshes call it")]

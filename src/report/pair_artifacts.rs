@@ -163,7 +163,11 @@ impl<'a> PairArtifacts<'a> {
         Ok(self.grey(stage, role)?.map(|value| *value == INK))
     }
 
-    fn grey(&self, stage: Stage, role: &str) -> Result<Grid<u8>, PairArtifactsError> {
+    /// Reads a stored 8-bit grey picture.
+    ///
+    /// # Errors
+    /// Returns an error if the picture cannot be read.
+    pub fn grey(&self, stage: Stage, role: &str) -> Result<Grid<u8>, PairArtifactsError> {
         decode_grey8(&self.bytes(stage, role)?).map_err(undecodable(role))
     }
 

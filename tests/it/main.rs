@@ -20,6 +20,8 @@ mod demo;
 mod error_snapshots;
 #[cfg(target_os = "linux")]
 mod every_call;
+mod export_formats;
+mod export_heights;
 #[cfg(target_os = "linux")]
 mod fault;
 #[cfg(target_os = "linux")]

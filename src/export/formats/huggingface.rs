@@ -33,6 +33,8 @@ struct DatasetPart {
     table: Option<ParquetTable>,
     files: Vec<String>,
     rows: u64,
+    /// Size of the pictures and of the numbers as JSON.
+    bytes: u64,
 }
 
 impl HuggingFaceWriter {
@@ -83,8 +85,9 @@ impl HuggingFaceWriter {
         for (part, data) in &self.parts {
             let _ = writeln!(
                 text,
-                "  - name: {}\n    num_examples: {}",
+                "  - name: {}\n    num_bytes: {}\n    num_examples: {}",
                 part.name(),
+                data.bytes,
                 data.rows
             );
         }
@@ -112,6 +115,8 @@ impl FormatWriter for HuggingFaceWriter {
         let Some(row) = fields(record) else {
             return Ok(());
         };
+        let pictures = shared.iter().map(Vec::len).sum::<usize>();
+        let bytes = (pictures + row.to_string().len()) as u64;
         let mut cells = field_cells(row, &self.columns);
         cells.extend(picture_cells(&mut shared.into_iter()));
         let split = record.pair.split.unwrap_or(SplitName::Train);
@@ -131,6 +136,7 @@ impl FormatWriter for HuggingFaceWriter {
         table.append(cells)?;
         part.table = Some(table);
         part.rows += 1;
+        part.bytes += bytes;
         Ok(())
     }
 

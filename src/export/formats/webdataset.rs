@@ -144,7 +144,10 @@ import webdataset
 pairs = webdataset.WebDataset(\"train-000000.tar\", shardshuffle=False).decode(\"pil\")
 for pair in pairs.to_tuple(\"print.png\", \"aligned_mask.png\", \"json\"):
     ...
-```"
+```
+
+`decode(\"pil\")` reduces pictures to 8 bits. For the 16 bits of the depth maps, leave `decode` out and open the bytes:
+`PIL.Image.open(io.BytesIO(pair[\"depth.png\"]))`."
             .to_owned(),
             fields: markdown_table(&schema, &tables),
             schema: Some(schema),

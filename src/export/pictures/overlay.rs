@@ -63,7 +63,11 @@ impl PrintView {
 
     /// Draws the print with the edges of the aligned depth mask.
     pub fn overlay(&self, print: &PrintImage, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
-        let mut picture = self.print(print);
+        self.overlay_on(self.print(print), depth, outcome)
+    }
+
+    /// Draws the edges of the aligned depth mask on a picture of the view.
+    pub fn overlay_on(&self, mut picture: Rgb, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
         self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
         picture
     }

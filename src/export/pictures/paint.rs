@@ -22,9 +22,29 @@ pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();
     }
+    if width.is_multiple_of(image.width()) && height.is_multiple_of(image.height()) {
+        return enlarged(image, width / image.width(), height / image.height());
+    }
     let columns = spans(image.width(), width);
     let rows = spans(image.height(), height);
     Rgb::from_fn(width, height, |x, y| mean(image, &columns[x], &rows[y]))
+}
+
+/// Repeats each pixel `across` times and each row `down` times.
+fn enlarged(image: &Rgb, across: usize, down: usize) -> Rgb {
+    let (width, height) = (image.width() * across, image.height() * down);
+    let mut out = Rgb::new(width, height, BACKGROUND);
+    let rows = out.data_mut().chunks_exact_mut(width * down);
+    for (y, rows) in rows.enumerate() {
+        let (first, others) = rows.split_at_mut(width);
+        for (pixels, colour) in first.chunks_exact_mut(across).zip(image.row(y)) {
+            pixels.fill(*colour);
+        }
+        for row in others.chunks_exact_mut(width) {
+            row.copy_from_slice(first);
+        }
+    }
+    out
 }
 
 /// The source pixels, with weights, that contribute to one output pixel along one axis.

@@ -1,0 +1,290 @@
+//! Exports in several formats: what they hold, what is left out, and what is refused.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mocban::raster::{ImageLimits, decode};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use serde_json::Value;
+
+use crate::cli::{Call, empty, mocban};
+
+/// All formats of this file.
+const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset";
+
+/// Names that checks outside the repository rely on.
+const FIXED_NAMES: &str = "id character block unit mesh print meta metric status error_class error threshold_depth \
+    threshold_print angle_deg scale shift_px ssim nl_ssim iou iou_box dice density_print density_depth print_from_mesh \
+    plane_from_mesh depth_from_plane print_from_depth files mesh_hash print_hash result_hash config_hash confidence margin \
+    verdict seconds manual_alignment disagreements missing_ink missing_wood";
+
+/// A folder with the finished project `p` of 12 pairs of three blocks.
+fn project() -> tempfile::TempDir {
+    let dir = empty();
+    let demo = [
+        "demo", "p", "--tier", "upright", "--pairs", "30", "--seed", "2",
+    ];
+    mocban(dir.path(), &demo).expect(0);
+    dir
+}
+
+fn export(dir: &Path, args: &[&str]) -> Call {
+    let all: Vec<&str> = ["-C", "p", "export"]
+        .into_iter()
+        .chain(args.iter().copied())
+        .collect();
+    mocban(dir, &all)
+}
+
+fn lines(file: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(file).expect("the lines");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect()
+}
+
+/// Returns every file below a folder with its bytes.
+fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let below = path.strip_prefix(root).expect("below").to_owned();
+                found.insert(below, fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    found
+}
+
+/// Returns the files of the tar shards below a folder, by name.
+fn samples(files: &BTreeMap<PathBuf, Vec<u8>>) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for (path, bytes) in files {
+        if path.extension().is_none_or(|extension| extension != "tar") {
+            continue;
+        }
+        let mut shard = tar::Archive::new(&bytes[..]);
+        for entry in shard.entries().expect("a tar file") {
+            let mut entry = entry.expect("an entry");
+            assert_eq!(entry.header().mtime().expect("a time"), 0);
+            let name = entry.path().expect("a name").to_string_lossy().into_owned();
+            let mut content = Vec::new();
+            std::io::Read::read_to_end(&mut entry, &mut content).expect("content");
+            found.insert(name, content);
+        }
+    }
+    found
+}
+
+#[test]
+fn formats_agree_on_pairs_and_numbers() {
+    let dir = project();
+    let args = [
+        "--to",
+        FORMATS,
+        "--images",
+        "--shard-mib",
+        "1",
+        "--canvas",
+        "96",
+        "-o",
+        "out",
+    ];
+    export(dir.path(), &args).expect(0);
+    export(dir.path(), &[&args[..args.len() - 1], &["again"]].concat()).expect(0);
+    let [out, again] = ["out", "again"].map(|name| dir.path().join(name));
+    let files = contents(&out);
+    assert!(files == contents(&again), "two exports differ");
+
+    let rows = lines(&out.join("jsonl/pairs.jsonl"));
+    let pairs: BTreeSet<&str> = rows.iter().filter_map(|line| line["id"].as_str()).collect();
+    assert_eq!((pairs.len(), rows.len()), (30, 120));
+    for name in FIXED_NAMES.split_whitespace() {
+        assert!(rows[0].get(name).is_some(), "pairs.jsonl lacks {name}");
+    }
+    assert_eq!(rows[0]["meta"]["tier"], "upright");
+
+    let mut table = csv::Reader::from_path(out.join("csv/pairs.csv")).expect("a table");
+    let header = table.headers().expect("a header").clone();
+    let column = |name: &str| header.iter().position(|found| found == name).expect(name);
+    for (row, line) in table.records().zip(&rows) {
+        let row = row.expect("a row");
+        assert_eq!(&row[column("id")], line["id"]);
+        assert_eq!(&row[column("meta_tier")], "upright");
+        let number: f64 = row[column("print_from_mesh_2_4")]
+            .parse()
+            .expect("a number");
+        assert_eq!(number, line["print_from_mesh"][1][3]);
+    }
+
+    for (name, count) in [
+        ("parquet/pairs.parquet", 120),
+        ("huggingface/data/train-00000.parquet", 30),
+    ] {
+        let file = fs::File::open(out.join(name)).expect(name);
+        let table = SerializedFileReader::new(file).expect("a Parquet file");
+        assert_eq!(table.metadata().file_metadata().num_rows(), count, "{name}");
+    }
+
+    let samples = samples(&files);
+    assert_eq!(samples.len(), 30 * 6);
+    for id in pairs {
+        let fields: Value = serde_json::from_slice(&samples[&format!("{id}.json")]).expect("JSON");
+        assert_eq!(
+            (&fields["id"], &fields["metric"]),
+            (&id.into(), &"ensemble".into())
+        );
+        assert_eq!(fields["metrics"].as_array().map(Vec::len), Some(4));
+        for name in ["print", "print_mask", "aligned_depth", "aligned_mask"] {
+            let picture = decode(
+                &samples[&format!("{id}.{name}.png")],
+                &ImageLimits::SUGGESTED,
+            );
+            let picture = picture.expect("a picture").rgb;
+            assert_eq!((picture.width(), picture.height()), (96, 96), "{id} {name}");
+        }
+    }
+}
+
+#[test]
+fn no_block_is_in_two_parts_of_a_split() {
+    let dir = project();
+    let split = ["--split", "60/20/20", "--by", "block", "--seed", "4"];
+    export(
+        dir.path(),
+        &[&["--to", "csv,webdataset,jsonl", "-o", "out"][..], &split].concat(),
+    )
+    .expect(0);
+    let rows = lines(&dir.path().join("out/jsonl/pairs.jsonl"));
+    let mut parts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for row in &rows {
+        let text = |name: &str| row[name].as_str().expect(name).to_owned();
+        parts
+            .entry(text("block"))
+            .or_default()
+            .insert(text("split"));
+    }
+    assert!(parts.values().all(|names| names.len() == 1), "{parts:?}");
+    let used: BTreeSet<&String> = parts.values().flatten().collect();
+    assert_eq!(used.len(), 3, "{parts:?}");
+    for part in used {
+        assert!(
+            dir.path()
+                .join(format!("out/webdataset/{part}-000000.tar"))
+                .is_file()
+        );
+    }
+}
+
+#[test]
+fn results_are_selected_by_metric_confidence_and_verdict() {
+    let dir = project();
+    let said = [
+        "-C",
+        "p",
+        "verdict",
+        "set",
+        "upright-0003",
+        "pass",
+        "--reviewer",
+        "lan",
+        "--metric",
+        "relief",
+    ];
+    mocban(dir.path(), &said).expect(0);
+    export(dir.path(), &["--only", "passed", "-o", "passed"]).expect(0);
+    let rows = lines(&dir.path().join("passed/pairs.jsonl"));
+    assert_eq!(rows.len(), 1);
+    assert_eq!(
+        (&rows[0]["metric"], &rows[0]["verdict"]),
+        (&"relief".into(), &"pass".into())
+    );
+    assert_eq!(rows[0]["verdicts"][0]["reviewer"], "lan");
+
+    export(
+        dir.path(),
+        &[
+            "--metric",
+            "relief,density",
+            "--min-confidence",
+            "0.9",
+            "-o",
+            "sure",
+        ],
+    )
+    .expect(0);
+    let rows = lines(&dir.path().join("sure/pairs.jsonl"));
+    assert!(
+        rows.iter()
+            .all(|row| row["confidence"].as_f64() >= Some(0.9))
+    );
+    let metrics: BTreeSet<_> = rows
+        .iter()
+        .filter_map(|row| row["metric"].as_str())
+        .collect();
+    assert_eq!(metrics, BTreeSet::from(["density", "relief"]));
+}
+
+#[test]
+fn wrong_names_and_useless_options_are_refused() {
+    let dir = project();
+    for (args, said) in [
+        (
+            &["--to", "jsonl,xlsx"][..],
+            "possible values: jsonl, csv, parquet",
+        ),
+        (
+            &["--metric", "iou"],
+            "possible values: nl_ssim, density, ensemble, relief",
+        ),
+        (
+            &["--to", "csv", "--canvas", "64"],
+            "--canvas has no effect on csv",
+        ),
+        (&["--csv-bom"], "--csv-bom has no effect on jsonl"),
+        (
+            &["--to", "csv", "--shard-mib", "9"],
+            "--shard-mib has no effect on csv",
+        ),
+        (&["--split", "80/10"], "percentages that sum to 100"),
+        (&["--by", "pair"], "--split"),
+        (&["--min-confidence", "2"], "a number from 0 to 1"),
+    ] {
+        let refused = export(dir.path(), &[args, &["-o", "out"]].concat()).expect(2);
+        assert!(refused.err.contains(said), "{args:?}: {}", refused.err);
+        assert!(!dir.path().join("out").exists(), "{args:?}");
+    }
+}
+
+#[test]
+fn an_export_replaces_one_of_another_format_and_nothing_else() {
+    let dir = project();
+    let out = dir.path().join("out");
+    export(dir.path(), &["-o", "out"]).expect(0);
+    export(dir.path(), &["--to", "csv,parquet", "-o", "out"]).expect(0);
+    let names: BTreeSet<_> = fs::read_dir(&out)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name())
+        .collect();
+    assert_eq!(
+        names,
+        BTreeSet::from(["csv".into(), "export.json".into(), "parquet".into()])
+    );
+    fs::write(out.join("csv/notes.txt"), "mine").expect("written");
+    let before = contents(&out);
+    let refused = export(dir.path(), &["-o", "out"]).expect(1);
+    assert!(
+        refused
+            .err
+            .contains("csv/notes.txt is not part of an export"),
+        "{}",
+        refused.err
+    );
+    assert!(before == contents(&out), "the folder was changed");
+}
