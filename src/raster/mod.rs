@@ -1,5 +1,6 @@
 //! Images and masks in memory, their decoders and encoders, and warps. [`Grid`] states the pixel convention.
 
+pub(crate) mod components;
 mod decode;
 mod depth_map;
 pub mod encode;

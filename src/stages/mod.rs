@@ -4,7 +4,6 @@
 
 mod binarize;
 mod blur;
-mod components;
 pub mod depth;
 mod face;
 pub mod fit;

@@ -3,8 +3,8 @@
 use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
 use super::polarity::polarity;
+use crate::raster::components::{ConnectedComponents, remove_specks};
 use crate::raster::{Grid, Mask, PrintImage};
-use crate::stages::components::{ConnectedComponents, remove_specks};
 use crate::stages::pose::SoftMask;
 
 /// A pixel is white if its darkest channel is above this share of full white.

@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 
 use crate::domain::PrintOutline;
+use crate::raster::components::ConnectedComponents;
 use crate::raster::{Mask, PixelBox};
-use crate::stages::components::ConnectedComponents;
 
 /// Number of cells along the longest side of the ink.
 const CELLS: usize = 160;

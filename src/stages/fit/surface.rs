@@ -5,8 +5,8 @@
 
 use super::height_samples::{HeightSamples, quantile};
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
+use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
-use crate::stages::components::ConnectedComponents;
 use crate::stages::face::Face;
 use crate::stages::pose::SoftMask;
 

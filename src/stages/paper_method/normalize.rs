@@ -5,9 +5,9 @@
 //! the pixels get at most 49, and 95 % get at most 201. Each threshold is tried at four rotations by 90 degrees.
 
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
+use crate::raster::components::remove_specks;
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::binarize::{self, InkMask};
-use crate::stages::components::remove_specks;
 use crate::stages::normalize::{NormalizeError, NormalizeParams, Normalized, box_wrap};
 use crate::stages::print::Print;
 use crate::stages::score::SsimReference;

@@ -6,8 +6,8 @@
 //! angle could be off by half a sector.
 
 use crate::domain::{Affine2, ThresholdMetric};
+use crate::raster::components::remove_specks;
 use crate::raster::{DepthMap, Mask, warp_mask};
-use crate::stages::components::remove_specks;
 use crate::stages::normalize::Normalized;
 use crate::stages::register::{
     Alignment, RegisterError, RegisterParams, Registered, StrokeMap, canvas_print, score_alignments,

@@ -7,8 +7,8 @@ use super::PyramidLevel;
 use super::overlap::PlacedLevel;
 use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
+use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
-use crate::stages::components::ConnectedComponents;
 
 /// Amounts above this are strokes.
 const MIN_STROKE: f32 = 0.3;

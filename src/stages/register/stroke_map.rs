@@ -4,8 +4,8 @@ use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
 use super::unmatched::{BORDER_PX, tolerance_px};
 use crate::domain::{Affine2, Disagreement};
+use crate::raster::components::ConnectedComponents;
 use crate::raster::{DepthMap, Grid, Mask};
-use crate::stages::components::ConnectedComponents;
 use crate::stages::normalize::PrintMasks;
 
 /// Smallest area beyond the tolerance of a piece, in squares of the stroke width. Ends of strokes that are rounded or

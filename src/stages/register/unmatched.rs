@@ -6,7 +6,7 @@
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
 use crate::raster::Mask;
-use crate::stages::components::ConnectedComponents;
+use crate::raster::components::ConnectedComponents;
 
 /// Distance from the strokes of the other image, as a share of the stroke width, from which a pixel has no partner.
 /// Smaller distances are due to the spread of ink and to local misalignment.

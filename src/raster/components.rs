@@ -1,13 +1,13 @@
 //! Connected components of a mask, labelled by runs with union-find (4-connectivity).
 
-use crate::raster::{Grid, Mask, PixelBox};
+use super::{Grid, Mask, PixelBox};
 
 /// Components smaller than this share of an image are specks. The value is from the program of the paper's authors.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// Components of pixels connected by edges, with their areas.
 #[derive(Debug)]
-pub(super) struct ConnectedComponents {
+pub(crate) struct ConnectedComponents {
     /// Component of each pixel; `u32::MAX` where the mask is not set.
     labels: Grid<u32>,
     sizes: Vec<usize>,
@@ -15,7 +15,7 @@ pub(super) struct ConnectedComponents {
 
 impl ConnectedComponents {
     /// Labels the components of a mask in the order of their first pixels.
-    pub(super) fn label(mask: &Mask) -> Self {
+    pub(crate) fn label(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
         let mut runs = Vec::new();
         // Runs of the row above, a range of `runs`.
@@ -60,19 +60,19 @@ impl ConnectedComponents {
     }
 
     /// Returns the pixels of components of at least this area, in pixels.
-    pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
+    pub(crate) fn with_area_at_least(&self, size: usize) -> Mask {
         self.select(|label| self.sizes[label] >= size)
     }
 
     /// Returns the component of a pixel, or `None` if the mask is not set there.
-    pub(super) fn label_at(&self, x: usize, y: usize) -> Option<usize> {
+    pub(crate) fn label_at(&self, x: usize, y: usize) -> Option<usize> {
         let label = self.labels.at(x, y);
         (label != u32::MAX).then_some(label as usize)
     }
 
     /// Returns the bounding box and the number of the pixels of `mask` in each component. Every component must contain
     /// such a pixel.
-    pub(super) fn parts_of(&self, mask: &Mask) -> Vec<(PixelBox, usize)> {
+    pub(crate) fn parts_of(&self, mask: &Mask) -> Vec<(PixelBox, usize)> {
         let mut parts: Vec<Option<(PixelBox, usize)>> = vec![None; self.sizes.len()];
         for y in 0..mask.height() {
             for (x, is_set) in mask.row(y).iter().enumerate() {
@@ -101,13 +101,13 @@ impl ConnectedComponents {
 
     /// Returns the pixels of all components near `other` or the border. A component is near if a step of `distance`
     /// pixels along an axis leads from one of its pixels into `other` or out of the grid.
-    pub(super) fn touching(&self, other: &Mask, distance: i64) -> Mask {
+    pub(crate) fn touching(&self, other: &Mask, distance: i64) -> Mask {
         let touches = self.touches(other, distance);
         self.select(|label| touches[label])
     }
 
     /// Returns the area of the largest component that is not near `other` or the border, as in [`Self::touching`].
-    pub(super) fn largest_apart_from(&self, other: &Mask, distance: i64) -> usize {
+    pub(crate) fn largest_apart_from(&self, other: &Mask, distance: i64) -> usize {
         let touches = self.touches(other, distance);
         let apart = self.sizes.iter().zip(touches).filter(|(_, near)| !near);
         apart.map(|(size, _)| *size).max().unwrap_or(0)
@@ -115,7 +115,7 @@ impl ConnectedComponents {
 
     /// Returns the pixels and the number of the components of at least `size` pixels that are not near `other` or the
     /// border, as in [`Self::touching`].
-    pub(super) fn apart_from(&self, other: &Mask, distance: i64, size: usize) -> (Mask, usize) {
+    pub(crate) fn apart_from(&self, other: &Mask, distance: i64, size: usize) -> (Mask, usize) {
         let touches = self.touches(other, distance);
         let wanted = |label: usize| self.sizes[label] >= size && !touches[label];
         let count = (0..self.sizes.len()).filter(|label| wanted(*label)).count();
@@ -142,7 +142,7 @@ impl ConnectedComponents {
     }
 
     /// Returns the pixels of components that touch the border of the grid.
-    pub(super) fn touching_border(&self) -> Mask {
+    pub(crate) fn touching_border(&self) -> Mask {
         let none = Mask::new(self.labels.width(), self.labels.height(), false);
         self.touching(&none, 1)
     }
@@ -185,7 +185,7 @@ fn union(runs: &mut [Run], one: usize, other: usize) {
 }
 
 /// Removes specks and fills pinholes that are smaller than [`SPECK_SHARE`] of `area`, a number of pixels.
-pub(super) fn remove_specks(mask: &Mask, area: usize) -> Mask {
+pub(crate) fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = ConnectedComponents::label(mask).with_area_at_least(size);
     let holes = ConnectedComponents::label(&kept.map(|set| !set)).with_area_at_least(size);
