@@ -7,6 +7,7 @@ mod ply;
 mod stl;
 mod text;
 mod triangle_mesh;
+mod weld;
 
 pub mod write;
 mod xyz;

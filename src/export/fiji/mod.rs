@@ -1,0 +1,5 @@
+//! Calibrated TIFF images for ImageJ and Fiji.
+
+mod imagej_tags;
+mod images;
+mod tiff_stack;
