@@ -1,5 +1,6 @@
 //! Exports results for other tools, and images for people.
 
+mod annotations;
 mod contact_sheet;
 mod export_folder;
 mod export_logs;

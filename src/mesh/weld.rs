@@ -50,7 +50,9 @@ impl Mesh {
         let faces = triangles.iter();
         let faces = faces.map(|face| face.map(|corner| welded[corner as usize]));
         Self {
-            triangles: faces.filter(|[a, b, c]| a != b && b != c && c != a).collect(),
+            triangles: faces
+                .filter(|[a, b, c]| a != b && b != c && c != a)
+                .collect(),
             vertices: vertices.select(&kept),
         }
     }
@@ -76,7 +78,9 @@ mod tests {
     #[test]
     fn a_mesh_without_repeated_vertices_is_unchanged() {
         let mesh = Mesh {
-            vertices: Vertices::Single(vec![[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 2.0, 1.0]].into()),
+            vertices: Vertices::Single(
+                vec![[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 2.0, 1.0]].into(),
+            ),
             // A face with two equal corners of the file itself stays.
             triangles: vec![[0, 1, 2], [0, 0, 1]].into(),
         };

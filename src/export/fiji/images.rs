@@ -110,7 +110,8 @@ mod tests {
 
     #[test]
     fn heights_are_millimetres_and_nan_without_data() {
-        let mut depth = DepthMap::of_levels(Grid::from_vec(3, 1, vec![0, 1, 50_001]).expect("a row"));
+        let mut depth =
+            DepthMap::of_levels(Grid::from_vec(3, 1, vec![0, 1, 50_001]).expect("a row"));
         depth.scale.unit = Some(LengthUnit::Cm);
         let (display, heights) = height_channel(&depth.levels, &depth.scale);
         assert!(heights.at(0, 0).is_nan());

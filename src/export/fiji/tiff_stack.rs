@@ -96,7 +96,11 @@ mod tests {
     #[test]
     fn floats_of_a_stack_are_read_back_with_calibration() {
         let images = [0.0, 0.5].map(|shift| {
-            Grid::from_fn(5, 3, |x, y| if x == y { f32::NAN } else { x as f32 + shift })
+            Grid::from_fn(
+                5,
+                3,
+                |x, y| if x == y { f32::NAN } else { x as f32 + shift },
+            )
         });
         let file = float_stack(&SIZE, &images.clone().map(|image| (DISPLAY, image)));
         let mut decoder = Decoder::new(Cursor::new(file)).expect("a TIFF");

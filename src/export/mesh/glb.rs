@@ -54,7 +54,8 @@ pub(super) fn write_glb(
     }
     let padded = buffer.len().next_multiple_of(4);
     let length = u32::try_from(12 + 8 + text.len() + 8 + padded).ok();
-    let length = length.ok_or_else(|| io::Error::other("the scan is too large: a GLB holds 4 GiB"))?;
+    let length =
+        length.ok_or_else(|| io::Error::other("the scan is too large: a GLB holds 4 GiB"))?;
     for word in [MAGIC, VERSION, length, text.len() as u32, JSON_CHUNK] {
         out.write_all(&word.to_le_bytes())?;
     }
@@ -104,7 +105,12 @@ impl GlbBuffer {
     /// Returns the sizes of the four parts in bytes.
     fn sizes(&self) -> [usize; 4] {
         let corners = self.corners.iter().map(Vec::len).sum::<usize>();
-        [12 * self.positions.len(), 8 * self.positions.len(), 4 * corners, self.png]
+        [
+            12 * self.positions.len(),
+            8 * self.positions.len(),
+            4 * corners,
+            self.png,
+        ]
     }
 
     /// Returns the size of all parts in bytes.
@@ -114,7 +120,12 @@ impl GlbBuffer {
 
     /// Returns the buffer views of the parts.
     fn views(&self) -> Vec<Value> {
-        let targets = [Some(ARRAY_BUFFER), Some(ARRAY_BUFFER), Some(ELEMENT_ARRAY_BUFFER), None];
+        let targets = [
+            Some(ARRAY_BUFFER),
+            Some(ARRAY_BUFFER),
+            Some(ELEMENT_ARRAY_BUFFER),
+            None,
+        ];
         let mut offset = 0;
         let mut view = |(size, target): (usize, Option<u32>)| {
             let mut view = json!({"buffer": 0, "byteOffset": offset, "byteLength": size});
@@ -124,7 +135,11 @@ impl GlbBuffer {
             offset += size;
             view
         };
-        self.sizes().into_iter().zip(targets).map(&mut view).collect()
+        self.sizes()
+            .into_iter()
+            .zip(targets)
+            .map(&mut view)
+            .collect()
     }
 
     /// Returns the accessors: positions, texture coordinates, and the corners of each part that has any.
@@ -154,8 +169,14 @@ impl GlbBuffer {
 
 /// Returns the JSON chunk.
 fn document(mesh: &PlacedMesh, content: &GlbContent<'_>, buffer: &GlbBuffer) -> Value {
-    let mode = if mesh.triangles.is_empty() { POINTS } else { TRIANGLES };
-    let parts = (0..).zip(&buffer.corners).filter(|(_, corners)| !corners.is_empty());
+    let mode = if mesh.triangles.is_empty() {
+        POINTS
+    } else {
+        TRIANGLES
+    };
+    let parts = (0..)
+        .zip(&buffer.corners)
+        .filter(|(_, corners)| !corners.is_empty());
     let primitives = (2..).zip(parts).map(|(accessor, (material, _))| {
         json!({
             "attributes": {"POSITION": 0, "TEXCOORD_0": 1},
@@ -202,11 +223,17 @@ fn texture_coordinates(pixel: [f32; 2], size: [usize; 2]) -> [f32; 2] {
 fn corners(mesh: &PlacedMesh, on_print: bool) -> Vec<u32> {
     if mesh.triangles.is_empty() {
         let points = 0..mesh.positions.len() as u32;
-        return points.filter(|point| mesh.is_on_print(*point) == on_print).collect();
+        return points
+            .filter(|point| mesh.is_on_print(*point) == on_print)
+            .collect();
     }
     let is_on_print = |face: &&[u32; 3]| face.iter().all(|corner| mesh.is_on_print(*corner));
     let faces = mesh.triangles.iter();
-    faces.filter(|face| is_on_print(face) == on_print).flatten().copied().collect()
+    faces
+        .filter(|face| is_on_print(face) == on_print)
+        .flatten()
+        .copied()
+        .collect()
 }
 
 #[cfg(test)]
@@ -230,11 +257,15 @@ mod tests {
         };
         let mut file = Vec::new();
         write_glb(mesh, &content, &mut file).expect("written");
-        let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("4 bytes")) as usize;
+        let word =
+            |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("4 bytes")) as usize;
         assert_eq!(file[..8], *b"glTF\x02\0\0\0");
         assert_eq!(word(8), file.len());
         let binary = 20 + word(12);
-        assert_eq!([file[16..20].to_vec(), file[binary + 4..binary + 8].to_vec()], [b"JSON", b"BIN\0"]);
+        assert_eq!(
+            [file[16..20].to_vec(), file[binary + 4..binary + 8].to_vec()],
+            [b"JSON", b"BIN\0"]
+        );
         assert_eq!(binary + 8 + word(binary), file.len());
         let document = serde_json::from_slice(&file[20..binary]).expect("JSON");
         (document, file[binary + 8..].to_vec())
@@ -267,15 +298,22 @@ mod tests {
     #[test]
     fn faces_beside_the_print_have_no_texture() {
         let file = written(&placed(None));
-        let primitives = file.0["meshes"][0]["primitives"].as_array().expect("a list");
+        let primitives = file.0["meshes"][0]["primitives"]
+            .as_array()
+            .expect("a list");
         assert_eq!(primitives.len(), 2);
         let accessor = |k: usize| &file.0["accessors"][k];
         assert_eq!([&accessor(2)["count"], &accessor(3)["count"]], [6, 3]);
         let (indices, _) = view(&file, 2).as_chunks::<4>();
-        let indices: Vec<u32> = indices.iter().map(|word| u32::from_le_bytes(*word)).collect();
+        let indices: Vec<u32> = indices
+            .iter()
+            .map(|word| u32::from_le_bytes(*word))
+            .collect();
         assert_eq!(indices, [0, 1, 2, 2, 1, 3, 2, 3, 4]);
         let material = primitives[1]["material"].as_u64().expect("a number") as usize;
-        assert!(file.0["materials"][material]["pbrMetallicRoughness"]["baseColorTexture"].is_null());
+        assert!(
+            file.0["materials"][material]["pbrMetallicRoughness"]["baseColorTexture"].is_null()
+        );
     }
 
     #[test]
@@ -284,7 +322,12 @@ mod tests {
         let file = written(&mesh);
         let metres = floats(view(&file, 0));
         let millimetres = mesh.positions.as_flattened();
-        assert!(metres.iter().zip(millimetres).all(|(m, mm)| (1e3 * m - mm).abs() < 1e-4));
+        assert!(
+            metres
+                .iter()
+                .zip(millimetres)
+                .all(|(m, mm)| (1e3 * m - mm).abs() < 1e-4)
+        );
         let x = metres.iter().step_by(3).copied();
         let stated = file.0["accessors"][0]["min"][0].as_f64();
         assert_eq!(stated, Some(f64::from(x.fold(f32::INFINITY, f32::min))));

@@ -74,10 +74,10 @@ pub(super) mod tests {
     /// Returns three triangles: two over the print, and one beside it.
     pub(crate) fn placed(unit: Option<LengthUnit>) -> PlacedMesh {
         let on_plane = [
-            [-2.0, -1.0, 0.0],
-            [-3.0, -1.5, -0.9],
-            [-2.0, -2.0, 0.1],
-            [-3.0, -2.0, -0.9],
+            [-2.0, 1.2, 0.0],
+            [-2.9, 1.6, -0.9],
+            [-2.0, 2.0, 0.1],
+            [-2.9, 2.1, -0.9],
             [90.0, 0.0, 0.0],
         ];
         let mesh = Mesh {
@@ -102,7 +102,10 @@ pub(super) mod tests {
     fn a_pixel_reaches_half_a_pixel_around_its_centre() {
         let print = print();
         let red = |x: f64| colour_at(&print, [x, 3.2]).map(|[red, ..]| red);
-        assert_eq!([-0.51, -0.5, 0.49, 0.5].map(red), [None, Some(0), Some(0), Some(1)]);
+        assert_eq!(
+            [-0.51, -0.5, 0.49, 0.5].map(red),
+            [None, Some(0), Some(0), Some(1)]
+        );
         assert_eq!([199.49, 199.5].map(red), [Some(199), None]);
         assert_eq!(colour_at(&print, [3.0, f64::INFINITY]), None);
     }

@@ -258,7 +258,11 @@ pub(super) mod tests {
         let placed = MeshPlacement::new(fit(), scale(None), &outcome(mirrored), SIZE);
         let placed = placed.expect("invertible");
         let found = placed.place(mesh_point([1.0, 2.0, 0.5]));
-        let expected = [(found.pixel[0] - 99.5) / 20.0, (49.5 - found.pixel[1]) / 20.0, 0.5];
+        let expected = [
+            (found.pixel[0] - 99.5) / 20.0,
+            (49.5 - found.pixel[1]) / 20.0,
+            0.5,
+        ];
         assert!(close(&found.position, &expected), "{found:?} {expected:?}");
     }
 

@@ -1,0 +1,5 @@
+//! Annotations of strokes and characters for training and labelling tools: COCO and VIA 2.
+
+mod coco;
+mod rle;
+mod via;
