@@ -53,6 +53,9 @@ enum_names! { pub ThresholdMetric, "a metric":
 }
 
 impl ThresholdMetric {
+    /// The metric of files that show one result per pair. Both methods compute it.
+    pub const DEFAULT: Self = Self::Ensemble;
+
     /// The paper's three metrics, which both methods compute.
     pub const PAPER: [Self; 3] = [Self::NlSsim, Self::Density, Self::Ensemble];
 

@@ -73,6 +73,11 @@ pub async fn export(
         program: format!("mocban {}", env!("CARGO_PKG_VERSION")),
         metrics: options.metrics.clone(),
         meta_columns: catalog.meta_columns().await?,
+        shared_prints: if formats.contains(&ExportFormat::Annotations) {
+            catalog.shared_prints().await?
+        } else {
+            BTreeMap::new()
+        },
         options,
     };
     let mut run = ExportRun::begin(project, dir, formats, context, plan)?;

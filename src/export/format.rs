@@ -18,26 +18,44 @@ pub enum ExportFormat {
     HuggingFace,
     /// Tar shards with one sample per pair.
     WebDataset,
+    /// Scans in the frame of their prints, for `CloudCompare`, `MeshLab` and viewers.
+    Mesh,
+    /// Calibrated TIFF images for `ImageJ` and Fiji.
+    Fiji,
+    /// Strokes and characters as COCO and VIA annotations.
+    Annotations,
 }
 
 enum_names! {
     pub ExportFormat, "an export format":
     Jsonl = "jsonl", Csv = "csv", Parquet = "parquet", HuggingFace = "huggingface", WebDataset = "webdataset",
+    Mesh = "mesh", Fiji = "fiji", Annotations = "annotations",
 }
 
 impl ExportFormat {
     /// Returns whether the format writes pictures in the frame of the print, so that it can use a canvas.
     pub const fn writes_pictures(self) -> bool {
         match self {
-            Self::Jsonl | Self::Parquet | Self::HuggingFace | Self::WebDataset => true,
-            Self::Csv => false,
+            Self::Jsonl
+            | Self::Parquet
+            | Self::HuggingFace
+            | Self::WebDataset
+            | Self::Fiji => true,
+            Self::Csv | Self::Mesh | Self::Annotations => false,
         }
     }
 
     /// Returns whether the format writes the part of the dataset that a pair belongs to.
     pub const fn writes_splits(self) -> bool {
         match self {
-            Self::Jsonl | Self::Csv | Self::Parquet | Self::HuggingFace | Self::WebDataset => true,
+            Self::Jsonl
+            | Self::Csv
+            | Self::Parquet
+            | Self::HuggingFace
+            | Self::WebDataset
+            | Self::Mesh
+            | Self::Fiji
+            | Self::Annotations => true,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What a format of exports must implement.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use super::export_folder::FolderError;
 use super::options::ExportOptions;
 use super::pair_pictures::{PairPictures, PictureError};
 use super::record::PairRecord;
-use crate::domain::ThresholdMetric;
+use crate::domain::{PairName, ThresholdMetric};
 
 /// What all formats know about an export.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub(super) struct ExportContext {
     pub(super) metrics: Vec<ThresholdMetric>,
     /// Names of the user's columns of all pairs, sorted.
     pub(super) meta_columns: Vec<String>,
+    /// Paths of prints that several pairs share, each with the first of its pairs. Empty unless a format needs it.
+    pub(super) shared_prints: BTreeMap<String, PairName>,
     /// What to export.
     pub(super) options: ExportOptions,
 }

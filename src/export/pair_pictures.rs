@@ -38,6 +38,9 @@ pub enum PictureError {
     /// The mesh is not the one that was aligned.
     #[error("{0} has changed since it was aligned; run again")]
     MeshChanged(PathBuf),
+    /// The result has no form in a format.
+    #[error("{0}")]
+    Unencodable(String),
 }
 
 /// Limits of the input files.
@@ -166,8 +169,25 @@ impl<'a> PairPictures<'a> {
         if self.canvas.is_some() {
             return Ok((compact_rgb8(&self.print_rgb()?), "png"));
         }
+        self.original_file()
+    }
+
+    /// Returns the print in its own frame as an image file with its extension: the original where possible.
+    pub(super) fn original_file(&self) -> Result<(Vec<u8>, &'static str), PictureError> {
         let print = self.source_print()?;
         Ok((print.upright_file().into_owned(), print.extension()))
+    }
+
+    /// Returns the strokes at the metric's threshold, in the frame of the print.
+    pub(super) fn mask_on_print(&self, outcome: &MetricOutcome) -> Result<Mask, PictureError> {
+        let (strokes, print) = (self.depth_mask(outcome)?, self.source_mask()?);
+        let (width, height) = (print.width(), print.height());
+        Ok(warp_mask(
+            &strokes,
+            &outcome.print_from_depth,
+            width,
+            height,
+        ))
     }
 
     /// Returns the ink mask in the frame of the pictures.
@@ -207,7 +227,6 @@ impl<'a> PairPictures<'a> {
         Ok(view.overlay_on(enlarged.clone(), depth, outcome))
     }
 
-    #[expect(dead_code, reason = "the formats with meshes call it")]
     /// Reads the mesh file, and checks that it is the one that was aligned.
     pub(super) fn mesh(&self) -> Result<Mesh, PictureError> {
         let stored = &self.pair.attributes.mesh_path;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use sqlx::Row as _;
 
 use crate::catalog::{Catalog, Result};
+use crate::domain::PairName;
 
 const META_COLUMNS: &str = "
 SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m ORDER BY m.key";
@@ -13,6 +14,9 @@ const GROUPS: &str = "
 SELECT CASE ?1 WHEN 'block' THEN nullif(p.block, '') WHEN 'character' THEN nullif(p.character, '') END AS shared,
     p.name, count(*) AS pairs
 FROM pair AS p GROUP BY shared, CASE WHEN shared IS NULL THEN p.name END";
+
+const SHARED_PRINTS: &str = "
+SELECT p.print_path, min(p.name) AS first FROM pair AS p GROUP BY p.print_path HAVING count(*) > 1";
 
 impl Catalog {
     /// Returns the names of the user's columns of all pairs, sorted.
@@ -44,5 +48,18 @@ impl Catalog {
             Ok((key, row.try_get("pairs")?))
         });
         groups.collect()
+    }
+
+    /// Returns the paths of prints that several pairs share, such as pages, each with the first of its pairs by name.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn shared_prints(&self) -> Result<BTreeMap<String, PairName>> {
+        let mut conn = self.read_conn().await?;
+        let found = sqlx::query(SHARED_PRINTS).fetch_all(&mut *conn).await?;
+        let prints = found
+            .iter()
+            .map(|row| Ok((row.try_get("print_path")?, row.try_get("first")?)));
+        prints.collect()
     }
 }

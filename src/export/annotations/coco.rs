@@ -1,9 +1,8 @@
-//! Writes COCO annotation files: masks and boxes of the strokes of each pair.
+//! COCO annotation files: masks and boxes of the strokes of each pair.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::rle::{compressed, run_lengths};
@@ -15,7 +14,7 @@ const STROKE: &str = "stroke";
 
 /// A print image that annotations refer to.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(in crate::export) struct CocoImage {
+struct CocoImage {
     /// Number of the image, from 1.
     id: u32,
     /// Path of the image below the export folder.
@@ -25,7 +24,7 @@ pub(in crate::export) struct CocoImage {
 }
 
 /// The strokes of a pair on its print.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::export) struct StrokeAnnotation {
     /// The pair.
     pub(in crate::export) pair: PairName,
@@ -34,15 +33,15 @@ pub(in crate::export) struct StrokeAnnotation {
     /// Path of the print below the export folder.
     pub(in crate::export) file_name: String,
     /// Width and height of the print in pixels.
-    pub(in crate::export) size: [usize; 2],
+    size: [usize; 2],
     /// Left, top, width and height of the strokes in pixels; zeros if there are none.
-    pub(in crate::export) bbox: [usize; 4],
+    pub(super) bbox: [usize; 4],
     /// Pixels of the strokes.
-    pub(in crate::export) area: usize,
-    /// Further fields of the annotation.
-    pub(in crate::export) attributes: Value,
+    pub(super) area: usize,
     /// The mask in COCO's compressed run-length encoding.
     counts: String,
+    /// Further fields of the annotation.
+    attributes: Value,
 }
 
 impl StrokeAnnotation {
@@ -62,45 +61,55 @@ impl StrokeAnnotation {
             size: [mask.width(), mask.height()],
             bbox: bounds.map_or([0; 4], |b| [b.x0, b.y0, b.width(), b.height()]),
             area: mask.count(),
-            attributes,
             counts: compressed(&run_lengths(mask)),
+            attributes,
         }
     }
 }
 
-/// Writes a COCO file annotation by annotation. Only the lists of images and categories are kept in memory.
+/// The categories of all files of an export: one per character, numbered from 1 in the order of their first pairs.
+#[derive(Debug, Default)]
+pub(in crate::export) struct CocoCategories(BTreeMap<String, u32>);
+
+impl CocoCategories {
+    /// Returns the number of a pair's category.
+    fn number(&mut self, strokes: &StrokeAnnotation) -> u32 {
+        let name = strokes.character.as_deref().unwrap_or(STROKE).to_owned();
+        let next = self.0.len() as u32 + 1;
+        *self.0.entry(name).or_insert(next)
+    }
+
+    /// Returns the list that each file holds.
+    fn list(&self) -> Vec<Value> {
+        let mut all: Vec<(&String, &u32)> = self.0.iter().collect();
+        all.sort_unstable_by_key(|(_, id)| **id);
+        let category = |(name, id)| json!({"id": id, "name": name, "supercategory": "character"});
+        all.into_iter().map(category).collect()
+    }
+}
+
+/// The text of a COCO file, annotation by annotation. Only the list of images is kept in memory.
 ///
 /// Ids count from 1 in the order of the annotations. The lists of images and categories come last in the file.
-#[derive(Debug)]
-pub(in crate::export) struct CocoWriter<W> {
-    out: W,
+#[derive(Debug, Default)]
+pub(in crate::export) struct CocoText {
     images: BTreeMap<String, CocoImage>,
-    categories: BTreeMap<String, u32>,
     annotations: u32,
 }
 
-impl<W: Write> CocoWriter<W> {
-    /// Begins a file with the given description of the dataset.
-    ///
-    /// # Errors
-    /// Returns an error if the output cannot be written.
-    pub(in crate::export) fn begin(mut out: W, description: &str) -> io::Result<Self> {
+impl CocoText {
+    /// Returns the beginning of a file with the given description of the dataset.
+    pub(in crate::export) fn head(description: &str) -> String {
         let info = json!({"description": description, "version": env!("CARGO_PKG_VERSION")});
-        write!(out, "{{\"info\":{info},\"licenses\":[],\"annotations\":[")?;
-        Ok(Self {
-            out,
-            images: BTreeMap::new(),
-            categories: BTreeMap::new(),
-            annotations: 0,
-        })
+        format!("{{\"info\":{info},\"licenses\":[],\"annotations\":[")
     }
 
-    /// Writes an annotation. Annotations with the same file name share an image, and those with the same character a
-    /// category.
-    ///
-    /// # Errors
-    /// Returns an error if the output cannot be written.
-    pub(in crate::export) fn add(&mut self, strokes: &StrokeAnnotation) -> io::Result<()> {
+    /// Returns the text of the next annotation. Annotations with the same file name share an image.
+    pub(in crate::export) fn annotation(
+        &mut self,
+        strokes: &StrokeAnnotation,
+        categories: &mut CocoCategories,
+    ) -> String {
         let next_image = self.images.len() as u32 + 1;
         let [width, height] = strokes.size;
         let image = self.images.entry(strokes.file_name.clone());
@@ -110,14 +119,11 @@ impl<W: Write> CocoWriter<W> {
             width,
             height,
         });
-        let next_category = self.categories.len() as u32 + 1;
-        let category = strokes.character.as_deref().unwrap_or(STROKE).to_owned();
-        let category = *self.categories.entry(category).or_insert(next_category);
         self.annotations += 1;
         let annotation = json!({
             "id": self.annotations,
             "image_id": image.id,
-            "category_id": category,
+            "category_id": categories.number(strokes),
             "iscrowd": 0,
             "area": strokes.area,
             "bbox": strokes.bbox,
@@ -126,28 +132,15 @@ impl<W: Write> CocoWriter<W> {
             "attributes": strokes.attributes,
         });
         let comma = if self.annotations > 1 { "," } else { "" };
-        write!(self.out, "{comma}\n{annotation}")
+        format!("{comma}\n{annotation}")
     }
 
-    /// Writes the lists of images and categories and returns the output.
-    ///
-    /// # Errors
-    /// Returns an error if the output cannot be written.
-    pub(in crate::export) fn finish(mut self) -> io::Result<W> {
-        let mut images: Vec<CocoImage> = self.images.into_values().collect();
+    /// Returns the end of the file.
+    pub(in crate::export) fn tail(&self, categories: &CocoCategories) -> String {
+        let mut images: Vec<&CocoImage> = self.images.values().collect();
         images.sort_unstable_by_key(|image| image.id);
-        let mut categories: Vec<(String, u32)> = self.categories.into_iter().collect();
-        categories.sort_unstable_by_key(|(_, id)| *id);
-        let categories: Vec<Value> = categories
-            .into_iter()
-            .map(|(name, id)| json!({"id": id, "name": name, "supercategory": "character"}))
-            .collect();
-        let (images, categories) = (json!(images), json!(categories));
-        writeln!(
-            self.out,
-            "\n],\"images\":{images},\"categories\":{categories}}}"
-        )?;
-        Ok(self.out)
+        let (images, categories) = (json!(images), json!(categories.list()));
+        format!("\n],\"images\":{images},\"categories\":{categories}}}\n")
     }
 }
 
@@ -155,7 +148,7 @@ impl<W: Write> CocoWriter<W> {
 pub(super) mod tests {
     use serde_json::{Value, json};
 
-    use super::{CocoWriter, StrokeAnnotation};
+    use super::{CocoCategories, CocoText, StrokeAnnotation};
     use crate::raster::Mask;
 
     /// Returns the annotation of a square of four pixels on a print of 9 x 7 pixels.
@@ -173,12 +166,13 @@ pub(super) mod tests {
     }
 
     fn written(all: &[StrokeAnnotation]) -> Value {
-        let mut file = CocoWriter::begin(Vec::new(), "prints").expect("written");
+        let (mut file, mut categories) = (CocoText::default(), CocoCategories::default());
+        let mut text = CocoText::head("prints");
         for strokes in all {
-            file.add(strokes).expect("written");
+            text += &file.annotation(strokes, &mut categories);
         }
-        let text = file.finish().expect("written");
-        serde_json::from_slice(&text).expect("JSON")
+        text += &file.tail(&categories);
+        serde_json::from_str(&text).expect("JSON")
     }
 
     #[test]

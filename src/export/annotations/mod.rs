@@ -3,3 +3,6 @@
 mod coco;
 mod rle;
 mod via;
+
+pub(super) use coco::{CocoCategories, CocoText, StrokeAnnotation};
+pub(super) use via::ViaRegions;

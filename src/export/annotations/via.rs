@@ -1,7 +1,6 @@
 //! Annotation files of the VGG Image Annotator 2: the box of each character on its print.
 
 use std::collections::BTreeMap;
-use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
@@ -22,7 +21,9 @@ pub(in crate::export) struct ViaRegions(BTreeMap<String, ViaImage>);
 impl ViaRegions {
     /// Adds the box of a pair on a print file of `bytes` bytes. A pair without strokes has no box.
     pub(in crate::export) fn add(&mut self, strokes: &StrokeAnnotation, bytes: u64) {
-        let image = self.0.entry(strokes.file_name.clone());
+        // VIA names an image by its file name without folders.
+        let name = strokes.file_name.rsplit('/').next().unwrap_or_default();
+        let image = self.0.entry(name.to_owned());
         let image = image.or_insert_with(|| ViaImage {
             bytes,
             regions: Vec::new(),
@@ -39,12 +40,15 @@ impl ViaRegions {
         }
     }
 
-    /// Writes the file. The key of an image is its name followed by its size in bytes, as VIA makes it.
+    /// Writes the file, image by image. The key of an image is its name followed by its size in bytes, as in VIA.
     ///
     /// # Errors
-    /// Returns an error if the output cannot be written.
-    pub(in crate::export) fn write(self, out: &mut impl Write) -> io::Result<()> {
-        write!(out, "{{")?;
+    /// Returns the first error of `append`.
+    pub(in crate::export) fn write<E>(
+        self,
+        mut append: impl FnMut(&str) -> Result<(), E>,
+    ) -> Result<(), E> {
+        append("{")?;
         for (k, (name, image)) in self.0.into_iter().enumerate() {
             let comma = if k > 0 { "," } else { "" };
             let key = json!(format!("{name}{}", image.bytes));
@@ -54,32 +58,42 @@ impl ViaRegions {
                 "regions": image.regions,
                 "file_attributes": {},
             });
-            write!(out, "{comma}\n{key}:{value}")?;
+            append(&format!("{comma}\n{key}:{value}"))?;
         }
-        writeln!(out, "\n}}")
+        append("\n}\n")
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
     use serde_json::{Value, json};
 
     use super::ViaRegions;
     use crate::export::annotations::coco::tests::square;
 
+    fn written(regions: ViaRegions) -> Value {
+        let mut text = String::new();
+        let added = regions.write(|part| -> Result<(), Infallible> {
+            text += part;
+            Ok(())
+        });
+        added.expect("a String takes any text");
+        serde_json::from_str(&text).expect("JSON")
+    }
+
     #[test]
     fn boxes_of_a_page_are_listed_together() {
         let mut regions = ViaRegions::default();
         for (pair, print, bytes) in [
-            ("a", "p1.png", 10),
-            ("b", "p2.png", 20),
-            ("c", "p1.png", 10),
+            ("a", "images/p1.png", 10),
+            ("b", "images/p2.png", 20),
+            ("c", "images/p1.png", 10),
         ] {
             regions.add(&square(pair, Some("\u{4eba}"), print), bytes);
         }
-        let mut text = Vec::new();
-        regions.write(&mut text).expect("written");
-        let file: Value = serde_json::from_slice(&text).expect("JSON");
+        let file = written(regions);
         let page = &file["p1.png10"];
         assert_eq!(
             [&page["filename"], &page["size"]],

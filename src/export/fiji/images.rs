@@ -2,60 +2,70 @@
 
 use super::imagej_tags::{ImageDisplay, PixelSize};
 use super::tiff_stack::{float_stack, integer_image};
-use crate::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome};
+use crate::domain::{Affine2, DepthScale, LengthUnit};
 use crate::export::pictures::Rgb;
 use crate::raster::components::ConnectedComponents;
-use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
+use crate::raster::{Grid, Mask};
 
 /// Name of the unit of lengths if the unit of the mesh is unknown.
 const UNKNOWN_UNIT: &str = "mesh unit";
+
+/// Pictures of equal size: the print, and what is aligned with it.
+#[derive(Debug)]
+pub(in crate::export) struct AlignedPictures {
+    /// The print.
+    pub(in crate::export) print: Rgb,
+    /// Levels of the depth map; 0 is no data.
+    pub(in crate::export) levels: Grid<u16>,
+    /// The strokes.
+    pub(in crate::export) mask: Mask,
+    /// Maps depth-map pixels to pixels of the pictures.
+    pub(in crate::export) from_depth: Affine2,
+}
 
 /// The images of one pair and metric as TIFF files. Lengths are millimetres, or mesh units if the unit is unknown.
 #[derive(Debug)]
 pub(in crate::export) struct FijiImages {
     /// Heights over the fitted surface, in the depth map's frame.
     pub(in crate::export) heights: Vec<u8>,
-    /// Print, heights and stroke mask as channels, in the print's frame.
+    /// Print, heights and stroke mask as channels, in the frame of the pictures.
     pub(in crate::export) stack: Vec<u8>,
-    /// The connected strokes, numbered from 1, in the print's frame.
+    /// The connected strokes, numbered from 1, in the frame of the pictures.
     pub(in crate::export) strokes: Vec<u8>,
 }
 
 impl FijiImages {
-    /// Encodes the images of a metric's result.
-    pub(in crate::export) fn new(depth: &DepthMap, outcome: &MetricOutcome, print: &Rgb) -> Self {
-        let (width, height) = (print.width(), print.height());
-        let alignment = &outcome.print_from_depth;
-        let mask = depth.stroke_mask(outcome.threshold_level);
-        let mask = warp_mask(&mask, alignment, width, height);
-        let aligned = warp_depth(depth, alignment, width, height);
-        let on_print = pixel_size(&depth.scale, alignment);
-        let (numbers, count) = numbered(&mask);
+    /// Encodes the images of a result. `scale` is that of the depth map with the given levels.
+    pub(in crate::export) fn new(
+        depth: &Grid<u16>,
+        scale: &DepthScale,
+        pictures: &AlignedPictures,
+    ) -> Self {
+        let on_pictures = pixel_size(scale, &pictures.from_depth);
+        let on_depth = pixel_size(scale, &Affine2::IDENTITY);
+        let print = pictures.print.map(|colour| luminance(*colour));
+        let mask = pictures.mask.map(|set| if *set { 255.0 } else { 0.0 });
+        let channels = [
+            grey_channel("print", print),
+            height_channel(&pictures.levels, scale),
+            grey_channel("mask", mask),
+        ];
+        let (numbers, highest) = numbered(&pictures.mask);
         let strokes = ImageDisplay {
             label: "strokes",
-            range: [0.0, f64::from(count.max(1))],
+            range: [0.0, f64::from(highest.max(1))],
         };
         Self {
-            heights: float_stack(
-                &pixel_size(&depth.scale, &Affine2::IDENTITY),
-                &[height_channel(&depth.levels, &depth.scale)],
-            ),
-            stack: float_stack(
-                &on_print,
-                &[
-                    grey_channel("print", print.map(|colour| luminance(*colour))),
-                    height_channel(&aligned, &depth.scale),
-                    grey_channel("mask", mask.map(|set| if *set { 255.0 } else { 0.0 })),
-                ],
-            ),
-            strokes: integer_image(&on_print, strokes, numbers),
+            heights: float_stack(&on_depth, &[height_channel(depth, scale)]),
+            stack: float_stack(&on_pictures, &channels),
+            strokes: integer_image(&on_pictures, strokes, numbers),
         }
     }
 }
 
-/// Returns the size of a pixel of the frame into which `to_depth` maps depth-map pixels.
-fn pixel_size(scale: &DepthScale, to_depth: &Affine2) -> PixelSize {
-    let per_unit = to_depth.scale() / scale.mesh_unit_per_px;
+/// Returns the size of a pixel of the frame into which `from_depth` maps depth-map pixels.
+fn pixel_size(scale: &DepthScale, from_depth: &Affine2) -> PixelSize {
+    let per_unit = from_depth.scale() / scale.mesh_unit_per_px;
     PixelSize {
         px_per_unit: per_unit / scale.unit.map_or(1.0, LengthUnit::mm),
         unit: scale.unit.map_or(UNKNOWN_UNIT, |_| "mm"),

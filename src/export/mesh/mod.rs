@@ -1,7 +1,12 @@
-//! Scans in the frame of their prints, as PLY, GLB, and files for CloudCompare and MeshLab.
+//! Scans in the frame of their prints, as PLY, GLB, and files for `CloudCompare` and `MeshLab`.
 
 mod glb;
 mod matrix;
+mod meshlab;
 mod placed_mesh;
 mod placement;
 mod ply;
+mod scan_files;
+
+pub(super) use placement::MeshPlacement;
+pub(super) use scan_files::{ScanFiles, ScanTitle};

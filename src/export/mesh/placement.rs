@@ -6,7 +6,8 @@
 //! against the rows of the print, and x against its columns. Only texture coordinates contain the reflection.
 
 use crate::domain::{
-    Affine2, DepthScale, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, Rigid3,
+    Affine2, DepthScale, FitOutcome, HeightFromMesh, LengthUnit, MetricOutcome, PrintFromMesh,
+    Rigid3,
 };
 
 /// Places the points of a scan in the frame of exported meshes.
@@ -16,6 +17,7 @@ pub(in crate::export) struct MeshPlacement {
     scale: DepthScale,
     threshold: f64,
     print_from_mesh: PrintFromMesh,
+    height_from_mesh: HeightFromMesh,
     frame_from_plane: Rigid3,
 }
 
@@ -56,6 +58,7 @@ impl MeshPlacement {
                 &scale.depth_from_plane,
                 &fit.plane_from_mesh,
             ),
+            height_from_mesh: HeightFromMesh::new(&fit.plane_from_mesh, scale.bow.as_ref()),
             threshold: outcome.threshold_depth,
             frame_from_plane: Rigid3::to_frame(axes, [origin[0], origin[1], 0.0]),
             fit,
@@ -87,8 +90,8 @@ impl MeshPlacement {
     /// Places a point of the mesh.
     pub(super) fn place(&self, point: [f64; 3]) -> PlacedPoint {
         let scale = self.frame_unit_per_mesh_unit();
-        let on_plane @ [x, y, z] = self.fit.plane_from_mesh.apply(point);
-        let height = z - self.scale.bow.map_or(0.0, |bow| bow.height(x, y));
+        let on_plane = self.fit.plane_from_mesh.apply(point);
+        let height = self.height_from_mesh.apply(point);
         let [u, v, _] = self.print_from_mesh.apply(point);
         let region = self.fit.region.as_ref();
         PlacedPoint {

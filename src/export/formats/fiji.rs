@@ -1,0 +1,106 @@
+//! The format `fiji`: calibrated TIFF images.
+
+use super::super::export_folder::FolderError;
+use super::super::fiji::{AlignedPictures, FijiImages};
+use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use super::super::pair_pictures::PictureError;
+use super::super::record::PairRecord;
+use super::single_results::{NamedFiles, SingleResults};
+
+/// Files of a pair: name in `pairs.jsonl`, path, and meaning.
+const FILES: [[&str; 3]; 3] = [
+    ["heights", "pairs/*/heights.tif", HEIGHTS],
+    ["stack", "pairs/*/stack.tif", STACK],
+    ["strokes", "pairs/*/strokes.tif", STROKES],
+];
+const HEIGHTS: &str =
+    "32-bit heights over the fitted surface in mm, in the frame of the depth map; NaN is no data";
+const STACK: &str = "three 32-bit channels in the frame of the pictures: print (0-255), heights in mm, stroke mask \
+    (255 = stroke)";
+const STROKES: &str =
+    "16-bit label image in the frame of the pictures: connected strokes from 1, 0 is background";
+
+const USAGE: &str = "\
+## Use
+
+All images are calibrated: ImageJ and Fiji show and measure lengths in millimetres, or in `mesh unit` if the unit of the
+mesh is unknown. A pixel of the depth map is `mesh_unit_per_px` wide, and a pixel of the print that divided by `scale`.
+Heights are measured over the fitted surface, which may be curved (see Coordinates). With
+`register.anisotropic_scale`, the calibration is the mean of both axes.
+
+`Analyze > Tools > ROI Manager...` and the plugin MorphoLibJ (`Plugins > MorphoLibJ > Analyze > Analyze Regions`) take
+`strokes.tif`; open `stack.tif` and `strokes.tif` together to measure heights per stroke.
+
+```python
+import tifffile
+with tifffile.TiffFile(\"pairs/ID/heights.tif\") as file:
+    heights = file.asarray()                                   # mm
+    n, d = file.pages[0].tags[\"XResolution\"].value             # pixels per mm = n / d
+```
+";
+
+/// Writes the images.
+pub(super) struct FijiWriter {
+    results: SingleResults,
+}
+
+impl FijiWriter {
+    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
+        Ok(Self {
+            results: SingleResults::begin(&folder)?,
+        })
+    }
+}
+
+impl FormatWriter for FijiWriter {
+    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
+        let mut encoded = EncodedPair::default();
+        let shown = self.results.of_pair(view).zip(view.result);
+        let Some(((fields, record), pictures)) = shown else {
+            encoded.shared.push(self.results.line(view, None));
+            return Ok(encoded);
+        };
+        let outcome = &record.outcome;
+        let mut scale = pictures.outcomes.depth.scale.clone();
+        scale.unit = scale.unit.or(view.record.pair.unit);
+        let aligned = AlignedPictures {
+            print: pictures.print_rgb()?,
+            levels: pictures.aligned_depth(outcome)?,
+            mask: pictures.aligned_mask(outcome)?,
+            from_depth: pictures
+                .frame()?
+                .from_print
+                .after(&outcome.print_from_depth),
+        };
+        let images = FijiImages::new(&pictures.depth()?.levels, &scale, &aligned);
+        let contents = [images.heights, images.stack, images.strokes];
+        let mut names = NamedFiles::new();
+        for ([name, path, _], content) in FILES.into_iter().zip(contents) {
+            names.insert(name, path.to_owned());
+            encoded.add_file(path, content);
+        }
+        encoded
+            .shared
+            .push(self.results.line(view, Some((fields, names))));
+        Ok(encoded)
+    }
+
+    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
+        shared.iter().try_for_each(|line| self.results.append(line))
+    }
+
+    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
+        Ok(vec![self.results.finish()?])
+    }
+
+    fn guide(&self) -> FormatGuide {
+        let paths = FILES.map(|[_, path, _]| path.replace('*', "ID"));
+        let files: Vec<[&str; 2]> = FILES
+            .iter()
+            .zip(&paths)
+            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
+            .collect();
+        let purpose = "Prints and heights of carved blocks as calibrated TIFF images.";
+        self.results.guide(purpose, &files, USAGE)
+    }
+}

@@ -1,0 +1,136 @@
+//! The format `mesh`: scans in the frame of their prints.
+
+use super::super::export_folder::FolderError;
+use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use super::super::mesh::{MeshPlacement, ScanFiles, ScanTitle};
+use super::super::pair_pictures::PictureError;
+use super::super::pictures::eight_bits;
+use super::super::record::PairRecord;
+use super::single_results::{NamedFiles, SingleResults};
+
+/// Files of a pair: name in `pairs.jsonl`, path, and meaning.
+const FILES: [[&str; 3]; 5] = [
+    ["ply", "pairs/*/scan.ply", PLY],
+    ["glb", "pairs/*/scan.glb", GLB],
+    ["matrix", "pairs/*/matrix.txt", MATRIX],
+    ["project", "pairs/*/scan.mlp", PROJECT],
+    ["print", "pairs/*/print.png", "the print"],
+];
+const PLY: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
+    `height` over the fitted surface";
+const GLB: &str =
+    "the scan, glTF 2.0 in metres with the print as texture; `asset.extras` states units and maps";
+const MATRIX: &str =
+    "4 x 4 matrix from the original mesh file to `scan.ply`, a similarity without reflection";
+const PROJECT: &str = "MeshLab project with `scan.ply` and the print";
+
+/// The frame, and how to open the files.
+const USAGE: &str = "\
+## Frame
+
+`scan.ply` and `scan.glb` show the block in front of you, upright like its print: **x right, y up, z out of the block**.
+The origin is on the fitted plane, at the centre of the print image. The block is carved in mirror writing, and no
+motion makes it readable, so the scan is not reflected: x runs against the columns of the print. Without
+`register.anisotropic_scale`, a point (x, y, z) lies at the print pixel
+
+```
+u = (width - 1) / 2 - x / mm_per_print_px          mm_per_print_px = mesh_unit_per_px * mm_per_mesh_unit / scale
+v = (height - 1) / 2 - y / mm_per_print_px
+```
+
+Only the texture coordinates of the GLB contain the reflection; they follow `print_from_mesh` exactly. The print is
+projected along z, onto walls and the back too. Vertices and faces beside the print are white and have `stroke` 0.
+Lengths are millimetres (metres in the GLB). If the unit of the mesh is unknown, they are mesh units, and the GLB takes
+a mesh unit for a millimetre. Vertices that the file repeats are merged.
+
+`stroke` is 1 where `height` is at least `threshold_depth`: heights are measured over the fitted surface, which may be
+curved (see Coordinates).
+
+## Use
+
+```sh
+CloudCompare -O original.stl -APPLY_TRANS pairs/ID/matrix.txt -SAVE_MESHES   # moves the original onto scan.ply
+meshlab pairs/ID/scan.mlp
+```
+
+```python
+import trimesh
+scan = trimesh.load(\"pairs/ID/scan.ply\", process=False)
+stroke = scan.metadata[\"_ply_raw\"][\"vertex\"][\"data\"][\"stroke\"]
+```
+";
+
+/// Writes the scans.
+pub(super) struct MeshWriter {
+    results: SingleResults,
+}
+
+impl MeshWriter {
+    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
+        Ok(Self {
+            results: SingleResults::begin(&folder)?,
+        })
+    }
+}
+
+impl FormatWriter for MeshWriter {
+    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
+        let mut encoded = EncodedPair::default();
+        let shown = self.results.of_pair(view).zip(view.result);
+        let Some(((fields, record), pictures)) = shown else {
+            encoded.shared.push(self.results.line(view, None));
+            return Ok(encoded);
+        };
+        let print = eight_bits(&pictures.source_print()?.picture);
+        let mut scale = pictures.outcomes.depth.scale.clone();
+        scale.unit = scale.unit.or(view.record.pair.unit);
+        let placement = MeshPlacement::new(
+            pictures.outcomes.fit.clone(),
+            scale,
+            &record.outcome,
+            [print.width(), print.height()],
+        )
+        .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
+        let title = ScanTitle {
+            pair: &view.record.pair.id,
+            metric: fields.metric,
+        };
+        let files = ScanFiles::new(pictures.mesh()?, &placement, &print, &title)
+            .map_err(|error| PictureError::Unencodable(error.to_string()))?;
+        let contents = [
+            files.ply,
+            files.glb,
+            files.matrix.into_bytes(),
+            files.project.into_bytes(),
+            files.print,
+        ];
+        let mut names = NamedFiles::new();
+        for ([name, path, _], content) in FILES.into_iter().zip(contents) {
+            names.insert(name, path.to_owned());
+            encoded.add_file(path, content);
+        }
+        encoded
+            .shared
+            .push(self.results.line(view, Some((fields, names))));
+        Ok(encoded)
+    }
+
+    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
+        shared.iter().try_for_each(|line| self.results.append(line))
+    }
+
+    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
+        Ok(vec![self.results.finish()?])
+    }
+
+    fn guide(&self) -> FormatGuide {
+        let paths = FILES.map(|[_, path, _]| path.replace('*', "ID"));
+        let files: Vec<[&str; 2]> = FILES
+            .iter()
+            .zip(&paths)
+            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
+            .collect();
+        let purpose = "Scans of carved blocks, moved onto their prints.";
+        self.results.guide(purpose, &files, USAGE)
+    }
+}

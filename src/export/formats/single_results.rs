@@ -1,0 +1,123 @@
+//! The file `pairs.jsonl` of formats that hold one result per pair.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::super::export_folder::{FolderError, SharedFile};
+use super::super::export_logs::json_lines;
+use super::super::format_writer::{FormatFolder, FormatGuide, PairView};
+use super::super::record::{MetricFields, PairFields};
+use super::super::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
+use crate::catalog::MetricRecord;
+use crate::domain::ThresholdMetric;
+
+/// The file of lines.
+const LINES: &str = "pairs.jsonl";
+
+/// Files of a line by name, as paths below the folder of `pairs.jsonl`.
+pub(super) type NamedFiles = BTreeMap<&'static str, String>;
+
+/// A line: one pair and the result that the other files of the format show.
+#[derive(Debug, Serialize, JsonSchema)]
+struct SingleResult<'a> {
+    /// The pair.
+    #[serde(flatten)]
+    pair: &'a PairFields,
+    /// The result.
+    #[serde(flatten)]
+    metric: &'a MetricFields,
+    /// Files of the pair, paths below the folder of `pairs.jsonl`; null if the pair has no result.
+    files: Option<NamedFiles>,
+}
+
+/// Selects one result per pair, and writes a line about each.
+pub(super) struct SingleResults {
+    lines: SharedFile,
+    metric: ThresholdMetric,
+}
+
+impl SingleResults {
+    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
+        let metrics = &folder.context.metrics;
+        let default = ThresholdMetric::DEFAULT;
+        let first = metrics.first().copied().unwrap_or(default);
+        Ok(Self {
+            lines: SharedFile::create(&folder.root, LINES)?,
+            metric: if metrics.contains(&default) {
+                default
+            } else {
+                first
+            },
+        })
+    }
+
+    /// Returns the result of a pair to show: that of the default metric if it was selected, otherwise the first.
+    pub(super) fn of_pair<'a>(
+        &self,
+        view: &PairView<'a>,
+    ) -> Option<(&'a MetricFields, &'a MetricRecord)> {
+        let records = &view.result?.metrics;
+        let is_wanted = |record: &&MetricRecord| record.outcome.metric == self.metric;
+        let place = records.iter().position(is_wanted).unwrap_or(0);
+        Some((view.record.metrics.get(place)?, records.get(place)?))
+    }
+
+    /// Returns the line of a pair. `shown` is its result with its files.
+    pub(super) fn line(
+        &self,
+        view: &PairView<'_>,
+        shown: Option<(&MetricFields, NamedFiles)>,
+    ) -> Vec<u8> {
+        let id = view.record.pair.id.as_str();
+        let missing = MetricFields::without_result(self.metric);
+        let (metric, files) = shown.map_or((&missing, None), |(metric, files)| {
+            let files = files.into_iter();
+            let paths = files.map(|(name, path)| (name, path.replace('*', id)));
+            (metric, Some(paths.collect()))
+        });
+        let line = SingleResult {
+            pair: &view.record.pair,
+            metric,
+            files,
+        };
+        json_lines(&[line]).into_bytes()
+    }
+
+    /// Appends a line.
+    pub(super) fn append(&mut self, line: &[u8]) -> Result<(), FolderError> {
+        self.lines.append(line)
+    }
+
+    /// Completes the file and returns its path.
+    pub(super) fn finish(&mut self) -> Result<String, FolderError> {
+        self.lines.flush()?;
+        Ok(LINES.to_owned())
+    }
+
+    /// Returns what the README says about the lines, for a format with this purpose and these files.
+    pub(super) fn guide(&self, purpose: &str, files: &[[&str; 2]], usage: &str) -> FormatGuide {
+        let schema = schema_of::<SingleResult<'_>>();
+        let lines = [
+            LINES,
+            "one line per pair: its record, and its paths as `files`",
+        ];
+        let all = [lines].into_iter().chain(files.iter().copied());
+        let tables = [
+            ("Fields of a line of `pairs.jsonl`", &PAIR_FIELDS[..]),
+            ("", &METRIC_FIELDS[..]),
+        ];
+        FormatGuide {
+            purpose: format!(
+                "{purpose} Each pair is shown by one result: that of `{}`, or else of the first selected metric.",
+                self.metric
+            ),
+            files: all.map(|pair| pair.map(str::to_owned)).collect(),
+            usage: usage.to_owned(),
+            fields: markdown_table(&schema, &tables),
+            schema: Some(schema),
+            ..FormatGuide::default()
+        }
+    }
+}

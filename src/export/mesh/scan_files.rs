@@ -1,0 +1,125 @@
+//! The files of one scan.
+
+use std::io;
+
+use serde_json::{Value, json};
+
+use super::glb::{GlbContent, write_glb};
+use super::matrix::matrix_text;
+use super::meshlab::project_text;
+use super::placed_mesh::PlacedMesh;
+use super::placement::MeshPlacement;
+use super::ply::write_ply;
+use crate::domain::{LengthUnit, PairName, ThresholdMetric};
+use crate::export::pictures::Rgb;
+use crate::mesh::Mesh;
+use crate::raster::{png_grey8, png_rgb8};
+
+/// Metres per unit of the frame.
+const METRES: f64 = 1e-3;
+
+/// What the files name the scan.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::export) struct ScanTitle<'a> {
+    /// The pair.
+    pub(in crate::export) pair: &'a PairName,
+    /// The metric whose threshold separates strokes.
+    pub(in crate::export) metric: ThresholdMetric,
+}
+
+/// The files of a scan in the frame of its print.
+#[derive(Debug)]
+pub(in crate::export) struct ScanFiles {
+    /// Mesh with colours, labels and heights.
+    pub(in crate::export) ply: Vec<u8>,
+    /// Mesh with the print as texture.
+    pub(in crate::export) glb: Vec<u8>,
+    /// The similarity from the scan to the frame, as text.
+    pub(in crate::export) matrix: String,
+    /// `MeshLab` project with the mesh and the print.
+    pub(in crate::export) project: String,
+    /// The print as PNG.
+    pub(in crate::export) print: Vec<u8>,
+}
+
+impl ScanFiles {
+    /// Places a scan and encodes its files. Repeated vertices are merged.
+    ///
+    /// # Errors
+    /// Returns an error if a file would be too large for its format.
+    pub(in crate::export) fn new(
+        mesh: Mesh,
+        placement: &MeshPlacement,
+        print: &Rgb,
+        title: &ScanTitle<'_>,
+    ) -> io::Result<Self> {
+        let placed = PlacedMesh::new(mesh.welded(), placement, print);
+        let png = print_png(print);
+        let mut ply = Vec::new();
+        write_ply(&placed, placement.unit(), &mut ply)?;
+        let content = GlbContent {
+            name: title.pair.as_str(),
+            png: &png,
+            size: [print.width(), print.height()],
+            extras: extras(placement, title),
+        };
+        let mut glb = Vec::new();
+        write_glb(&placed, &content, &mut glb)?;
+        Ok(Self {
+            ply,
+            glb,
+            matrix: matrix_text(&placement.frame_from_mesh()),
+            project: project_text(title.pair, placement, [print.width(), print.height()]),
+            print: png,
+        })
+    }
+}
+
+/// Encodes a print as PNG, grey if it has no colours.
+fn print_png(print: &Rgb) -> Vec<u8> {
+    if print.data().iter().all(|[r, g, b]| r == g && g == b) {
+        png_grey8(&print.map(|[grey, ..]| *grey))
+    } else {
+        png_rgb8(print)
+    }
+}
+
+/// Returns the fields of `asset.extras` of a GLB.
+fn extras(placement: &MeshPlacement, title: &ScanTitle<'_>) -> Value {
+    let mut metres_from_mesh = placement.frame_from_mesh();
+    for value in metres_from_mesh[..3].as_flattened_mut() {
+        *value *= METRES;
+    }
+    json!({
+        "unit": "m",
+        "axes": "x right, y up as in the print, z out of the block; the writing is mirrored, as on the block",
+        "pair": title.pair,
+        "metric": title.metric,
+        "mesh_unit": placement.unit().map(LengthUnit::name),
+        "metres_per_mesh_unit": placement.frame_unit_per_mesh_unit() * METRES,
+        "metres_from_mesh": metres_from_mesh,
+        "print_from_mesh": placement.print_from_mesh(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::print_png;
+    use crate::export::pictures::Rgb;
+    use crate::raster::{ImageLimits, decode, decode_grey8};
+
+    #[test]
+    fn grey_prints_are_grey_files_with_the_same_pixels() {
+        let grey = Rgb::from_fn(5, 4, |x, y| [(40 * x + y) as u8; 3]);
+        assert!(decode_grey8(&print_png(&grey)).is_ok());
+        let mut coloured = grey.clone();
+        coloured.set(2, 2, [1, 2, 3]);
+        for print in [grey, coloured] {
+            let found = decode(&print_png(&print), &ImageLimits::SUGGESTED).expect("reads");
+            assert_eq!(
+                found.rgb,
+                print.map(|colour| colour.map(|c| u16::from(c) * 257))
+            );
+        }
+    }
+}
