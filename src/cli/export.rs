@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 
 use super::context::Context;
@@ -25,7 +25,7 @@ pub(super) struct ExportArgs {
         value_name = "FORMAT",
         default_value = "jsonl",
         value_delimiter = ',',
-        value_parser = one_of::<ExportFormat>(ExportFormat::ALL.map(ExportFormat::name))
+        value_parser = one_of::<ExportFormat>(ExportFormat::ALL.map(described))
     )]
     pub(super) to: Vec<ExportFormat>,
     /// The directory to write; an earlier export there is replaced as a whole
@@ -85,9 +85,14 @@ pub(super) struct ExportArgs {
     pub(super) with_times: bool,
 }
 
+/// Returns the name of a format with its purpose, for help and completion.
+fn described(format: ExportFormat) -> PossibleValue {
+    PossibleValue::new(format.name()).help(format.summary())
+}
+
 /// Returns a parser of names, which lists them in help, in errors and for completion.
 fn one_of<T: FromStr<Err = String> + Clone + Send + Sync + 'static>(
-    names: impl IntoIterator<Item = &'static str>,
+    names: impl IntoIterator<Item = impl Into<PossibleValue>>,
 ) -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
 }

@@ -33,14 +33,26 @@ enum_names! {
 }
 
 impl ExportFormat {
+    /// Returns what the format is for, as a phrase.
+    pub const fn summary(self) -> &'static str {
+        match self {
+            Self::Jsonl => "Lines with all numbers, and pictures as files",
+            Self::Csv => "A table for spreadsheets and R",
+            Self::Parquet => "A table with typed columns",
+            Self::HuggingFace => "A dataset with image columns for datasets.load_dataset",
+            Self::WebDataset => "Tar shards with one sample per pair",
+            Self::Mesh => {
+                "Scans on their prints: coloured PLY, textured GLB, matrix, MeshLab project"
+            }
+            Self::Fiji => "Calibrated TIFF images for ImageJ and Fiji",
+            Self::Annotations => "Strokes as COCO masks and boxes, characters as VIA 2 boxes",
+        }
+    }
+
     /// Returns whether the format writes pictures in the frame of the print, so that it can use a canvas.
     pub const fn writes_pictures(self) -> bool {
         match self {
-            Self::Jsonl
-            | Self::Parquet
-            | Self::HuggingFace
-            | Self::WebDataset
-            | Self::Fiji => true,
+            Self::Jsonl | Self::Parquet | Self::HuggingFace | Self::WebDataset | Self::Fiji => true,
             Self::Csv | Self::Mesh | Self::Annotations => false,
         }
     }

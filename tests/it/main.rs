@@ -22,6 +22,7 @@ mod error_snapshots;
 mod every_call;
 mod export_formats;
 mod export_heights;
+mod export_tools;
 #[cfg(target_os = "linux")]
 mod fault;
 #[cfg(target_os = "linux")]

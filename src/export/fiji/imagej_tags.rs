@@ -1,10 +1,10 @@
-//! The TIFF tags in which ImageJ keeps calibration, display ranges and labels.
+//! The TIFF tags in which `ImageJ` keeps calibration, display ranges and labels.
 
 use std::fmt::Write as _;
 
 use tiff::encoder::Rational;
 
-/// Version that the description names. ImageJ reads the fields of all versions since 1.47.
+/// Version that the description names. `ImageJ` reads the fields of all versions since 1.47.
 const VERSION: &str = "1.53t";
 /// First bytes of the metadata and the types of its entries.
 const MAGIC: u32 = u32::from_be_bytes(*b"IJIJ");
@@ -34,7 +34,7 @@ impl PixelSize {
     }
 }
 
-/// What ImageJ shows of an image of a stack.
+/// What `ImageJ` shows of an image of a stack.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ImageDisplay {
     /// Title of the image in its stack.
@@ -63,7 +63,7 @@ pub(super) fn description(size: &PixelSize, channels: &[ImageDisplay]) -> String
     text
 }
 
-/// Returns the lengths and the content of ImageJ's metadata: the labels and display ranges of the channels, in the
+/// Returns the lengths and the content of `ImageJ`'s metadata: the labels and display ranges of the channels, in the
 /// byte order of this machine, like the rest of the file.
 pub(super) fn metadata(channels: &[ImageDisplay]) -> (Vec<u32>, Vec<u8>) {
     let count = channels.len() as u32;

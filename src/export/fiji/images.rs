@@ -1,4 +1,4 @@
-//! The images of a pair for ImageJ: heights, a stack in the print's frame, and numbered strokes.
+//! The images of a pair for `ImageJ`: heights, a stack in the print's frame, and numbered strokes.
 
 use super::imagej_tags::{ImageDisplay, PixelSize};
 use super::tiff_stack::{float_stack, integer_image};

@@ -1,4 +1,4 @@
-//! Encodes images and stacks of equal size as TIFF with the tags of ImageJ.
+//! Encodes images and stacks of equal size as TIFF with the tags of `ImageJ`.
 
 use std::io::Cursor;
 
@@ -10,7 +10,7 @@ use tiff::tags::{ResolutionUnit, Tag};
 use super::imagej_tags::{ImageDisplay, PixelSize, description, metadata};
 use crate::raster::Grid;
 
-/// Tags of ImageJ's metadata: its content, and the lengths of the parts of the content.
+/// Tags of `ImageJ`'s metadata: its content, and the lengths of the parts of the content.
 const METADATA_LENGTHS: Tag = Tag::Unknown(50_838);
 const METADATA: Tag = Tag::Unknown(50_839);
 

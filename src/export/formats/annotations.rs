@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::super::annotations::{CocoCategories, CocoText, StrokeAnnotation, ViaRegions};
-use super::super::export_folder::{FolderError, SharedFile};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::{PairPictures, PictureError};
-use super::super::record::{PairRecord, SplitName};
 use super::single_results::{NamedFiles, SingleResults};
+use crate::export::annotations::{CocoCategories, CocoText, StrokeAnnotation, ViaRegions};
+use crate::export::export_folder::{FolderError, SharedFile};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::{PairPictures, PictureError};
+use crate::export::record::{PairRecord, SplitName};
 
 /// The file of boxes.
 const VIA: &str = "via.json";

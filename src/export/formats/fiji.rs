@@ -1,11 +1,13 @@
 //! The format `fiji`: calibrated TIFF images.
 
-use super::super::export_folder::FolderError;
-use super::super::fiji::{AlignedPictures, FijiImages};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::PictureError;
-use super::super::record::PairRecord;
 use super::single_results::{NamedFiles, SingleResults};
+use crate::export::export_folder::FolderError;
+use crate::export::fiji::{AlignedPictures, FijiImages};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::PictureError;
+use crate::export::record::PairRecord;
 
 /// Files of a pair: name in `pairs.jsonl`, path, and meaning.
 const FILES: [[&str; 3]; 3] = [
@@ -45,9 +47,9 @@ pub(super) struct FijiWriter {
 }
 
 impl FijiWriter {
-    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
+    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
         Ok(Self {
-            results: SingleResults::begin(&folder)?,
+            results: SingleResults::begin(folder)?,
         })
     }
 }

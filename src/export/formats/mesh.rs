@@ -1,28 +1,32 @@
 //! The format `mesh`: scans in the frame of their prints.
 
-use super::super::export_folder::FolderError;
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::mesh::{MeshPlacement, ScanFiles, ScanTitle};
-use super::super::pair_pictures::PictureError;
-use super::super::pictures::eight_bits;
-use super::super::record::PairRecord;
 use super::single_results::{NamedFiles, SingleResults};
+use crate::export::export_folder::FolderError;
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::mesh::{MeshPlacement, ScanFiles, ScanTitle};
+use crate::export::pair_pictures::PictureError;
+use crate::export::pictures::eight_bits;
+use crate::export::record::PairRecord;
 
 /// Files of a pair: name in `pairs.jsonl`, path, and meaning.
-const FILES: [[&str; 3]; 5] = [
-    ["ply", "pairs/*/scan.ply", PLY],
+const FILES: [[&str; 3]; 4] = [
+    ["ply", "pairs/*/scan.ply", SCAN],
     ["glb", "pairs/*/scan.glb", GLB],
     ["matrix", "pairs/*/matrix.txt", MATRIX],
-    ["project", "pairs/*/scan.mlp", PROJECT],
-    ["print", "pairs/*/print.png", "the print"],
+    [
+        "project",
+        "pairs/*/scan.mlp",
+        "MeshLab project with `scan.ply`",
+    ],
 ];
-const PLY: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
+const SCAN: &str = "the scan, binary PLY in millimetres: per vertex the colour of the print, `stroke` (1 on strokes) and \
     `height` over the fitted surface";
 const GLB: &str =
     "the scan, glTF 2.0 in metres with the print as texture; `asset.extras` states units and maps";
 const MATRIX: &str =
     "4 x 4 matrix from the original mesh file to `scan.ply`, a similarity without reflection";
-const PROJECT: &str = "MeshLab project with `scan.ply` and the print";
 
 /// The frame, and how to open the files.
 const USAGE: &str = "\
@@ -56,7 +60,8 @@ meshlab pairs/ID/scan.mlp
 ```python
 import trimesh
 scan = trimesh.load(\"pairs/ID/scan.ply\", process=False)
-stroke = scan.metadata[\"_ply_raw\"][\"vertex\"][\"data\"][\"stroke\"]
+vertices = scan.metadata[\"_ply_raw\"][\"vertex\"][\"data\"]
+tops = scan.vertices[vertices[\"stroke\"] == 1]                # mm
 ```
 ";
 
@@ -66,9 +71,9 @@ pub(super) struct MeshWriter {
 }
 
 impl MeshWriter {
-    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
+    pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
         Ok(Self {
-            results: SingleResults::begin(&folder)?,
+            results: SingleResults::begin(folder)?,
         })
     }
 }
@@ -102,7 +107,6 @@ impl FormatWriter for MeshWriter {
             files.glb,
             files.matrix.into_bytes(),
             files.project.into_bytes(),
-            files.print,
         ];
         let mut names = NamedFiles::new();
         for ([name, path, _], content) in FILES.into_iter().zip(contents) {

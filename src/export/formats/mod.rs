@@ -31,8 +31,8 @@ pub(super) fn begin(
         ExportFormat::Parquet => Box::new(parquet::ParquetWriter::begin(folder)?),
         ExportFormat::HuggingFace => Box::new(huggingface::HuggingFaceWriter::begin(folder)?),
         ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
-        ExportFormat::Mesh => Box::new(mesh::MeshWriter::begin(folder)?),
-        ExportFormat::Fiji => Box::new(fiji::FijiWriter::begin(folder)?),
+        ExportFormat::Mesh => Box::new(mesh::MeshWriter::begin(&folder)?),
+        ExportFormat::Fiji => Box::new(fiji::FijiWriter::begin(&folder)?),
         ExportFormat::Annotations => Box::new(annotations::AnnotationWriter::begin(folder)?),
     })
 }

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::export_folder::{FolderError, SharedFile};
-use super::super::export_logs::json_lines;
-use super::super::format_writer::{FormatFolder, FormatGuide, PairView};
-use super::super::record::{MetricFields, PairFields};
-use super::super::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 use crate::catalog::MetricRecord;
 use crate::domain::ThresholdMetric;
+use crate::export::export_folder::{FolderError, SharedFile};
+use crate::export::export_logs::json_lines;
+use crate::export::format_writer::{FormatFolder, FormatGuide, PairView};
+use crate::export::record::{MetricFields, PairFields};
+use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 
 /// The file of lines.
 const LINES: &str = "pairs.jsonl";

@@ -49,7 +49,7 @@ pub(super) fn write_glb(
 ) -> io::Result<()> {
     let buffer = GlbBuffer::new(mesh, content);
     let mut text = document(mesh, content, &buffer).to_string();
-    while text.len() % 4 != 0 {
+    while !text.len().is_multiple_of(4) {
         text.push(' ');
     }
     let padded = buffer.len().next_multiple_of(4);
@@ -167,25 +167,31 @@ impl GlbBuffer {
     }
 }
 
-/// Returns the JSON chunk.
+/// Returns the JSON chunk. Faces beside the print have a material without texture.
 fn document(mesh: &PlacedMesh, content: &GlbContent<'_>, buffer: &GlbBuffer) -> Value {
-    let mode = if mesh.triangles.is_empty() {
+    let mode = if mesh.source.triangles.is_empty() {
         POINTS
     } else {
         TRIANGLES
     };
-    let parts = (0..)
-        .zip(&buffer.corners)
-        .filter(|(_, corners)| !corners.is_empty());
-    let primitives = (2..).zip(parts).map(|(accessor, (material, _))| {
-        json!({
-            "attributes": {"POSITION": 0, "TEXCOORD_0": 1},
-            "indices": accessor, "material": material, "mode": mode,
-        })
-    });
-    let matte = json!({"metallicFactor": 0, "roughnessFactor": 1});
-    let mut printed = matte.clone();
-    printed["baseColorTexture"] = json!({"index": 0});
+    let printed =
+        json!({"metallicFactor": 0, "roughnessFactor": 1, "baseColorTexture": {"index": 0}});
+    let white = json!({"metallicFactor": 0, "roughnessFactor": 1});
+    let parts = [
+        ("print", printed, json!({"POSITION": 0, "TEXCOORD_0": 1})),
+        ("beside the print", white, json!({"POSITION": 0})),
+    ];
+    let (mut materials, mut primitives) = (Vec::new(), Vec::new());
+    for ((name, colours, attributes), corners) in parts.into_iter().zip(&buffer.corners) {
+        if corners.is_empty() {
+            continue;
+        }
+        let material = materials.len();
+        primitives.push(json!({
+            "attributes": attributes, "indices": 2 + material, "material": material, "mode": mode,
+        }));
+        materials.push(json!({"name": name, "doubleSided": true, "pbrMetallicRoughness": colours}));
+    }
     json!({
         "asset": {
             "version": "2.0",
@@ -195,11 +201,8 @@ fn document(mesh: &PlacedMesh, content: &GlbContent<'_>, buffer: &GlbBuffer) -> 
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": content.name, "mesh": 0}],
-        "meshes": [{"name": content.name, "primitives": primitives.collect::<Vec<_>>()}],
-        "materials": [
-            {"name": "print", "doubleSided": true, "pbrMetallicRoughness": printed},
-            {"name": "beside the print", "doubleSided": true, "pbrMetallicRoughness": matte},
-        ],
+        "meshes": [{"name": content.name, "primitives": primitives}],
+        "materials": materials,
         "textures": [{"source": 0, "sampler": 0}],
         "images": [{"name": "print", "mimeType": "image/png", "bufferView": 3}],
         "samplers": [{
@@ -221,14 +224,14 @@ fn texture_coordinates(pixel: [f32; 2], size: [usize; 2]) -> [f32; 2] {
 /// Returns the corners of the faces with all corners over the print, or of the other faces. For a point set, returns
 /// the points instead.
 fn corners(mesh: &PlacedMesh, on_print: bool) -> Vec<u32> {
-    if mesh.triangles.is_empty() {
+    if mesh.source.triangles.is_empty() {
         let points = 0..mesh.positions.len() as u32;
         return points
             .filter(|point| mesh.is_on_print(*point) == on_print)
             .collect();
     }
     let is_on_print = |face: &&[u32; 3]| face.iter().all(|corner| mesh.is_on_print(*corner));
-    let faces = mesh.triangles.iter();
+    let faces = mesh.source.triangles.iter();
     faces
         .filter(|face| is_on_print(face) == on_print)
         .flatten()
@@ -272,7 +275,7 @@ mod tests {
     }
 
     /// Returns the bytes of a buffer view.
-    fn view<'a>((document, binary): &'a (Value, Vec<u8>), index: usize) -> &'a [u8] {
+    fn view((document, binary): &(Value, Vec<u8>), index: usize) -> &[u8] {
         let view = &document["bufferViews"][index];
         let number = |field: &str| view[field].as_u64().expect("a number") as usize;
         &binary[number("byteOffset")..][..number("byteLength")]
@@ -336,7 +339,7 @@ mod tests {
     #[test]
     fn a_point_set_is_written_as_points() {
         let mut mesh = placed(None);
-        mesh.triangles = Vec::new().into();
+        mesh.source.triangles = Vec::new().into();
         let file = written(&mesh);
         let primitives = &file.0["meshes"][0]["primitives"];
         assert_eq!([&primitives[0]["mode"], &primitives[1]["mode"]], [0, 0]);

@@ -1,24 +1,35 @@
 //! The project file of `MeshLab`.
 
-use std::fmt::Write as _;
-
 use super::matrix::matrix_text;
-use super::placement::MeshPlacement;
 use crate::domain::PairName;
 
-/// Returns a project with `scan.ply`.
-pub(super) fn project_text(pair: &PairName, _: &MeshPlacement, _: [usize; 2]) -> String {
-    let mut identity = [[0.0; 4]; 4];
-    for (k, row) in identity.iter_mut().enumerate() {
-        row[k] = 1.0;
-    }
-    let mut text = String::from("<!DOCTYPE MeshLabDocument>\n<MeshLabProject>\n <MeshGroup>\n");
-    writeln!(
-        text,
-        "  <MLMesh label=\"{pair}\" filename=\"scan.ply\">\n   <MLMatrix44>\n{}</MLMatrix44>\n  </MLMesh>",
-        matrix_text(&identity)
+/// The rows of the matrix of a mesh that is in its place.
+const IDENTITY: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+    [0.0, 0.0, 0.0, 1.0],
+];
+
+/// Returns a project with a mesh file, which is in its place.
+pub(super) fn project_text(pair: &PairName, file: &str) -> String {
+    let matrix = matrix_text(&IDENTITY);
+    format!(
+        "<!DOCTYPE MeshLabDocument>\n<MeshLabProject>\n <MeshGroup>\n  \
+         <MLMesh label=\"{pair}\" filename=\"{file}\" visible=\"1\">\n   <MLMatrix44>\n{matrix}</MLMatrix44>\n  \
+         </MLMesh>\n </MeshGroup>\n <RasterGroup/>\n</MeshLabProject>\n"
     )
-    .expect("a String takes any text");
-    text.push_str(" </MeshGroup>\n <RasterGroup/>\n</MeshLabProject>\n");
-    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::project_text;
+
+    #[test]
+    fn a_project_names_pair_and_file() {
+        let pair = "a-1".parse().expect("a valid name");
+        let text = project_text(&pair, "scan.ply");
+        assert!(text.contains("<MLMesh label=\"a-1\" filename=\"scan.ply\" visible=\"1\">"));
+        assert!(text.contains("<MLMatrix44>\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n</MLMatrix44>"));
+    }
 }

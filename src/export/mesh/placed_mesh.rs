@@ -3,7 +3,6 @@
 use super::placement::MeshPlacement;
 use crate::export::pictures::Rgb;
 use crate::mesh::Mesh;
-use crate::page_vec::PageVec;
 
 /// A placed scan. All lists of vertices have the same order and length.
 #[derive(Debug)]
@@ -18,8 +17,8 @@ pub(in crate::export) struct PlacedMesh {
     pub(super) heights: Vec<f32>,
     /// Whether a vertex belongs to a stroke and lies over the print.
     pub(super) strokes: Vec<bool>,
-    /// Indices of corners, with the winding of the file; empty for a point set.
-    pub(super) triangles: PageVec<[u32; 3]>,
+    /// The scan in its own frame. Its faces have the winding of the file.
+    pub(super) source: Mesh,
 }
 
 impl PlacedMesh {
@@ -32,9 +31,9 @@ impl PlacedMesh {
             colours: Vec::with_capacity(count),
             heights: Vec::with_capacity(count),
             strokes: Vec::with_capacity(count),
-            triangles: mesh.triangles,
+            source: mesh,
         };
-        for vertex in mesh.vertices.iter() {
+        for vertex in placed.source.vertices.iter() {
             let point = placement.place(vertex);
             placed.positions.push(point.position.map(|c| c as f32));
             placed.pixels.push(point.pixel.map(|c| c as f32));

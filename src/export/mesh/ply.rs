@@ -19,7 +19,7 @@ pub(super) fn write_ply(
     out: &mut impl Write,
 ) -> io::Result<()> {
     let unit = unit.map_or("unknown, as in the scan", |_| "mm");
-    let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
+    let (vertices, faces) = (mesh.positions.len(), mesh.source.triangles.len());
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\ncomment unit {unit}\n\
@@ -35,7 +35,7 @@ pub(super) fn write_ply(
         let height = mesh.heights[k].to_le_bytes();
         out.write_all([x, y, z, labels, height].as_flattened())?;
     }
-    for triangle in mesh.triangles.iter() {
+    for triangle in &mesh.source.triangles {
         out.write_all(&[3])?;
         out.write_all(triangle.map(u32::to_le_bytes).as_flattened())?;
     }
@@ -55,7 +55,7 @@ mod tests {
         let mut file = Vec::new();
         write_ply(&mesh, Some(LengthUnit::Mm), &mut file).expect("written");
         let back = read(&file, "a.ply", &MeshLimits::SUGGESTED).expect("reads");
-        assert_eq!(*back.triangles, *mesh.triangles);
+        assert_eq!(*back.triangles, *mesh.source.triangles);
         assert_eq!(back.vertices, Vertices::Single(mesh.positions.into()));
     }
 

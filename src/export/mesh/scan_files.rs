@@ -15,6 +15,8 @@ use crate::export::pictures::Rgb;
 use crate::mesh::Mesh;
 use crate::raster::{png_grey8, png_rgb8};
 
+/// Name of the PLY, which the project refers to.
+const PLY: &str = "scan.ply";
 /// Metres per unit of the frame.
 const METRES: f64 = 1e-3;
 
@@ -36,10 +38,8 @@ pub(in crate::export) struct ScanFiles {
     pub(in crate::export) glb: Vec<u8>,
     /// The similarity from the scan to the frame, as text.
     pub(in crate::export) matrix: String,
-    /// `MeshLab` project with the mesh and the print.
+    /// `MeshLab` project with [`PLY`].
     pub(in crate::export) project: String,
-    /// The print as PNG.
-    pub(in crate::export) print: Vec<u8>,
 }
 
 impl ScanFiles {
@@ -69,8 +69,7 @@ impl ScanFiles {
             ply,
             glb,
             matrix: matrix_text(&placement.frame_from_mesh()),
-            project: project_text(title.pair, placement, [print.width(), print.height()]),
-            print: png,
+            project: project_text(title.pair, PLY),
         })
     }
 }
