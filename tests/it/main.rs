@@ -22,6 +22,7 @@ mod error_snapshots;
 mod every_call;
 mod export_formats;
 mod export_heights;
+mod examples;
 mod export_tools;
 #[cfg(target_os = "linux")]
 mod fault;
@@ -54,6 +55,7 @@ mod parsers;
 mod power;
 mod processes;
 mod queue;
+mod readers;
 mod renamed;
 mod report;
 mod resume;

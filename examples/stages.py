@@ -1,9 +1,9 @@
-"""Draws docs/stages.png, the stages of one demo pair with a label under each panel.
+"""Draws the stages of one pair with a label under each panel, such as docs/stages.png in the README:
 
     mocban demo demo --tier pose --pairs 4 --seed 1
     mocban -C demo export -o demo-export
     pip install pillow numpy
-    python docs/stages.py demo-export pose-0003 docs/stages.png
+    python examples/stages.py demo-export pose-0003 docs/stages.png
 """
 
 import json
@@ -20,11 +20,10 @@ FONT = ImageFont.load_default(17)
 METRIC = "ensemble"
 
 
-def shaded_relief(pair: Path) -> Image.Image:
+def shaded_relief(export: Path, line: dict) -> Image.Image:
     """Returns the depth map lit from the top left; pixels without data are white."""
-    levels = np.asarray(Image.open(pair / "depth.png")).astype(float)
-    scale = json.loads((pair / "depth.json").read_text())
-    height_px = levels * scale["height_per_level"] / scale["mesh_unit_per_px"]
+    levels = np.asarray(Image.open(export / line["files"]["depth"])).astype(float)
+    height_px = levels * line["height_per_level"] / line["mesh_unit_per_px"]
     dy, dx = np.gradient(height_px)
     normal = np.stack([-dx, -dy, np.ones_like(dx)]) / np.sqrt(dx**2 + dy**2 + 1)
     light = np.array([-0.5, -0.6, 0.62])
@@ -34,21 +33,22 @@ def shaded_relief(pair: Path) -> Image.Image:
     return Image.fromarray(rgb.astype(np.uint8))
 
 
-def panels(pair: Path) -> list[tuple[Image.Image, str, str]]:
+def panels(export: Path, line: dict) -> list[tuple[Image.Image, str, str]]:
     """Returns the panels, each with its title and a second line."""
-    metric = pair / METRIC
+    files = {name: export / path for name, path in line["files"].items()}
     return [
-        (Image.open(pair / "print.png"), "1  Print", "as scanned"),
-        (shaded_relief(pair), "2  Depth map", "on the fitted plane, mirrored"),
-        (Image.open(metric / "depth_mask.png"), "3  Relief mask", "at the selected threshold"),
-        (Image.open(metric / "aligned_mask.png"), "4  Aligned mask", "in the print's frame"),
-        (Image.open(metric / "overlay.png"), "5  Overlay", "relief outline on the print"),
+        (Image.open(files["print"]), "1  Print", "as scanned"),
+        (shaded_relief(export, line), "2  Depth map", "on the fitted plane, mirrored"),
+        (Image.open(files["depth_mask"]), "3  Relief mask", "at the selected threshold"),
+        (Image.open(files["aligned_mask"]), "4  Aligned mask", "in the print's frame"),
+        (Image.open(files["overlay"]), "5  Overlay", "relief outline on the print"),
     ]
 
 
 def main(export: str, pair: str, output: str) -> None:
-    """Writes the picture of a pair of an export."""
-    drawn = panels(Path(export) / "pairs" / pair)
+    """Writes the picture of a pair of an export of the format `jsonl`."""
+    lines = map(json.loads, open(Path(export) / "pairs.jsonl", encoding="utf-8"))
+    drawn = panels(Path(export), next(line for line in lines if (line["id"], line["metric"]) == (pair, METRIC)))
     width = len(drawn) * (PANEL_PX + GAP_PX) + GAP_PX
     sheet = Image.new("RGB", (width, PANEL_PX + LABEL_PX + 2 * GAP_PX), "white")
     draw = ImageDraw.Draw(sheet)
