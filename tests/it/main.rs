@@ -20,9 +20,9 @@ mod demo;
 mod error_snapshots;
 #[cfg(target_os = "linux")]
 mod every_call;
+mod examples;
 mod export_formats;
 mod export_heights;
-mod examples;
 mod export_tools;
 #[cfg(target_os = "linux")]
 mod fault;

@@ -27,8 +27,8 @@ const USAGE: &str = "\
 
 All images are calibrated: ImageJ and Fiji show and measure lengths in millimetres, or in `mesh unit` if the unit of the
 mesh is unknown. A pixel of the depth map is `mesh_unit_per_px` wide, and a pixel of the print that divided by `scale`.
-Heights are measured over the fitted surface, which may be curved (see Coordinates). With
-`register.anisotropic_scale`, the calibration is the mean of both axes.
+Heights are measured over the fitted surface, which may be curved (see Coordinates). If the
+print has different scales along two axes, the calibration is their mean.
 
 `Analyze > Tools > ROI Manager...` and the plugin MorphoLibJ (`Plugins > MorphoLibJ > Analyze > Analyze Regions`) take
 `strokes.tif`; open `stack.tif` and `strokes.tif` together to measure heights per stroke.

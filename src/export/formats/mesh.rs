@@ -34,8 +34,8 @@ const USAGE: &str = "\
 
 `scan.ply` and `scan.glb` show the block in front of you, upright like its print: **x right, y up, z out of the block**.
 The origin is on the fitted plane, at the centre of the print image. The block is carved in mirror writing, and no
-motion makes it readable, so the scan is not reflected: x runs against the columns of the print. Without
-`register.anisotropic_scale`, a point (x, y, z) lies at the print pixel
+motion makes it readable, so the scan is not reflected: x runs against the columns of the print. Unless
+the print has different scales along two axes, a point (x, y, z) lies at the print pixel
 
 ```
 u = (width - 1) / 2 - x / mm_per_print_px          mm_per_print_px = mesh_unit_per_px * mm_per_mesh_unit / scale
