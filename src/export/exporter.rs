@@ -29,8 +29,10 @@ use crate::domain::{Affine2, Failure, FailureClass, PairName};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::store::Project;
 
-/// Pairs in memory at a time.
+/// Pairs whose rows are in memory at a time.
 const PAGE: usize = 32;
+/// Pairs for each core whose pictures are in memory at a time.
+const ENCODED_PER_CORE: usize = 2;
 
 /// What was exported.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -186,14 +188,16 @@ impl ExportRun {
                 (pair, alignment.map(ManualAlignmentFields::from))
             })
             .collect();
-        let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
-            .into_par_iter()
-            .map(|(pair, alignment)| self.write_pair(&pair, alignment.as_ref()))
-            .collect();
-        for pair in written? {
-            match pair {
-                None => self.summary.pairs.left_out += 1,
-                Some(pair) => self.append(pair)?,
+        for pairs in pairs.chunks(ENCODED_PER_CORE * rayon::current_num_threads()) {
+            let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
+                .par_iter()
+                .map(|(pair, alignment)| self.write_pair(pair, alignment.as_ref()))
+                .collect();
+            for pair in written? {
+                match pair {
+                    None => self.summary.pairs.left_out += 1,
+                    Some(pair) => self.append(pair)?,
+                }
             }
         }
         Ok(())

@@ -1,5 +1,7 @@
 //! Encodes and decodes artifacts as lossless PNG, and encodes images for viewing as JPEG. Equal grids give equal bytes.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::Cursor;
 
 use image::ExtendedColorType;
@@ -133,19 +135,58 @@ pub fn compact_grey8(grid: &Grid<u8>) -> Vec<u8> {
     )
 }
 
-/// Encodes like [`png_rgb8`], smaller and more slowly, for enlarged pictures that are kept.
+/// Encodes like [`png_rgb8`], smaller and more slowly, for enlarged pictures that are kept. A picture of at most 256
+/// colours gets a palette.
+///
+/// ```
+/// use mocban::raster::{Grid, ImageLimits, compact_rgb8, decode, png_rgb8};
+///
+/// let picture = Grid::from_fn(200, 100, |x, y| [(x / 2) as u8, (y / 50) as u8, 9]);
+/// let png = compact_rgb8(&picture);
+/// assert!(png.len() < png_rgb8(&picture).len());
+/// let read = decode(&png, &ImageLimits::SUGGESTED)?.rgb;
+/// assert_eq!(read, picture.map(|colour| colour.map(|value| u16::from(value) * 257)));
+/// # Ok::<(), mocban::raster::DecodeError>(())
+/// ```
 pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
-    let kind = (png::ColorType::Rgb, png::BitDepth::Eight);
-    let samples = grid.data().as_flattened();
-    // Enlarging repeats pixels and rows, which a filter would hide: an overlay of 600 px takes 11 ms and 61 kB, instead
-    // of 0.7 ms and 100 kB.
-    encode(
-        grid,
-        kind,
-        samples,
-        png::DeflateCompression::Level(6),
-        png::Filter::NoFilter,
-    )
+    // Enlarging repeats pixels and rows, which a filter would hide: an overlay of 600 px takes 5 ms and 69 kB, instead
+    // of 0.7 ms and 100 kB. Another third of the time would save 3 %.
+    let (width, height) = (grid.width() as u32, grid.height() as u32);
+    let mut out = Vec::with_capacity(grid.data().len());
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_filter(png::Filter::NoFilter);
+    let samples = if let Some((palette, indices)) = palette(grid) {
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_palette(palette);
+        encoder.set_deflate_compression(png::DeflateCompression::Level(6));
+        Cow::Owned(indices)
+    } else {
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_deflate_compression(png::DeflateCompression::Level(3));
+        Cow::Borrowed(grid.data().as_flattened())
+    };
+    finish(encoder, &samples);
+    out
+}
+
+/// Returns the colours of a picture and the index of each pixel's colour, or `None` if there are more than 256 colours.
+fn palette(grid: &Grid<[u8; 3]>) -> Option<(Vec<u8>, Vec<u8>)> {
+    let mut known: HashMap<[u8; 3], u8> = HashMap::new();
+    let (mut colours, mut indices) = (Vec::new(), Vec::with_capacity(grid.data().len()));
+    for colour in grid.data() {
+        let index = match known.get(colour) {
+            Some(index) => *index,
+            None => {
+                let index = u8::try_from(known.len()).ok()?;
+                known.insert(*colour, index);
+                colours.extend(colour);
+                index
+            }
+        };
+        indices.push(index);
+    }
+    Some((colours, indices))
 }
 
 fn png_of<T: Copy>(
@@ -172,6 +213,11 @@ fn encode<T: Copy>(
     encoder.set_depth(depth);
     encoder.set_deflate_compression(deflate);
     encoder.set_filter(filter);
+    finish(encoder, samples);
+    out
+}
+
+fn finish(encoder: png::Encoder<'_, &mut Vec<u8>>, samples: &[u8]) {
     encoder
         .write_header()
         .and_then(|mut writer| {
@@ -179,7 +225,6 @@ fn encode<T: Copy>(
             writer.finish()
         })
         .expect("a grid with pixels is written to memory");
-    out
 }
 
 /// Decodes a PNG that [`png_grey16`] encoded.
