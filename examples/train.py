@@ -18,14 +18,16 @@ def batches(folder, part):
     shards = sorted(str(path) for path in Path(folder).glob(f"{part}-*.tar"))
     pairs = webdataset.WebDataset(shards, shardshuffle=False).shuffle(100 if part == "train" else 0)
     pairs = pairs.decode("torchrgb").to_tuple("print.png", "aligned_mask.png")
-    for prints, masks in torch.utils.data.DataLoader(pairs, batch_size=8):
+    for prints, masks in torch.utils.data.DataLoader(pairs, batch_size=4):
         yield prints, (masks[:, :1] > 0.5).float()
 
 
+torch.manual_seed(1)
 folder, epochs = sys.argv[1], int(sys.argv[2])
-first, second = nn.Conv2d(3, 16, 5, padding=2), nn.Conv2d(16, 16, 5, padding=2)
-network = nn.Sequential(first, nn.ReLU(), second, nn.ReLU(), nn.Conv2d(16, 1, 5, padding=2))
-optimizer = torch.optim.Adam(network.parameters(), lr=3e-3)
+first = nn.Conv2d(3, 16, 5, padding=2), nn.BatchNorm2d(16), nn.ReLU()
+second = nn.Conv2d(16, 16, 5, padding=2), nn.BatchNorm2d(16), nn.ReLU()
+network = nn.Sequential(*first, *second, nn.Conv2d(16, 1, 5, padding=2))
+optimizer = torch.optim.Adam(network.parameters(), lr=1e-2)
 for epoch in range(1, epochs + 1):
     for prints, masks in batches(folder, "train"):
         loss = nn.functional.binary_cross_entropy_with_logits(network(prints), masks)

@@ -105,11 +105,11 @@ fn skip(reason: &str) {
     eprintln!("skipped: {reason}");
 }
 
-/// Returns a command that runs a script, below the package, in Python. Returns `None`, with a line on stderr, if there
-/// is no Python.
-pub(crate) fn python(script: &Path) -> Option<Command> {
-    let Some(interpreter) = std::env::var_os("READERS_PYTHON") else {
-        skip("READERS_PYTHON names no Python interpreter");
+/// Returns a command that runs a script, given by its path in the package, in the Python interpreter that an environment
+/// variable names. Returns `None`, with a line on stderr, if the variable is not set.
+pub(crate) fn python(variable: &str, script: &str) -> Option<Command> {
+    let Some(interpreter) = std::env::var_os(variable) else {
+        skip(&format!("{variable} names no Python interpreter"));
         return None;
     };
     let mut command = Command::new(interpreter);
@@ -120,7 +120,7 @@ pub(crate) fn python(script: &Path) -> Option<Command> {
 /// Returns a command that checks an export, that of the demo by default, by a script of `tests/readers/`. Returns `None`
 /// without Python.
 fn reader(script: &str, export: Option<&Path>) -> Option<Command> {
-    let mut command = python(&Path::new("tests/readers").join(script))?;
+    let mut command = python("READERS_PYTHON", &format!("tests/readers/{script}"))?;
     let demo = exported_demo();
     let export = export.map_or_else(|| demo.path("export"), Path::to_owned);
     command.arg(export).arg(demo.path("demo/data"));
@@ -174,6 +174,7 @@ readers! {
     imagej_opens_the_calibrated_images: "imagej_images.py",
     pycocotools_decodes_the_masks: "pycocotools_masks.py",
     via_has_the_boxes_of_the_masks: "via_boxes.py",
+    the_measuring_example_finds_the_width_of_bars: "example_widths.py",
 }
 
 #[test]
