@@ -23,18 +23,17 @@ def batches(folder, part):
 
 
 torch.manual_seed(1)
-folder, epochs = sys.argv[1], int(sys.argv[2])
 first = nn.Conv2d(3, 16, 5, padding=2), nn.BatchNorm2d(16), nn.ReLU()
 second = nn.Conv2d(16, 16, 5, padding=2), nn.BatchNorm2d(16), nn.ReLU()
 network = nn.Sequential(*first, *second, nn.Conv2d(16, 1, 5, padding=2))
 optimizer = torch.optim.Adam(network.parameters(), lr=1e-2)
-for epoch in range(1, epochs + 1):
-    for prints, masks in batches(folder, "train"):
+for epoch in range(1, int(sys.argv[2]) + 1):
+    for prints, masks in batches(sys.argv[1], "train"):
         loss = nn.functional.binary_cross_entropy_with_logits(network(prints), masks)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
     with torch.no_grad():
-        found = [(network(prints) > 0, masks > 0.5) for prints, masks in batches(folder, "test")]
+        found = [(network(prints) > 0, masks > 0.5) for prints, masks in batches(sys.argv[1], "test")]
     iou = sum((a & b).sum() for a, b in found) / sum((a | b).sum() for a, b in found)
     print(f"epoch {epoch}: loss {loss:.4f}, IoU on the test blocks {iou:.3f}")
