@@ -1,6 +1,6 @@
 //! `backup` through the real binary: backs up during a run, can be restored, and is never incomplete.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
 use mocban::domain::Stage;
@@ -106,10 +106,30 @@ fn restore_finds_inputs_in_another_directory() {
     at(&restored, &["check", "--repair"]).expect(0);
     at(&restored, &["run"]).expect(0);
     at(&restored, &["check"]).expect(0);
+    let found = exported(&restored, "restored");
     assert!(
-        exported(&restored, "restored") == expected,
+        without_source_paths(&found) == without_source_paths(&expected),
         "another export"
     );
+}
+
+/// Returns the files of an export with lines that do not name the mesh and the print.
+fn without_source_paths(files: &[(PathBuf, Vec<u8>)]) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = files.to_vec();
+    for (_, bytes) in files
+        .iter_mut()
+        .filter(|(path, _)| path.ends_with("pairs.jsonl"))
+    {
+        let text = String::from_utf8_lossy(bytes).into_owned();
+        let lines = text.lines().map(|line| {
+            let mut line: serde_json::Value = serde_json::from_str(line).expect("JSON");
+            line["mesh"].take();
+            line["print"].take();
+            line.to_string() + "\n"
+        });
+        *bytes = lines.collect::<String>().into_bytes();
+    }
+    files
 }
 
 /// A repair would remove results that no run can compute again.

@@ -86,7 +86,7 @@ pub(crate) fn below(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
         }
     }
     files.sort();
-    assert!(files.len() > 20);
+    assert!(files.len() > 10);
     files
 }
 

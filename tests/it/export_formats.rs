@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mocban::raster::{ImageLimits, decode};
+use mocban::raster::{ImageLimits, decode, decode_grey8};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use serde_json::Value;
 
@@ -19,7 +19,7 @@ const FIXED_NAMES: &str = "id character block unit mesh print meta metric status
     plane_from_mesh depth_from_plane print_from_depth files mesh_hash print_hash result_hash config_hash confidence margin \
     verdict seconds manual_alignment disagreements missing_ink missing_wood";
 
-/// A folder with the finished project `p` of 12 pairs of three blocks.
+/// Returns a folder with the finished project `p` of 30 pairs of three blocks.
 fn project() -> tempfile::TempDir {
     let dir = empty();
     let demo = [
@@ -160,6 +160,41 @@ fn formats_agree_on_pairs_and_numbers() {
             let picture = picture.expect("a picture").rgb;
             assert_eq!((picture.width(), picture.height()), (96, 96), "{id} {name}");
         }
+    }
+}
+
+/// The canvas of the scores has 256 pixels by default, so that its masks are those of the pictures.
+#[test]
+fn pictures_on_a_canvas_lie_on_the_masks_of_the_scores() {
+    let dir = project();
+    export(dir.path(), &["--canvas", "256", "-o", "out"]).expect(0);
+    let out = dir.path().join("out");
+    let grey = |line: &Value, name: &str| {
+        let path = out.join(line["files"][name].as_str().expect(name));
+        decode_grey8(&fs::read(path).expect(name)).expect(name)
+    };
+    for line in lines(&out.join("pairs.jsonl")) {
+        for (picture, scored) in [
+            ("aligned_mask", "canvas_depth_mask"),
+            ("print_mask", "canvas_print_mask"),
+        ] {
+            let (picture, scored) = (grey(&line, picture), grey(&line, scored));
+            let both = picture
+                .zip_map(&scored, |a, b| a == 255 && b == 255)
+                .count();
+            let either = picture
+                .zip_map(&scored, |a, b| a == 255 || b == 255)
+                .count();
+            assert!(
+                both as f64 > 0.97 * either as f64,
+                "{}: {both} of {either}",
+                line["id"]
+            );
+        }
+        let print = out.join(line["files"]["print"].as_str().expect("a print"));
+        let print = decode(&fs::read(print).expect("a print"), &ImageLimits::SUGGESTED);
+        let print = print.expect("a print").rgb;
+        assert_eq!((print.width(), print.height()), (256, 256));
     }
 }
 

@@ -3,11 +3,13 @@
 use ::csv::{Terminator, WriterBuilder};
 use serde_json::{Map, Value};
 
-use super::super::export_folder::{FolderError, SharedFile};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::PictureError;
-use super::super::record::{MetricFields, PairFields, PairRecord, ReviewerFields};
-use super::super::record_fields::{
+use crate::export::export_folder::{FolderError, SharedFile};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::PictureError;
+use crate::export::record::{MetricFields, PairFields, PairRecord, ReviewerFields};
+use crate::export::record_fields::{
     METRIC_FIELDS, PAIR_FIELDS, RecordField, markdown_table, schema_of,
 };
 
@@ -30,7 +32,7 @@ const LISTS: [(&str, &[usize]); 9] = [
 ];
 
 /// A column and where its value is in the JSON of a row.
-struct TableColumn {
+struct ResultColumn {
     name: String,
     pointer: String,
 }
@@ -38,7 +40,7 @@ struct TableColumn {
 /// Writes `pairs.csv`.
 pub(super) struct CsvWriter {
     folder: FormatFolder,
-    columns: Vec<TableColumn>,
+    columns: Vec<ResultColumn>,
     table: SharedFile,
 }
 
@@ -69,7 +71,7 @@ impl CsvWriter {
         }
         let row = Value::Object(row);
         let cell =
-            |column: &TableColumn| row.pointer(&column.pointer).map_or_else(String::new, cell);
+            |column: &ResultColumn| row.pointer(&column.pointer).map_or_else(String::new, cell);
         self.columns.iter().map(cell).collect()
     }
 }
@@ -131,11 +133,11 @@ struct RowSchema {
 }
 
 /// Returns the columns in the order of the fields.
-fn columns(meta: &[String]) -> Vec<TableColumn> {
+fn columns(meta: &[String]) -> Vec<ResultColumn> {
     let mut columns = Vec::new();
     for RecordField { name, .. } in PAIR_FIELDS.iter().chain(&METRIC_FIELDS) {
         match *name {
-            "meta" => columns.extend(meta.iter().map(|key| TableColumn {
+            "meta" => columns.extend(meta.iter().map(|key| ResultColumn {
                 name: format!("meta_{key}"),
                 pointer: format!("/meta/{}", key.replace('~', "~0").replace('/', "~1")),
             })),
@@ -144,13 +146,13 @@ fn columns(meta: &[String]) -> Vec<TableColumn> {
             }
             "manual_alignment" => {
                 for name in ["reviewer", "at", "iou", "dice", "note"] {
-                    columns.push(TableColumn {
+                    columns.push(ResultColumn {
                         name: format!("manual_alignment_{name}"),
                         pointer: format!("/manual_alignment/{name}"),
                     });
                 }
             }
-            "verdicts" => columns.push(TableColumn {
+            "verdicts" => columns.push(ResultColumn {
                 name: "verdicts".to_owned(),
                 pointer: "/verdicts_text".to_owned(),
             }),
@@ -161,7 +163,7 @@ fn columns(meta: &[String]) -> Vec<TableColumn> {
 }
 
 /// Adds a column for a value, or one for each element if it is a list.
-fn add_list(columns: &mut Vec<TableColumn>, name: &str, pointer: &str) {
+fn add_list(columns: &mut Vec<ResultColumn>, name: &str, pointer: &str) {
     let lengths = LISTS.iter().find(|(list, _)| *list == name);
     let mut places = vec![(name.to_owned(), pointer.to_owned())];
     for length in lengths.map_or(&[][..], |(_, lengths)| lengths) {
@@ -175,7 +177,7 @@ fn add_list(columns: &mut Vec<TableColumn>, name: &str, pointer: &str) {
     columns.extend(
         places
             .into_iter()
-            .map(|(name, pointer)| TableColumn { name, pointer }),
+            .map(|(name, pointer)| ResultColumn { name, pointer }),
     );
 }
 

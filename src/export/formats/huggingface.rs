@@ -5,15 +5,17 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::super::export_folder::{FolderError, at};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::PictureError;
-use super::super::parquet_columns::ColumnType;
-use super::super::parquet_table::{ParquetTable, TableLayout};
-use super::super::record::{PairRecord, SplitName};
-use super::super::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table};
-use super::super::sample::{PICTURE_FIELDS, chosen, fields, pictures, schema};
-use super::super::table_columns::{field_cells, field_columns, picture_cells, picture_columns};
+use crate::export::export_folder::{FolderError, at};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::PictureError;
+use crate::export::parquet_columns::ColumnType;
+use crate::export::parquet_table::{ParquetTable, TableLayout};
+use crate::export::record::{PairRecord, SplitName};
+use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table};
+use crate::export::sample::{PICTURE_FIELDS, chosen, fields, pictures, schema};
+use crate::export::table_columns::{field_cells, field_columns, picture_cells, picture_columns};
 
 /// The folder of the tables.
 const DATA: &str = "data";

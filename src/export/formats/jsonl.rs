@@ -5,13 +5,15 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::export_folder::{FolderError, SharedFile};
-use super::super::export_logs::{LOG_FILES, json_lines};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_files::{Files, write_files};
-use super::super::pair_pictures::PictureError;
-use super::super::record::{MetricFields, PairFields, PairRecord};
-use super::super::record_fields::{
+use crate::export::export_folder::{FolderError, SharedFile};
+use crate::export::export_logs::{LOG_FILES, json_lines};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_files::{Files, write_files};
+use crate::export::pair_pictures::PictureError;
+use crate::export::record::{MetricFields, PairFields, PairRecord};
+use crate::export::record_fields::{
     FILE_FIELDS, METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of,
 };
 

@@ -1,14 +1,16 @@
 //! The format `parquet`: a table with one row per pair and metric, with typed columns, and pictures if requested.
 
-use super::super::export_folder::FolderError;
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::PictureError;
-use super::super::parquet_columns::{CellValue, ColumnType};
-use super::super::parquet_table::{ParquetTable, TableLayout};
-use super::super::record::{MetricFields, PairFields, PairRecord};
-use super::super::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
-use super::super::sample::pictures;
-use super::super::table_columns::{field_cells, field_columns, picture_cells, picture_columns};
+use crate::export::export_folder::FolderError;
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::PictureError;
+use crate::export::parquet_columns::{CellValue, ColumnType};
+use crate::export::parquet_table::{ParquetTable, TableLayout};
+use crate::export::record::{MetricFields, PairFields, PairRecord};
+use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
+use crate::export::sample::pictures;
+use crate::export::table_columns::{field_cells, field_columns, picture_cells, picture_columns};
 
 /// The table.
 const TABLE: &str = "pairs.parquet";

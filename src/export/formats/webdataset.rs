@@ -7,12 +7,14 @@ use std::path::PathBuf;
 
 use tar::{Builder, Header};
 
-use super::super::export_folder::{FolderError, at};
-use super::super::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
-use super::super::pair_pictures::PictureError;
-use super::super::record::{PairRecord, SplitName};
-use super::super::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table};
-use super::super::sample::{PICTURE_FIELDS, chosen, fields, pictures, schema};
+use crate::export::export_folder::{FolderError, at};
+use crate::export::format_writer::{
+    EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
+};
+use crate::export::pair_pictures::PictureError;
+use crate::export::record::{PairRecord, SplitName};
+use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table};
+use crate::export::sample::{PICTURE_FIELDS, chosen, fields, pictures, schema};
 
 /// Size of a block of a tar file, in bytes. A file takes one for its header, and its content is padded to blocks.
 const BLOCK: u64 = 512;
