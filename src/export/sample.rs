@@ -74,9 +74,9 @@ pub(super) struct SamplePicture {
 
 /// Returns the index of the metric whose pictures a sample has: `ensemble` if it was selected, otherwise the first.
 pub(super) fn chosen(metrics: &[MetricFields]) -> Option<usize> {
-    let ensemble = |fields: &MetricFields| fields.metric == ThresholdMetric::Ensemble;
+    let is_default = |fields: &MetricFields| fields.metric == ThresholdMetric::DEFAULT;
     let first = (!metrics.is_empty()).then_some(0);
-    metrics.iter().position(ensemble).or(first)
+    metrics.iter().position(is_default).or(first)
 }
 
 /// Returns the fields of a sample. `None` if the pair has no result.

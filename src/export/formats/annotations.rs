@@ -1,6 +1,7 @@
 //! The format `annotations`: strokes and characters as COCO and VIA files.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -53,6 +54,15 @@ struct CocoFile {
     file: SharedFile,
 }
 
+impl CocoFile {
+    fn begin(folder: &FormatFolder, split: Option<SplitName>) -> Result<Self, FolderError> {
+        let mut file = SharedFile::create(&folder.root, &coco_name(split))?;
+        file.append(CocoText::head(DESCRIPTION).as_bytes())?;
+        let text = CocoText::default();
+        Ok(Self { text, file })
+    }
+}
+
 /// Writes the annotation files and the prints.
 pub(super) struct AnnotationWriter {
     folder: FormatFolder,
@@ -72,10 +82,7 @@ impl AnnotationWriter {
         };
         let mut files = BTreeMap::new();
         for split in splits {
-            let mut file = SharedFile::create(&folder.root, &coco_name(split))?;
-            file.append(CocoText::head(DESCRIPTION).as_bytes())?;
-            let text = CocoText::default();
-            files.insert(split, CocoFile { text, file });
+            files.insert(split, CocoFile::begin(&folder, split)?);
         }
         Ok(Self {
             results: SingleResults::begin(&folder)?,
@@ -116,7 +123,7 @@ impl AnnotationWriter {
 impl FormatWriter for AnnotationWriter {
     fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
         let mut encoded = EncodedPair::default();
-        let shown = self.results.of_pair(view).zip(view.result);
+        let shown = SingleResults::of_pair(view).zip(view.result);
         let Some(((fields, record), pictures)) = shown else {
             encoded.shared.push(self.results.line(view, None));
             return Ok(encoded);
@@ -159,11 +166,13 @@ impl FormatWriter for AnnotationWriter {
         for text in annotation {
             let added: PairAnnotation = serde_json::from_slice(text).expect("written above");
             self.regions.add(&added.strokes, added.print_bytes);
-            let split = record.pair.split;
-            if let Some(CocoFile { text, file }) = self.files.get_mut(&split) {
-                let text = text.annotation(&added.strokes, &mut self.categories);
-                file.append(text.as_bytes())?;
-            }
+            let CocoFile { text, file } = match self.files.entry(record.pair.split) {
+                Entry::Occupied(found) => found.into_mut(),
+                // A pair that was imported during the export belongs to no part of a split.
+                Entry::Vacant(place) => place.insert(CocoFile::begin(&self.folder, None)?),
+            };
+            let text = text.annotation(&added.strokes, &mut self.categories);
+            file.append(text.as_bytes())?;
         }
         Ok(())
     }

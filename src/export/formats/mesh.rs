@@ -81,7 +81,7 @@ impl MeshWriter {
 impl FormatWriter for MeshWriter {
     fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
         let mut encoded = EncodedPair::default();
-        let shown = self.results.of_pair(view).zip(view.result);
+        let shown = SingleResults::of_pair(view).zip(view.result);
         let Some(((fields, record), pictures)) = shown else {
             encoded.shared.push(self.results.line(view, None));
             return Ok(encoded);

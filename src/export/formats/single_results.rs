@@ -12,6 +12,7 @@ use crate::export::export_logs::json_lines;
 use crate::export::format_writer::{FormatFolder, FormatGuide, PairView};
 use crate::export::record::{MetricFields, PairFields};
 use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
+use crate::export::sample::chosen;
 
 /// The file of lines.
 const LINES: &str = "pairs.jsonl";
@@ -54,14 +55,10 @@ impl SingleResults {
     }
 
     /// Returns the result of a pair to show: that of the default metric if it was selected, otherwise the first.
-    pub(super) fn of_pair<'a>(
-        &self,
-        view: &PairView<'a>,
-    ) -> Option<(&'a MetricFields, &'a MetricRecord)> {
-        let records = &view.result?.metrics;
-        let is_wanted = |record: &&MetricRecord| record.outcome.metric == self.metric;
-        let place = records.iter().position(is_wanted).unwrap_or(0);
-        Some((view.record.metrics.get(place)?, records.get(place)?))
+    pub(super) fn of_pair<'a>(view: &PairView<'a>) -> Option<(&'a MetricFields, &'a MetricRecord)> {
+        let (fields, records) = (&view.record.metrics, &view.result?.metrics);
+        let place = chosen(fields)?;
+        Some((fields.get(place)?, records.get(place)?))
     }
 
     /// Returns the line of a pair. `shown` is its result with its files.
