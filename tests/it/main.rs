@@ -21,8 +21,12 @@ mod error_snapshots;
 #[cfg(target_os = "linux")]
 mod every_call;
 mod examples;
+mod export_agreement;
 mod export_formats;
 mod export_heights;
+#[cfg(target_os = "linux")]
+mod export_interrupted;
+mod export_readback;
 mod export_tools;
 #[cfg(target_os = "linux")]
 mod fault;

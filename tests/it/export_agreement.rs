@@ -1,0 +1,271 @@
+//! All formats of an export have the same pairs, labels and parts, whichever results are selected; and pictures on a
+//! canvas show the same pixels.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mocban::raster::{Grid, decode_grey8, decode_grey16};
+use mocban::store::Project;
+use serde_json::Value;
+
+use crate::check::at;
+use crate::cli::mocban;
+use crate::export_readback::{FORMATS, agreeing_lines, lines};
+use crate::resume::copy;
+
+/// Pairs of the demo. Two more are added: one with the print of another pair, one with a broken mesh.
+const PAIRS: usize = 9;
+/// Characters and blocks of the pairs, in turn.
+const CHARACTERS: [&str; 4] = ["一", "𠃅", "", "\"na\", m"];
+const BLOCKS: [&str; 5] = ["b 1", "b,2", "b3", "b4", "b5"];
+
+/// A project that was run and judged, created once. Each test works on a copy.
+static JUDGED: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let count = PAIRS.to_string();
+    mocban(dir.path(), &["demo", "data", "--pairs", &count, "--no-run"]).expect(0);
+    let data = dir.path().join("data/data");
+    fs::write(data.join("broken.stl"), "no mesh").expect("written");
+    let file = |folder: &str, number: usize| {
+        let entries = fs::read_dir(data.join(folder)).expect("a folder");
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.expect("an entry").file_name())
+            .collect();
+        names.sort();
+        format!("{folder}/{}", names[number].to_string_lossy())
+    };
+    let list = fs::File::create(data.join("pairs.csv")).expect("a file");
+    let mut list = csv::Writer::from_writer(list);
+    list.write_record(["id", "mesh", "print", "character", "block"])
+        .expect("written");
+    let mut add = |id: &str, mesh: &str, print: &str, number: usize| {
+        let character = CHARACTERS[number % CHARACTERS.len()];
+        let block = BLOCKS[number % BLOCKS.len()];
+        list.write_record([id, mesh, print, character, block])
+            .expect("written");
+    };
+    for number in 0..PAIRS {
+        let [mesh, print] = ["meshes", "prints"].map(|folder| file(folder, number));
+        add(&format!("p{number}"), &mesh, &print, number);
+    }
+    add("wrong", &file("meshes", 0), &file("prints", 3), PAIRS);
+    add("broken", "broken.stl", &file("prints", 0), PAIRS + 1);
+    list.flush().expect("written");
+    drop(list);
+    mocban(
+        dir.path(),
+        &["-C", "judged", "import", "data/data/pairs.csv"],
+    )
+    .expect(0);
+    let project = Project::open(&dir.path().join("judged")).expect("a project");
+    at(&project, &["run"]).expect(3);
+    for set in [
+        "p1 pass --reviewer lan",
+        "p2 pass --reviewer lan --metric relief",
+        "p3 fail --reviewer lan",
+        "p4 pass --reviewer lan",
+        "p4 fail --reviewer minh",
+    ] {
+        let set: Vec<&str> = "verdict set".split(' ').chain(set.split(' ')).collect();
+        at(&project, &set).expect(0);
+    }
+    dir
+});
+
+/// Copies the judged project to a folder.
+fn judged(dir: &Path) -> Project {
+    let original = Project::open(&JUDGED.path().join("judged")).expect("a project");
+    copy(&original, &dir.join("p"))
+}
+
+/// Exports with these options to a folder beside the project. Returns the folder.
+fn export(project: &Project, name: &str, options: &[&str]) -> PathBuf {
+    let out = project.dir().with_file_name(name);
+    let args = [
+        "export",
+        "--to",
+        FORMATS,
+        "-o",
+        out.to_str().expect("UTF-8"),
+    ];
+    at(project, &[&args[..], options].concat()).expect(0);
+    out
+}
+
+/// Returns id and metric of lines.
+fn results(lines: &[Value]) -> BTreeSet<(String, String)> {
+    let text = |line: &Value, name: &str| line[name].as_str().expect("a text").to_owned();
+    lines
+        .iter()
+        .map(|line| (text(line, "id"), text(line, "metric")))
+        .collect()
+}
+
+#[test]
+fn all_formats_select_the_same_results() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = judged(dir.path());
+    let all = agreeing_lines(&export(&project, "all", &[]));
+    assert_eq!(all.len(), (PAIRS + 2) * 4);
+    let failed = all.iter().filter(|line| line["status"] == "failed");
+    assert_eq!(failed.filter(|line| line["id"] == "broken").count(), 4);
+    let confidence = |line: &&Value| line["confidence"].as_f64();
+    let mut found: Vec<f64> = all.iter().filter_map(|line| confidence(&line)).collect();
+    found.sort_by(f64::total_cmp);
+    assert!(found[0] < 0.5, "no pair is doubtful: {found:?}");
+    let median = found[found.len() / 2];
+    let text = median.to_string();
+    let cases: [(&[&str], &dyn Fn(&&Value) -> bool); 5] = [
+        (&["--only", "confident"], &|line| {
+            confidence(line) >= Some(0.5)
+        }),
+        (&["--min-confidence", &text], &|line| {
+            confidence(line) >= Some(median)
+        }),
+        (&["--only", "passed"], &|line| line["verdict"] == "pass"),
+        (
+            &["--only", "passed", "--metric", "density,nl_ssim"],
+            &|line| {
+                line["verdict"] == "pass"
+                    && ["density", "nl_ssim"].contains(&line["metric"].as_str().expect("a metric"))
+            },
+        ),
+        (&["--metric", "relief"], &|line| line["metric"] == "relief"),
+    ];
+    for (options, is_wanted) in cases {
+        let wanted: Vec<Value> = all.iter().filter(is_wanted).cloned().collect();
+        let found = agreeing_lines(&export(&project, "out", options));
+        assert_eq!(results(&found), results(&wanted), "{options:?}");
+        assert!(!found.is_empty() && found.len() < all.len(), "{options:?}");
+    }
+    let passed = lines(&export(&project, "out", &["--only", "passed"]).join("jsonl"));
+    let ids: Vec<_> = passed.iter().map(|line| &line["id"]).collect();
+    assert_eq!(ids, ["p1", "p1", "p1", "p1", "p2"]);
+    assert!(dir.path().join("out/mesh/pairs/p2/scan.ply").is_file());
+    assert!(!dir.path().join("out/mesh/pairs/p4").exists());
+}
+
+#[test]
+fn parts_of_a_split_are_the_same_in_all_formats() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = judged(dir.path());
+    let mut splits = BTreeSet::new();
+    for (by, seed) in [
+        ("block", "1"),
+        ("block", "2"),
+        ("character", "1"),
+        ("pair", "1"),
+    ] {
+        let options = ["--split", "60/20/20", "--by", by, "--seed", seed];
+        let found = agreeing_lines(&export(&project, "out", &options));
+        let mut parts: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for line in &found {
+            let text = |name: &str| line[name].as_str().unwrap_or_default();
+            // A pair without a character is a group of its own.
+            let group = Some(text(by)).filter(|group| !group.is_empty() && by != "pair");
+            let group = group.unwrap_or(text("id"));
+            parts.entry(group).or_default().insert(text("split"));
+        }
+        assert!(parts.values().all(|names| names.len() == 1), "{parts:?}");
+        let used: BTreeSet<&&str> = parts.values().flatten().collect();
+        assert!(
+            used.into_iter().eq(&["test", "train", "validation"]),
+            "{parts:?}"
+        );
+        let texts = parts
+            .iter()
+            .map(|(group, parts)| format!("{group} {parts:?}"));
+        splits.insert((by, texts.collect::<Vec<_>>()));
+    }
+    assert_eq!(splits.len(), 4, "the seed changes nothing: {splits:?}");
+}
+
+/// A picture of a line, and the value of a pixel with the given place.
+fn grey8(export: &Path, line: &Value, role: &str) -> Grid<u8> {
+    let path = export.join(line["files"][role].as_str().expect(role));
+    decode_grey8(&fs::read(path).expect(role)).expect(role)
+}
+
+/// Returns the share of pixels of the picture on the canvas that equal the nearest pixel of the picture in the frame of
+/// the print, and the number of compared pixels. Leaves out pixels next to another value, where warping rounds.
+fn agreement<T: PartialEq + Copy>(
+    native: &Grid<T>,
+    canvas: &Grid<T>,
+    line: &Value,
+) -> (f64, usize) {
+    let m = |row: usize, column: usize| {
+        line["picture_from_print"][row][column]
+            .as_f64()
+            .expect("a number")
+    };
+    assert_eq!([m(0, 1), m(1, 0)], [0.0, 0.0], "the canvas turns the print");
+    let (mut equal, mut compared) = (0, 0);
+    for v in 0..canvas.height() {
+        for u in 0..canvas.width() {
+            let x = ((u as f64 - m(0, 2)) / m(0, 0)).round() as i64;
+            let y = ((v as f64 - m(1, 2)) / m(1, 1)).round() as i64;
+            let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
+            let values: Option<Vec<T>> = around.map(|(x, y)| native.get(x, y)).collect();
+            if let Some(values) = values.filter(|values| values.iter().all(|one| *one == values[0]))
+            {
+                compared += 1;
+                equal += usize::from(canvas.at(u, v) == values[0]);
+            }
+        }
+    }
+    (equal as f64 / compared as f64, compared)
+}
+
+#[test]
+fn pictures_on_a_canvas_show_the_same_pixels() {
+    const PX: usize = 200;
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = judged(dir.path());
+    let args = ["--only", "confident", "--metric", "ensemble"];
+    let native = export(&project, "native", &args).join("jsonl");
+    let whole = export(
+        &project,
+        "canvas",
+        &[&args[..], &["--canvas", "200"]].concat(),
+    );
+    let canvas = whole.join("jsonl");
+    let pairs = lines(&native);
+    assert!(pairs.len() > 5);
+    for (before, line) in pairs.iter().zip(lines(&canvas)) {
+        for role in ["print_mask", "aligned_mask"] {
+            let [old, new] = [grey8(&native, before, role), grey8(&canvas, &line, role)];
+            assert_eq!([new.width(), new.height()], [PX, PX]);
+            let (share, compared) = agreement(&old, &new, &line);
+            assert!(
+                share > 0.99 && compared > PX * PX / 4,
+                "{role} {share} of {compared}: {line}"
+            );
+        }
+        let picture = fs::read(canvas.join(line["files"]["print"].as_str().expect("a print")));
+        let picture = image::load_from_memory(&picture.expect("a file")).expect("a picture");
+        assert_eq!([picture.width(), picture.height()], [PX as u32; 2]);
+        let levels = |export: &Path, line: &Value| {
+            let path = export.join(
+                line["files"]["aligned_depth"]
+                    .as_str()
+                    .expect("a depth map"),
+            );
+            let levels = decode_grey16(&fs::read(path).expect("a file")).expect("a depth map");
+            levels.map(|level| *level > 0)
+        };
+        let (share, compared) = agreement(&levels(&native, before), &levels(&canvas, &line), &line);
+        assert!(
+            share > 0.99 && compared > PX * PX / 4,
+            "{share} of {compared}: {line}"
+        );
+        let stack = whole.join(format!(
+            "fiji/pairs/{}/stack.tif",
+            line["id"].as_str().expect("an id")
+        ));
+        let stack = fs::File::open(stack).expect("a stack");
+        let mut stack = tiff::decoder::Decoder::new(stack).expect("a TIFF");
+        assert_eq!(stack.dimensions().expect("a size"), (PX as u32, PX as u32));
+    }
+}

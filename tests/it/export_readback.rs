@@ -1,0 +1,233 @@
+//! Reads the labels of every format of an export back, so that tests can compare them.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::Field;
+use serde_json::Value;
+
+/// Every format.
+pub(crate) const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations";
+
+/// What a format says about one result. Missing texts are empty.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ResultLabel {
+    pub(crate) id: String,
+    pub(crate) metric: String,
+    pub(crate) character: String,
+    pub(crate) block: String,
+    pub(crate) split: String,
+}
+
+impl ResultLabel {
+    /// Reads the fields of a label by a function that returns the text of a field.
+    fn of(text: impl Fn(&str) -> String) -> Self {
+        let [id, metric, character, block, split] =
+            ["id", "metric", "character", "block", "split"].map(text);
+        Self {
+            id,
+            metric,
+            character,
+            block,
+            split,
+        }
+    }
+
+    fn of_json(value: &Value) -> Self {
+        Self::of(|name| text(&value[name]))
+    }
+}
+
+/// Returns a text or nothing.
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// Returns the lines of `pairs.jsonl` of a format.
+pub(crate) fn lines(folder: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(folder.join("pairs.jsonl")).expect("the lines");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect()
+}
+
+/// Returns the files of a folder with this extension, each with its part of the dataset. The part is the first word of
+/// the name.
+fn parts(folder: &Path, extension: &str) -> Vec<(String, PathBuf)> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let is_wanted = |path: &PathBuf| path.extension().is_some_and(|found| found == extension);
+    let part = |path: &Path| {
+        let name = path.file_name().expect("a name").to_string_lossy();
+        name.split(['-', '.']).next().expect("a word").to_owned()
+    };
+    let named = paths.filter(is_wanted).map(|path| (part(&path), path));
+    named.collect()
+}
+
+/// Returns the labels of a CSV table.
+fn of_csv(path: &Path) -> Vec<ResultLabel> {
+    let mut table = csv::Reader::from_path(path).expect("a table");
+    let header = table.headers().expect("a header").clone();
+    let place = |name: &str| {
+        header
+            .iter()
+            .position(|found| found == name)
+            .expect("a column")
+    };
+    let rows = table.records().map(|row| row.expect("a row"));
+    rows.map(|row| ResultLabel::of(|name| row[place(name)].to_owned()))
+        .collect()
+}
+
+/// Returns the labels of a Parquet table.
+fn of_parquet(path: &Path) -> Vec<ResultLabel> {
+    let table = SerializedFileReader::new(File::open(path).expect("a file")).expect("a table");
+    let rows = table.get_row_iter(None).expect("rows");
+    let rows = rows.map(|row| row.expect("a row"));
+    rows.map(|row| {
+        let cells: BTreeMap<_, _> = row.get_column_iter().collect();
+        ResultLabel::of(|name| match cells[&name.to_owned()] {
+            Field::Str(text) => text.clone(),
+            Field::Null => String::new(),
+            other => panic!("{name} is {other}"),
+        })
+    })
+    .collect()
+}
+
+/// Returns the files of a tar shard by name.
+pub(crate) fn members(shard: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut shard = tar::Archive::new(File::open(shard).expect("a shard"));
+    for entry in shard.entries().expect("a shard") {
+        let mut entry = entry.expect("an entry");
+        let name = entry.path().expect("a name").to_string_lossy().into_owned();
+        let mut content = Vec::new();
+        entry.read_to_end(&mut content).expect("content");
+        let earlier = found.insert(name, content);
+        assert!(earlier.is_none(), "a name is twice in a shard");
+    }
+    found
+}
+
+/// Returns the samples of all tar shards below a folder. The part of a sample is that of its shard.
+fn of_shards(folder: &Path) -> Vec<ResultLabel> {
+    let mut labels = Vec::new();
+    for (part, shard) in parts(folder, "tar") {
+        for (name, content) in members(&shard) {
+            if !name.ends_with(".json") {
+                continue;
+            }
+            let label = ResultLabel::of_json(&serde_json::from_slice(&content).expect("JSON"));
+            assert_eq!(name, format!("{}.json", label.id));
+            assert!(label.split == part || part == "pairs", "{name} in {part}");
+            labels.push(label);
+        }
+    }
+    labels
+}
+
+/// Returns the labels of the COCO files of a folder. The part of an annotation is that of its file. Pairs without a
+/// character are in the category `stroke`.
+fn of_coco(folder: &Path) -> Vec<ResultLabel> {
+    let mut labels = Vec::new();
+    for (_, path) in parts(folder, "json") {
+        let name = path
+            .file_stem()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
+        let Some(part) = name.strip_prefix("coco") else {
+            continue;
+        };
+        let coco: Value = serde_json::from_slice(&fs::read(&path).expect("a file")).expect("JSON");
+        let categories = coco["categories"].as_array().expect("categories");
+        for annotation in coco["annotations"].as_array().expect("annotations") {
+            let is_its = |category: &&Value| category["id"] == annotation["category_id"];
+            let category = categories.iter().find(is_its).expect("a category");
+            let attributes = &annotation["attributes"];
+            let label = ResultLabel {
+                id: text(&annotation["pair"]),
+                metric: text(&attributes["metric"]),
+                character: text(&category["name"]).replace("stroke", ""),
+                block: text(&attributes["block"]),
+                split: text(&attributes["split"]),
+            };
+            assert_eq!(label.split, part.trim_start_matches('_'), "{label:?}");
+            labels.push(label);
+        }
+    }
+    labels
+}
+
+/// Returns all labels of the tables of `huggingface`. The part of a row is that of its file; without a split, it is
+/// `train`.
+fn of_huggingface(folder: &Path) -> Vec<ResultLabel> {
+    let tables = parts(&folder.join("data"), "parquet");
+    let rows = tables
+        .iter()
+        .flat_map(|(part, path)| of_parquet(path).into_iter().map(move |label| (part, label)));
+    rows.map(|(part, label)| {
+        assert!(label.split == *part || (label.split.is_empty() && part == "train"));
+        label
+    })
+    .collect()
+}
+
+/// Reads the labels of a format, sorted.
+fn labels(folder: &Path, format: &str) -> Vec<ResultLabel> {
+    let mut found = match format {
+        "csv" => of_csv(&folder.join("pairs.csv")),
+        "parquet" => of_parquet(&folder.join("pairs.parquet")),
+        "huggingface" => of_huggingface(folder),
+        "webdataset" => of_shards(folder),
+        "coco" => of_coco(folder),
+        _ => lines(folder).iter().map(ResultLabel::of_json).collect(),
+    };
+    found.sort();
+    found
+}
+
+/// Asserts that all formats of an export have the same pairs and labels. Returns the lines of `jsonl`.
+pub(crate) fn agreeing_lines(export: &Path) -> Vec<Value> {
+    let lines = lines(&export.join("jsonl"));
+    let expected = labels(&export.join("jsonl"), "jsonl");
+    for format in ["csv", "parquet"] {
+        let found = labels(&export.join(format), format);
+        assert!(
+            found == expected,
+            "{format}: {found:#?}\njsonl: {expected:#?}"
+        );
+    }
+    // The other formats show one result per pair: that of `ensemble`, or else of the first metric.
+    let mut shown: BTreeMap<String, (ResultLabel, bool)> = BTreeMap::new();
+    for line in &lines {
+        let label = ResultLabel::of_json(line);
+        let is_done = line["status"] == "done";
+        if label.metric == "ensemble" || !shown.contains_key(&label.id) {
+            shown.insert(label.id.clone(), (label, is_done));
+        }
+    }
+    let every: Vec<ResultLabel> = shown.values().map(|(label, _)| label.clone()).collect();
+    let done = shown.into_values().filter(|(_, is_done)| *is_done);
+    let done: Vec<ResultLabel> = done.map(|(label, _)| label).collect();
+    for (folder, format, expected) in [
+        ("mesh", "mesh", &every),
+        ("fiji", "fiji", &every),
+        ("annotations", "annotations", &every),
+        ("annotations", "coco", &done),
+        ("webdataset", "webdataset", &done),
+        ("huggingface", "huggingface", &done),
+    ] {
+        let found = labels(&export.join(folder), format);
+        assert!(
+            found == *expected,
+            "{format}: {found:#?}\njsonl: {expected:#?}"
+        );
+    }
+    lines
+}
