@@ -175,14 +175,13 @@ fn palette(grid: &Grid<[u8; 3]>) -> Option<(Vec<u8>, Vec<u8>)> {
     let mut known: HashMap<[u8; 3], u8> = HashMap::new();
     let (mut colours, mut indices) = (Vec::new(), Vec::with_capacity(grid.data().len()));
     for colour in grid.data() {
-        let index = match known.get(colour) {
-            Some(index) => *index,
-            None => {
-                let index = u8::try_from(known.len()).ok()?;
-                known.insert(*colour, index);
-                colours.extend(colour);
-                index
-            }
+        let index = if let Some(index) = known.get(colour) {
+            *index
+        } else {
+            let index = u8::try_from(known.len()).ok()?;
+            known.insert(*colour, index);
+            colours.extend(colour);
+            index
         };
         indices.push(index);
     }

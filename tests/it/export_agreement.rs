@@ -15,6 +15,9 @@ use crate::cli::mocban;
 use crate::export_readback::{FORMATS, agreeing_lines, lines};
 use crate::resume::copy;
 
+/// Returns whether an export with certain options must hold a line.
+type IsWanted<'a> = &'a dyn Fn(&&Value) -> bool;
+
 /// Pairs of the demo. Two more are added: one with the print of another pair, one with a broken mesh.
 const PAIRS: usize = 9;
 /// Characters and blocks of the pairs, in turn.
@@ -117,7 +120,7 @@ fn all_formats_select_the_same_results() {
     assert!(found[0] < 0.5, "no pair is doubtful: {found:?}");
     let median = found[found.len() / 2];
     let text = median.to_string();
-    let cases: [(&[&str], &dyn Fn(&&Value) -> bool); 5] = [
+    let cases: [(&[&str], IsWanted<'_>); 5] = [
         (&["--only", "confident"], &|line| {
             confidence(line) >= Some(0.5)
         }),

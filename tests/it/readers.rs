@@ -199,7 +199,7 @@ fn a_script_fails_with_one_sentence_if_a_number_is_wrong() {
                 .to_string_lossy()
                 .into();
         }
-        changed += &format!("{line}\n");
+        changed.extend([line.to_string(), "\n".to_owned()]);
     }
     std::fs::create_dir(dir.path().join("jsonl")).expect("a folder");
     std::fs::write(dir.path().join("jsonl/pairs.jsonl"), changed).expect("lines");
@@ -220,7 +220,8 @@ fn every_script_is_run_by_a_test() {
     for entry in std::fs::read_dir(package_dir().join("tests/readers")).expect("a folder") {
         let name = entry.expect("an entry").file_name();
         let name = name.to_str().expect("UTF-8");
-        let is_script = name.ends_with(".py") && !shared.contains(&name);
+        let is_python = Path::new(name).extension().is_some_and(|kind| kind == "py");
+        let is_script = is_python && !shared.contains(&name);
         assert!(
             !is_script || source.contains(&format!(": \"{name}\",")),
             "no test runs {name}"
