@@ -44,7 +44,7 @@ pub(super) fn render(
     if guide.schema.is_some() {
         let _ = writeln!(
             text,
-            "| `{SCHEMA}` | JSON Schema (draft 2020-12) of a line |"
+            "| `{SCHEMA}` | JSON Schema (draft 2020-12) of a record |"
         );
     }
     let _ = writeln!(text, "\n{}", guide.usage);

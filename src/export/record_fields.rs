@@ -120,7 +120,7 @@ pub(super) fn markdown_table(schema: &Value, tables: &[(&str, &[RecordField])]) 
             );
         }
         for field in *fields {
-            let Some(property) = property(schema, field.name) else {
+            let Some(property) = property(schema, field) else {
                 continue;
             };
             let meaning = property["description"].as_str().unwrap_or_default();
@@ -139,10 +139,16 @@ pub(super) fn markdown_table(schema: &Value, tables: &[(&str, &[RecordField])]) 
     text
 }
 
-/// Returns the schema of a field of a line, or of a file of a line.
-fn property<'a>(schema: &'a Value, name: &str) -> Option<&'a Value> {
-    let files = || find_properties(&schema["properties"]["files"])?.get(name);
-    schema["properties"].get(name).or_else(files)
+/// Returns the schema of a field of a line, or of a file of a line. `print` is both.
+fn property<'a>(schema: &'a Value, field: &RecordField) -> Option<&'a Value> {
+    let of_line = schema["properties"].get(field.name);
+    let of_file =
+        find_properties(&schema["properties"]["files"]).and_then(|files| files.get(field.name));
+    if FILE_FIELDS.contains(field) {
+        of_file.or(of_line)
+    } else {
+        of_line.or(of_file)
+    }
 }
 
 /// Returns the properties of an object, which may be one of several alternatives.
@@ -247,7 +253,7 @@ mod tests {
             names(find_properties(&files).expect("fields"))
         );
         for field in PAIR_FIELDS.iter().chain(&METRIC_FIELDS) {
-            let described = property(&schema, field.name).expect(field.name);
+            let described = property(&schema, field).expect(field.name);
             assert!(described["description"].is_string(), "{}", field.name);
         }
     }

@@ -95,6 +95,19 @@ pub(super) fn schema() -> Value {
     schema_of::<SampleFields<'_>>()
 }
 
+/// Returns whether a file is 8-bit grey or RGB without transparency, which all programs show alike.
+fn is_plain(file: &[u8], extension: &str) -> bool {
+    match extension {
+        "jpg" => true,
+        // Bytes 24 and 25 of a PNG are the bits per sample and the colour type: 0 is grey, 2 is RGB.
+        "png" => {
+            matches!(file.get(24..26), Some([8, 0 | 2]))
+                && !file.windows(4).any(|chunk| chunk == b"tRNS")
+        }
+        _ => false,
+    }
+}
+
 /// Draws the pictures of a sample under one metric. The print is the original file if it is PNG or JPEG of 8 bits and
 /// `keep_print`, otherwise an 8-bit PNG.
 ///
@@ -110,7 +123,7 @@ pub(super) fn pictures(
     if keep_print {
         (print, extension) = result.print_file()?;
     }
-    if !keep_print || !matches!(extension, "png" | "jpg") {
+    if !keep_print || !is_plain(&print, extension) {
         (print, extension) = (png_rgb8(&result.print_rgb()?), "png");
     }
     let files = [

@@ -179,7 +179,7 @@ impl FormatWriter for HuggingFaceWriter {
             usage: "\
 The numbers from `metric` on and the pictures belong to one metric: `ensemble` if it was selected, otherwise the first.
 `metrics` holds the numbers of all selected metrics. The paths of mesh and print in the catalog are `mesh_path` and
-`print_path`.
+`print_path`; they may name folders of the computer that made the dataset.
 
 ```python
 from datasets import load_dataset
