@@ -129,14 +129,11 @@ mod tests {
             rules.adjudicated.ci95,
             IntervalMethod::Exact.interval_95(1, 2)
         );
-        for format in ReportFormat::ALL {
+        // The CSV has one column for each number and none for the method.
+        let formats = ReportFormat::ALL.into_iter();
+        for format in formats.filter(|format| *format != ReportFormat::Csv) {
             let text = render(&report, format);
-            let names = [
-                "95% exact",
-                r"95\% exact",
-                r#""interval": "exact""#,
-                ",exact",
-            ];
+            let names = ["95% exact", r"95\% exact", r#""interval": "exact""#];
             assert!(names.iter().any(|name| text.contains(name)), "{text}");
             assert!(!text.to_lowercase().contains("wilson"), "{text}");
         }
