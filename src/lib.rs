@@ -112,7 +112,6 @@
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
-//! - `src/export/sample.rs`: the metric whose pictures a training sample has; no change needed
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
