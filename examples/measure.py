@@ -30,7 +30,9 @@ def top(heights):
 def main(export, pair):
     """Prints a table of the strokes, the largest first."""
     lines = map(json.loads, open(Path(export) / "pairs.jsonl", encoding="utf-8"))
-    line = next(line for line in lines if line["id"] == pair)
+    line = next((line for line in lines if line["id"] == pair and line["status"] == "done"), None)
+    if line is None:
+        sys.exit(f"{export} has no result of the pair {pair}")
     strokes = tifffile.imread(Path(export) / line["files"]["strokes"])
     _, heights, _ = tifffile.imread(Path(export) / line["files"]["stack"])
     mm_per_px = line["mesh_unit_per_px"] * (line["mm_per_mesh_unit"] or 1) / line["scale"]

@@ -48,7 +48,10 @@ def panels(export: Path, line: dict) -> list[tuple[Image.Image, str, str]]:
 def main(export: str, pair: str, output: str) -> None:
     """Writes the picture of a pair of an export of the format `jsonl`."""
     lines = map(json.loads, open(Path(export) / "pairs.jsonl", encoding="utf-8"))
-    drawn = panels(Path(export), next(line for line in lines if (line["id"], line["metric"]) == (pair, METRIC)))
+    line = next((line for line in lines if (line["id"], line["metric"]) == (pair, METRIC)), None)
+    if line is None:
+        sys.exit(f"{export} has no result of the pair {pair} with the metric {METRIC}")
+    drawn = panels(Path(export), line)
     width = len(drawn) * (PANEL_PX + GAP_PX) + GAP_PX
     sheet = Image.new("RGB", (width, PANEL_PX + LABEL_PX + 2 * GAP_PX), "white")
     draw = ImageDraw.Draw(sheet)

@@ -216,7 +216,7 @@ fn a_script_fails_with_one_sentence_if_a_number_is_wrong() {
 #[test]
 fn every_script_is_run_by_a_test() {
     let source = include_str!("readers.rs");
-    let shared = ["common.py", "missing.py", "scans.py"];
+    let shared = ["common.py", "missing.py", "prints.py", "scans.py"];
     for entry in std::fs::read_dir(package_dir().join("tests/readers")).expect("a folder") {
         let name = entry.expect("an entry").file_name();
         let name = name.to_str().expect("UTF-8");

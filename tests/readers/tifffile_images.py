@@ -5,6 +5,7 @@ import cv2
 import numpy as np
 import tifffile
 from PIL import Image
+from prints import print_rgb
 
 
 def read(path, unit, size):
@@ -44,7 +45,7 @@ for line in lines:
     same_in_others(folder / "strokes.tif", strokes)
     stack, metadata = read(folder / "stack.tif", unit, size / line["scale"])
     check(metadata["Labels"] == ["print", "height", "mask"], f"{name}: the channels are {metadata['Labels']}")
-    picture = np.asarray(Image.open(source(data, "prints", name)).convert("RGB"))
+    picture = print_rgb(source(data, "prints", name))
     check(stack.shape == (3, *picture.shape[:2]), f"{name}: the stack has the shape {stack.shape}")
     off = np.abs(stack[0] - picture @ np.array([0.299, 0.587, 0.114])).mean()
     check(off < 1, f"{name}: the first channel is {off} levels from the print")

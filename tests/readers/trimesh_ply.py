@@ -4,7 +4,7 @@ from common import apply, check, check_labels, check_landmarks, folders, heights
 from scans import colours, inside, positions, print_pixels, scans, vertex_table
 import numpy as np
 import trimesh
-from PIL import Image
+from prints import print_rgb
 from scipy.spatial import cKDTree
 
 
@@ -37,7 +37,7 @@ for line, folder in scans(export):
     height = heights_mm(line, apply(np.linalg.inv(matrix)[:3], position))
     error = np.abs(height - table["height"]).max()
     check(error < 0.01, f"{name}: heights differ from the mesh by {error} mm")
-    picture = np.asarray(Image.open(source(data, "prints", name)).convert("RGB"))
+    picture = print_rgb(source(data, "prints", name))
     pixels = print_pixels(line, folder, position)
     covered, nearest = inside(pixels, picture)
     above = height - line["threshold_depth"] * mm_per_mesh_unit(line)

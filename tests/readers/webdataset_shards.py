@@ -6,6 +6,7 @@ from common import check, check_labels, check_landmarks, folders, read_lines
 import numpy as np
 import webdataset
 from PIL import Image
+from prints import print_rgb
 
 PICTURES = ["print", "print_mask", "depth", "aligned_depth", "aligned_mask"]
 
@@ -29,12 +30,11 @@ for shard in sorted((export / "webdataset").glob("*.tar")):
         for name in ("split", "iou", "dice", "threshold_level", "print_from_mesh", "meta"):
             check(row[name] == line[name], f"webdataset: {row['id']}: {name} is {row[name]}, not {line[name]}")
         for name in PICTURES:
-            expected, found = Image.open(export / "jsonl" / line["files"][name]), sample[f"{name}.png"]
+            path, found = export / "jsonl" / line["files"][name], sample[f"{name}.png"]
             # Prints are RGB in all samples. Decoders of JPEG differ by a few levels.
-            expected = np.asarray(expected.convert("RGB") if name == "print" else expected)
+            expected = print_rgb(path) if name == "print" else np.asarray(Image.open(path))
             same = found.shape == expected.shape and found.dtype == expected.dtype
-            tolerance = 8 if line["files"][name].endswith("jpg") else 0
-            same = same and np.abs(found.astype(int) - expected).max() <= tolerance
+            same = same and np.abs(found.astype(int) - expected).max() <= (8 if name == "print" else 0)
             check(same, f"webdataset: {row['id']}: {name} is another picture than in jsonl")
         rows.append(row)
 check_labels("webdataset", rows, data)
