@@ -35,11 +35,13 @@ def main(export, pair):
         sys.exit(f"{export} has no result of the pair {pair}")
     strokes = tifffile.imread(Path(export) / line["files"]["strokes"])
     _, heights, _ = tifffile.imread(Path(export) / line["files"]["stack"])
+    # Heights and lengths are mesh units if the unit of the mesh is unknown.
+    unit = "mm" if line["mm_per_mesh_unit"] else "mesh unit"
     mm_per_px = line["mesh_unit_per_px"] * (line["mm_per_mesh_unit"] or 1) / line["scale"]
     numbers, areas = np.unique(strokes[strokes > 0], return_counts=True)
     tops = {number: top(heights[strokes == number]) for number in numbers}
-    print(f"{pair} {line['character']}: {len(numbers)} strokes; wear is the depth of a top below the highest top")
-    print("stroke  area mm2  width mm  wear mm")
+    print(f"{pair} {line['character']}: {len(numbers)} strokes, in {unit}; wear is the depth of a top below the highest top")
+    print("stroke      area     width     wear")
     for number, area in sorted(zip(numbers, areas), key=lambda stroke: -stroke[1]):
         width = width_px(strokes == number) * mm_per_px
         wear = max(tops.values()) - tops[number]
