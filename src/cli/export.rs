@@ -163,6 +163,13 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
     let summary =
         crate::export::export(&catalog, &project, &args.output, &formats, options).await?;
     catalog.close().await;
+    if summary.is_nothing_selected {
+        let text = format!(
+            "no result is selected by --only or --min-confidence; nothing was written to {}",
+            args.output.display()
+        );
+        return Err(Refusal::NothingSelected(text).into());
+    }
     print_summary(&summary, &args, context)?;
     Ok(if summary.unreadable.is_empty() {
         ExitCode::Done

@@ -43,6 +43,8 @@ pub struct ExportSummary {
     pub unreadable: Vec<(PairName, String)>,
     /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs cannot be read.
     pub kept_earlier: bool,
+    /// Whether nothing was written, because the options select no result. A folder at the target is kept.
+    pub is_nothing_selected: bool,
     /// The path of an earlier export that could not be removed after it was replaced, and why.
     pub leftover: Option<(PathBuf, String)>,
 }
@@ -51,7 +53,8 @@ pub struct ExportSummary {
 /// export. One format is written to the folder itself; of several, each is written to a folder of its name in it.
 ///
 /// If the files of a pair cannot be read, its record and the summary state so, and the other pairs are exported. Such an
-/// incomplete export never replaces an earlier export: the new one is discarded.
+/// incomplete export never replaces an earlier export: the new one is discarded. Nothing is written if the options
+/// select no result.
 ///
 /// # Errors
 /// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. If the error
@@ -326,6 +329,11 @@ impl ExportRun {
     fn finish(mut self) -> Result<ExportSummary, FolderError> {
         let root = self.folder.path().to_owned();
         let mut summary = self.summary;
+        let is_empty = summary.pairs.done == 0 && summary.unreadable.is_empty();
+        if is_empty && self.context.options.is_filtered() {
+            summary.is_nothing_selected = true;
+            return Ok(summary);
+        }
         for output in &mut self.outputs {
             let mut names = output.writer.finish()?;
             let guide = output.writer.guide();

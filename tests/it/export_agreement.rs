@@ -275,3 +275,20 @@ fn pictures_on_a_canvas_show_the_same_pixels() {
         assert_eq!(stack.dimensions().expect("a size"), (PX as u32, PX as u32));
     }
 }
+
+#[test]
+fn an_export_without_a_selected_result_keeps_the_earlier_one() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = judged(dir.path());
+    let out = export(&project, "out", &["--only", "passed"]);
+    let before = lines(&out.join("jsonl"));
+    let path = out.to_str().expect("UTF-8");
+    let none = ["export", "-o", path, "--min-confidence", "1"];
+    let refused = at(&project, &none).expect(4);
+    assert!(
+        refused.err.contains("no result is selected"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(lines(&out.join("jsonl")), before);
+}
