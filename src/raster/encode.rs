@@ -141,7 +141,8 @@ pub fn compact_grey8(grid: &Grid<u8>) -> Vec<u8> {
 /// ```
 /// use mocban::raster::{Grid, ImageLimits, compact_rgb8, decode, png_rgb8};
 ///
-/// let picture = Grid::from_fn(200, 100, |x, y| [(x / 2) as u8, (y / 50) as u8, 9]);
+/// // An enlarged picture of seven colours.
+/// let picture = Grid::from_fn(400, 300, |x, y| [(37 * (x / 4) * (y / 4) % 7) as u8, 80, 9]);
 /// let png = compact_rgb8(&picture);
 /// assert!(png.len() < png_rgb8(&picture).len());
 /// let read = decode(&png, &ImageLimits::SUGGESTED)?.rgb;
