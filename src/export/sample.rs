@@ -8,7 +8,7 @@ use super::pair_pictures::{PairPictures, PictureError};
 use super::record::{MetricFields, PairFields, PairRecord};
 use super::record_fields::{RecordField, schema_of};
 use crate::catalog::MetricRecord;
-use crate::domain::ThresholdMetric;
+use crate::domain::{PairName, ThresholdMetric};
 use crate::raster::{compact_grey16, compact_mask, png_rgb8};
 
 /// The fields of a sample.
@@ -70,6 +70,15 @@ pub(super) struct SamplePicture {
     pub(super) extension: &'static str,
     /// The file.
     pub(super) bytes: Vec<u8>,
+}
+
+impl SamplePicture {
+    /// Returns the name of the picture's file and its content, as `picture_cells` reads them. `id` is the id of the
+    /// pair.
+    pub(super) fn named(self, id: &PairName) -> [Vec<u8>; 2] {
+        let name = format!("{id}.{}.{}", self.name, self.extension);
+        [name.into_bytes(), self.bytes]
+    }
 }
 
 /// Returns the index of the metric whose pictures a sample has: `ensemble` if it was selected, otherwise the first.

@@ -122,14 +122,13 @@ impl AnnotationWriter {
 
 impl FormatWriter for AnnotationWriter {
     fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
-        let mut encoded = EncodedPair::default();
-        let shown = SingleResults::of_pair(view).zip(view.result);
-        let Some(((fields, record), pictures)) = shown else {
-            encoded.shared.push(self.results.line(view, None));
-            return Ok(encoded);
+        let Some(shown) = SingleResults::of_pair(view) else {
+            return Ok(self.results.without_result(view));
         };
+        let (fields, pictures) = (shown.fields, shown.pictures);
+        let mut encoded = EncodedPair::default();
         let pair = &view.record.pair;
-        let mask = pictures.mask_on_print(&record.outcome)?;
+        let mask = pictures.mask_on_print(&shown.record.outcome)?;
         let (file_name, print_bytes) = self.add_print(view.record, pictures, &mut encoded)?;
         let attributes = json!({
             "block": pair.block,

@@ -1,6 +1,6 @@
 //! The format `fiji`: calibrated TIFF images.
 
-use super::single_results::{NamedFiles, SingleResults};
+use super::single_results::{FileOfPair, SingleResults};
 use crate::export::export_folder::FolderError;
 use crate::export::fiji::{AlignedPictures, FijiImages};
 use crate::export::format_writer::{
@@ -9,8 +9,8 @@ use crate::export::format_writer::{
 use crate::export::pair_pictures::PictureError;
 use crate::export::record::PairRecord;
 
-/// Files of a pair: name in `pairs.jsonl`, path, and meaning.
-const FILES: [[&str; 3]; 3] = [
+/// Files of a pair.
+const FILES: [FileOfPair; 3] = [
     ["heights", "pairs/*/heights.tif", HEIGHTS],
     ["stack", "pairs/*/stack.tif", STACK],
     ["strokes", "pairs/*/strokes.tif", STROKES],
@@ -56,15 +56,10 @@ impl FijiWriter {
 
 impl FormatWriter for FijiWriter {
     fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
-        let mut encoded = EncodedPair::default();
-        let shown = SingleResults::of_pair(view).zip(view.result);
-        let Some(((fields, record), pictures)) = shown else {
-            encoded.shared.push(self.results.line(view, None));
-            return Ok(encoded);
+        let Some(shown) = SingleResults::of_pair(view) else {
+            return Ok(self.results.without_result(view));
         };
-        let outcome = &record.outcome;
-        let mut scale = pictures.outcomes.depth.scale.clone();
-        scale.unit = scale.unit.or(view.record.pair.unit);
+        let (pictures, outcome) = (shown.pictures, &shown.record.outcome);
         let aligned = AlignedPictures {
             print: pictures.print_rgb()?,
             levels: pictures.aligned_depth(outcome)?,
@@ -74,17 +69,11 @@ impl FormatWriter for FijiWriter {
                 .from_print
                 .after(&outcome.print_from_depth),
         };
-        let images = FijiImages::new(&pictures.depth()?.levels, &scale, &aligned);
+        let images = FijiImages::new(&pictures.depth()?.levels, &shown.scale, &aligned);
         let contents = [images.heights, images.stack, images.strokes];
-        let mut names = NamedFiles::new();
-        for ([name, path, _], content) in FILES.into_iter().zip(contents) {
-            names.insert(name, path.to_owned());
-            encoded.add_file(path, content);
-        }
-        encoded
-            .shared
-            .push(self.results.line(view, Some((fields, names))));
-        Ok(encoded)
+        Ok(self
+            .results
+            .with_files(view, shown.fields, &FILES, contents))
     }
 
     fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
@@ -96,13 +85,7 @@ impl FormatWriter for FijiWriter {
     }
 
     fn guide(&self) -> FormatGuide {
-        let paths = FILES.map(|[_, path, _]| path.replace('*', "ID"));
-        let files: Vec<[&str; 2]> = FILES
-            .iter()
-            .zip(&paths)
-            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
-            .collect();
         let purpose = "Prints and heights of carved blocks as calibrated TIFF images.";
-        self.results.guide(purpose, &files, USAGE)
+        self.results.guide_of_files(purpose, &FILES, USAGE)
     }
 }

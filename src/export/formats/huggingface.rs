@@ -103,11 +103,7 @@ impl FormatWriter for HuggingFaceWriter {
         let mut encoded = EncodedPair::default();
         if let (Some(result), Some(index)) = (view.result, chosen(&view.record.metrics)) {
             for picture in pictures(result, result.metrics[index], true)? {
-                let name = format!(
-                    "{}.{}.{}",
-                    view.record.pair.id, picture.name, picture.extension
-                );
-                encoded.shared.extend([name.into_bytes(), picture.bytes]);
+                encoded.shared.extend(picture.named(&view.record.pair.id));
             }
         }
         Ok(encoded)

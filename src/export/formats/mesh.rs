@@ -1,6 +1,6 @@
 //! The format `mesh`: scans in the frame of their prints.
 
-use super::single_results::{NamedFiles, SingleResults};
+use super::single_results::{FileOfPair, SingleResults};
 use crate::export::export_folder::FolderError;
 use crate::export::format_writer::{
     EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
@@ -10,8 +10,8 @@ use crate::export::pair_pictures::PictureError;
 use crate::export::pictures::eight_bits;
 use crate::export::record::PairRecord;
 
-/// Files of a pair: name in `pairs.jsonl`, path, and meaning.
-const FILES: [[&str; 3]; 4] = [
+/// Files of a pair.
+const FILES: [FileOfPair; 4] = [
     ["ply", "pairs/*/scan.ply", SCAN],
     ["glb", "pairs/*/scan.glb", GLB],
     ["matrix", "pairs/*/matrix.txt", MATRIX],
@@ -80,25 +80,21 @@ impl MeshWriter {
 
 impl FormatWriter for MeshWriter {
     fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
-        let mut encoded = EncodedPair::default();
-        let shown = SingleResults::of_pair(view).zip(view.result);
-        let Some(((fields, record), pictures)) = shown else {
-            encoded.shared.push(self.results.line(view, None));
-            return Ok(encoded);
+        let Some(shown) = SingleResults::of_pair(view) else {
+            return Ok(self.results.without_result(view));
         };
+        let pictures = shown.pictures;
         let print = eight_bits(&pictures.source_print()?.picture);
-        let mut scale = pictures.outcomes.depth.scale.clone();
-        scale.unit = scale.unit.or(view.record.pair.unit);
         let placement = MeshPlacement::new(
             pictures.outcomes.fit.clone(),
-            scale,
-            &record.outcome,
+            shown.scale,
+            &shown.record.outcome,
             [print.width(), print.height()],
         )
         .ok_or_else(|| PictureError::Unencodable("the alignment has no inverse".to_owned()))?;
         let title = ScanTitle {
             pair: &view.record.pair.id,
-            metric: fields.metric,
+            metric: shown.fields.metric,
         };
         let files = ScanFiles::new(pictures.mesh()?, &placement, &print, &title)
             .map_err(|error| PictureError::Unencodable(error.to_string()))?;
@@ -108,15 +104,9 @@ impl FormatWriter for MeshWriter {
             files.matrix.into_bytes(),
             files.project.into_bytes(),
         ];
-        let mut names = NamedFiles::new();
-        for ([name, path, _], content) in FILES.into_iter().zip(contents) {
-            names.insert(name, path.to_owned());
-            encoded.add_file(path, content);
-        }
-        encoded
-            .shared
-            .push(self.results.line(view, Some((fields, names))));
-        Ok(encoded)
+        Ok(self
+            .results
+            .with_files(view, shown.fields, &FILES, contents))
     }
 
     fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
@@ -128,13 +118,7 @@ impl FormatWriter for MeshWriter {
     }
 
     fn guide(&self) -> FormatGuide {
-        let paths = FILES.map(|[_, path, _]| path.replace('*', "ID"));
-        let files: Vec<[&str; 2]> = FILES
-            .iter()
-            .zip(&paths)
-            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
-            .collect();
         let purpose = "Scans of carved blocks, moved onto their prints.";
-        self.results.guide(purpose, &files, USAGE)
+        self.results.guide_of_files(purpose, &FILES, USAGE)
     }
 }

@@ -72,11 +72,7 @@ impl FormatWriter for ParquetWriter {
             .flat_map(|result| result.metrics.iter().map(move |record| (result, record)))
         {
             for picture in pictures(result, record, true)? {
-                let name = format!(
-                    "{}.{}.{}",
-                    view.record.pair.id, picture.name, picture.extension
-                );
-                encoded.shared.extend([name.into_bytes(), picture.bytes]);
+                encoded.shared.extend(picture.named(&view.record.pair.id));
             }
         }
         Ok(encoded)

@@ -6,10 +6,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::catalog::MetricRecord;
-use crate::domain::ThresholdMetric;
+use crate::domain::{DepthScale, ThresholdMetric};
 use crate::export::export_folder::{FolderError, SharedFile};
 use crate::export::export_logs::json_lines;
-use crate::export::format_writer::{FormatFolder, FormatGuide, PairView};
+use crate::export::format_writer::{EncodedPair, FormatFolder, FormatGuide, PairView};
+use crate::export::pair_pictures::PairPictures;
 use crate::export::record::{MetricFields, PairFields};
 use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 use crate::export::sample::chosen;
@@ -19,6 +20,18 @@ const LINES: &str = "pairs.jsonl";
 
 /// Files of a line by name, as paths below the folder of `pairs.jsonl`.
 pub(super) type NamedFiles = BTreeMap<&'static str, String>;
+
+/// A file of each pair: its name in `pairs.jsonl`, its path below the folder with `*` for the id, and its meaning.
+pub(super) type FileOfPair = [&'static str; 3];
+
+/// The result of a pair that a format shows.
+pub(super) struct ShownResult<'a> {
+    pub(super) fields: &'a MetricFields,
+    pub(super) record: &'a MetricRecord,
+    pub(super) pictures: &'a PairPictures<'a>,
+    /// Scale of the depth map, with the unit of the manifest if the result has none.
+    pub(super) scale: DepthScale,
+}
 
 /// A line: one pair and the result that the other files of the format show.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -55,10 +68,47 @@ impl SingleResults {
     }
 
     /// Returns the result of a pair to show: that of the default metric if it was selected, otherwise the first.
-    pub(super) fn of_pair<'a>(view: &PairView<'a>) -> Option<(&'a MetricFields, &'a MetricRecord)> {
-        let (fields, records) = (&view.record.metrics, &view.result?.metrics);
+    /// Returns `None` if the pair has no result.
+    pub(super) fn of_pair<'a>(view: &PairView<'a>) -> Option<ShownResult<'a>> {
+        let (fields, pictures) = (&view.record.metrics, view.result?);
         let place = chosen(fields)?;
-        Some((fields.get(place)?, records.get(place)?))
+        let scale = pictures.outcomes.depth.scale.clone();
+        Some(ShownResult {
+            fields: fields.get(place)?,
+            record: pictures.metrics.get(place)?,
+            pictures,
+            scale: DepthScale {
+                unit: scale.unit.or(view.record.pair.unit),
+                ..scale
+            },
+        })
+    }
+
+    /// Returns a pair without a result: only a line.
+    pub(super) fn without_result(&self, view: &PairView<'_>) -> EncodedPair {
+        EncodedPair {
+            files: Vec::new(),
+            shared: vec![self.line(view, None)],
+        }
+    }
+
+    /// Returns a pair with its line and its files. `contents` are in the order of `files`.
+    pub(super) fn with_files(
+        &self,
+        view: &PairView<'_>,
+        fields: &MetricFields,
+        files: &[FileOfPair],
+        contents: impl IntoIterator<Item = Vec<u8>>,
+    ) -> EncodedPair {
+        let mut encoded = EncodedPair::default();
+        let mut names = NamedFiles::new();
+        for ([name, path, _], content) in files.iter().zip(contents) {
+            names.insert(name, (*path).to_owned());
+            encoded.add_file(*path, content);
+        }
+        let line = self.line(view, Some((fields, names)));
+        encoded.shared.push(line);
+        encoded
     }
 
     /// Returns the line of a pair. `shown` is its result with its files.
@@ -91,6 +141,24 @@ impl SingleResults {
     pub(super) fn finish(&mut self) -> Result<String, FolderError> {
         self.lines.flush()?;
         Ok(LINES.to_owned())
+    }
+
+    /// Returns what the README says about the lines and the files of each pair, for a format with this purpose.
+    pub(super) fn guide_of_files(
+        &self,
+        purpose: &str,
+        files: &[FileOfPair],
+        usage: &str,
+    ) -> FormatGuide {
+        let paths: Vec<String> = files
+            .iter()
+            .map(|[_, path, _]| path.replace('*', "ID"))
+            .collect();
+        let rows = files.iter().zip(&paths);
+        let rows: Vec<[&str; 2]> = rows
+            .map(|([_, _, meaning], path)| [path.as_str(), *meaning])
+            .collect();
+        self.guide(purpose, &rows, usage)
     }
 
     /// Returns what the README says about the lines, for a format with this purpose and these files.
