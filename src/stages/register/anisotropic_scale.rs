@@ -15,8 +15,8 @@ const MOST: f64 = 0.016;
 /// If the first round finds a smaller change, the pose keeps one scale, which saves time. Such a change moves no landmark
 /// by more than 0.3 % of the character's height.
 const EVIDENT: f64 = 0.004;
-/// Least share by which the anisotropic scale must bring the correlation closer to 1. Damaged strokes reach 0.04 at most,
-/// sheets that shrank by 2 % or more and photographs 0.06 to 0.8.
+/// Least share by which the anisotropic scale must bring the correlation closer to 1. On generated pairs, 2 of 48 damaged
+/// ones exceeded it, and most sheets that shrank and photographs exceeded 0.06.
 const LEAST_GAIN: f64 = 0.03;
 /// The search ends after a round with a smaller change.
 const CONVERGED: f64 = 0.001;
