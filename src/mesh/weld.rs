@@ -1,4 +1,4 @@
-//! Merges repeated vertices, which formats without shared corners (STL) produce.
+//! Finds and merges repeated vertices, which formats without shared corners (STL) produce.
 
 use std::collections::HashMap;
 
@@ -24,22 +24,16 @@ impl Mesh {
     /// ```
     #[must_use]
     pub fn welded(self) -> Self {
+        let welded = self.position_numbers();
         let Self {
             vertices,
             triangles,
         } = self;
-        let mut firsts: HashMap<[u64; 3], u32> = HashMap::with_capacity(vertices.len() / 4);
-        let mut welded = Vec::with_capacity(vertices.len());
         let mut kept = Vec::new();
-        for (place, vertex) in (0..).zip(vertices.iter()) {
-            // Adding zero makes negative zero positive, so that both are the same position.
-            let key = vertex.map(|c| (c + 0.0).to_bits());
-            let next = kept.len() as u32;
-            let first = *firsts.entry(key).or_insert(next);
-            if first == next {
+        for (place, number) in (0..).zip(&welded) {
+            if *number as usize == kept.len() {
                 kept.push(place);
             }
-            welded.push(first);
         }
         if kept.len() == vertices.len() {
             return Self {
@@ -55,6 +49,19 @@ impl Mesh {
                 .collect(),
             vertices: vertices.select(&kept),
         }
+    }
+
+    /// Numbers the distinct positions of vertices from 0, in the order of the first vertex at each. Returns the number of
+    /// each vertex's position.
+    pub(crate) fn position_numbers(&self) -> Vec<u32> {
+        let mut known: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.vertices.len() / 4);
+        let number = |vertex: [f64; 3]| {
+            // Adding zero makes negative zero positive, so that both are the same position.
+            let key = vertex.map(|c| (c + 0.0).to_bits());
+            let next = known.len() as u32;
+            *known.entry(key).or_insert(next)
+        };
+        self.vertices.iter().map(number).collect()
     }
 }
 

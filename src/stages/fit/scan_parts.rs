@@ -1,7 +1,5 @@
 //! Finds the parts of a scan that may be the block. Debris and a table below the block are left out.
 
-use std::collections::HashMap;
-
 use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
@@ -102,7 +100,8 @@ fn fullest_layer(facets: &[Facet], normal: &Vector3<f64>) -> Option<(f64, f64)> 
 /// Returns a mesh without the faces at spikes. A point is a spike if in most of its faces the two edges that meet there
 /// are much longer than the third edge.
 pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
-    let points = points(mesh);
+    // STL files repeat a vertex in each of its faces.
+    let points = mesh.position_numbers();
     // Number of faces at each point, and how many of them are narrow there.
     let mut faces = vec![[0_u32; 2]; mesh.vertices.len()];
     for face in &mesh.triangles {
@@ -122,16 +121,6 @@ pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
     let is_kept = |face: &&[u32; 3]| !face.iter().any(is_spike);
     let kept: Vec<[u32; 3]> = mesh.triangles.iter().filter(is_kept).copied().collect();
     of_faces(mesh, &kept)
-}
-
-/// Returns, for each vertex, the index of the first vertex at the same position. STL files repeat a vertex in each of
-/// its faces.
-fn points(mesh: &Mesh) -> Vec<u32> {
-    let mut first = HashMap::with_capacity(mesh.vertices.len());
-    let vertices = (0..).zip(mesh.vertices.iter());
-    vertices
-        .map(|(index, vertex)| *first.entry(vertex.map(f64::to_bits)).or_insert(index))
-        .collect()
 }
 
 /// Returns a mesh without distant specks and without connected components that are smaller than [`DEBRIS`] of the
