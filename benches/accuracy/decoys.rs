@@ -1,6 +1,5 @@
 //! Table of how many decoys, pairs without a right answer, are rejected.
 
-use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
 use mocban::mesh::write::MeshFormat;
 use mocban::report::stats::quantile;
@@ -27,11 +26,14 @@ that no stage rejected, and those among them with a confidence of at least 0.5."
 
 /// Result of a decoy.
 pub(super) struct Answer {
-    tier: Tier,
-    kind: Decoy,
-    method: &'static str,
-    /// Confidence of the alignment. `Ok(None)` if it has no confidence, `Err` if a stage failed.
-    outcome: Result<Option<f64>, ()>,
+    /// The pair from which the decoy was made.
+    pub(super) case: Case,
+    /// What was changed.
+    pub(super) kind: Decoy,
+    /// Name of the method.
+    pub(super) method: &'static str,
+    /// Every number of the alignment under the chosen metric, or the error of the stage that rejected the decoy.
+    pub(super) outcome: Result<Numbers, String>,
 }
 
 /// Runs every kind of decoy of every pair under every method.
@@ -46,7 +48,7 @@ pub(super) fn all(
             let input = input(&cases[index], kind)?;
             for method in methods {
                 answers.push(Answer {
-                    tier: cases[index].tier,
+                    case: cases[index],
                     kind,
                     method: method.name,
                     outcome: outcome(&Run::new(&input, &method.settings), options.metric)?,
@@ -68,13 +70,23 @@ pub(super) fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
     })
 }
 
-fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Option<f64>, ()>> {
-    let Ok((_, aligned)) = &run.result else {
-        return Ok(Err(()));
-    };
-    let mut numbers = Numbers::default();
-    numbers.add("metric", &aligned.metric(metric))?;
-    Ok(Ok(numbers.number("metric.confidence")))
+fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Numbers, String>> {
+    match &run.result {
+        Ok((_, aligned)) => {
+            let mut numbers = Numbers::of_stages(aligned)?;
+            numbers.add("metric", &aligned.metric(metric))?;
+            Ok(Ok(numbers))
+        }
+        Err(failed) => Ok(Err(failed.to_string())),
+    }
+}
+
+impl Answer {
+    /// Returns the confidence of the alignment. `Ok(None)` if it has no confidence, `Err` if a stage failed.
+    fn confidence(&self) -> Result<Option<f64>, &String> {
+        let numbers = self.outcome.as_ref()?;
+        Ok(numbers.number("metric.confidence"))
+    }
 }
 
 /// Makes a row for each tier, method and kind.
@@ -101,7 +113,7 @@ pub(super) fn table(
             let level = level(trials, method, options.metric);
             for kind in Decoy::ALL {
                 let is_of = |answer: &&Answer| {
-                    (answer.tier, answer.method, answer.kind) == (*tier, method.name, kind)
+                    (answer.case.tier, answer.method, answer.kind) == (*tier, method.name, kind)
                 };
                 let answers: Vec<_> = answers.iter().filter(is_of).collect();
                 let mut cells = vec![
@@ -123,13 +135,13 @@ fn row(answers: &[&Answer], level: Option<f64>) -> [String; 6] {
         share(rejected, answers.len())
     };
     let by_stage = count(&|answer| answer.outcome.is_err());
-    let rejected = count(&|answer| match answer.outcome {
-        Err(()) => true,
+    let rejected = count(&|answer| match answer.confidence() {
+        Err(_) => true,
         Ok(confidence) => confidence.is_some_and(|sure| level.is_some_and(|level| sure < level)),
     });
     let accepted = answers
         .iter()
-        .filter_map(|answer| answer.outcome.ok())
+        .filter_map(|answer| answer.confidence().ok())
         .map(Option::unwrap_or_default);
     [
         answers.len().to_string(),

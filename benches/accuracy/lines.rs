@@ -1,18 +1,21 @@
-//! Every number of every pair and metric as CSV, for calibration.
+//! Every number of every pair and metric as CSV, for calibration. A decoy has one line, for the chosen metric.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::Context as _;
 
+use super::decoys::Answer;
+use super::numbers::Numbers;
 use super::times::Part;
 use super::trial::{Found, Trial};
 
 /// Columns before the outcomes.
-const HEADS: [&str; 13] = [
+const HEADS: [&str; 14] = [
     "tier",
     "seed",
     "id",
+    "decoy",
     "character",
     "preset",
     "metric",
@@ -25,9 +28,9 @@ const HEADS: [&str; 13] = [
     "normal_deg",
 ];
 
-/// Writes a line for each metric of each pair, and a single line for each pair that failed.
-pub(super) fn write(path: &Path, trials: &[Trial]) -> anyhow::Result<()> {
-    let paths = paths(trials);
+/// Writes a line for each metric of each pair, and a single line for each pair that failed and for each decoy.
+pub(super) fn write(path: &Path, trials: &[Trial], decoys: &[Answer]) -> anyhow::Result<()> {
+    let paths = paths(trials, decoys);
     let text = || -> anyhow::Result<()> {
         let mut writer = csv::Writer::from_path(path)?;
         let parts = Part::ALL.map(|part| format!("ms.{}", part.name().replace(' ', "_")));
@@ -38,19 +41,26 @@ pub(super) fn write(path: &Path, trials: &[Trial]) -> anyhow::Result<()> {
                 writer.write_record(line)?;
             }
         }
+        for decoy in decoys {
+            writer.write_record(decoy_line(decoy, &paths))?;
+        }
         Ok(writer.flush()?)
     };
     text().with_context(|| path.display().to_string())
 }
 
 /// Returns the paths that any result has, in order.
-fn paths(trials: &[Trial]) -> BTreeSet<&String> {
+fn paths<'a>(trials: &'a [Trial], decoys: &'a [Answer]) -> BTreeSet<&'a String> {
     let found = trials
         .iter()
         .filter_map(|trial| trial.outcome.as_ref().ok());
-    found
-        .flatten()
-        .flat_map(|found| found.numbers.paths())
+    let of_trials = found.flatten().map(|found| &found.numbers);
+    let of_decoys = decoys
+        .iter()
+        .filter_map(|decoy| decoy.outcome.as_ref().ok());
+    of_trials
+        .chain(of_decoys)
+        .flat_map(Numbers::paths)
         .collect()
 }
 
@@ -70,19 +80,34 @@ fn line(trial: &Trial, found: Result<&Found, &String>, paths: &BTreeSet<&String>
         trial.case.tier.to_string(),
         trial.case.seed.to_string(),
         trial.id.clone(),
+        String::new(),
         trial.character.clone(),
         trial.method.to_owned(),
     ];
     cells.extend(truth(found));
     cells.push(optional(trial.normal_deg));
     cells.extend(Part::ALL.map(|part| trial.times.ms(part).to_string()));
-    let text = |path: &&String| found.ok()?.numbers.text(path);
-    cells.extend(
-        paths
-            .iter()
-            .map(|path| text(path).unwrap_or_default().to_owned()),
-    );
+    cells.extend(values(found.ok().map(|found| &found.numbers), paths));
     cells
+}
+
+fn decoy_line(decoy: &Answer, paths: &BTreeSet<&String>) -> Vec<String> {
+    let mut cells = vec![String::new(); HEADS.len() + Part::ALL.len()];
+    cells[0] = decoy.case.tier.to_string();
+    cells[1] = decoy.case.seed.to_string();
+    cells[2] = decoy.case.index.to_string();
+    cells[3] = decoy.kind.name().to_owned();
+    cells[5] = decoy.method.to_owned();
+    cells[7] = decoy.outcome.as_ref().err().cloned().unwrap_or_default();
+    cells[8] = false.to_string();
+    cells.extend(values(decoy.outcome.as_ref().ok(), paths));
+    cells
+}
+
+fn values(numbers: Option<&Numbers>, paths: &BTreeSet<&String>) -> Vec<String> {
+    let text = |path: &&String| numbers?.text(path);
+    let cell = |path| text(path).unwrap_or_default().to_owned();
+    paths.iter().map(cell).collect()
 }
 
 /// Returns the cells from `metric` to `tops_iou`.

@@ -61,12 +61,13 @@ fn main() -> anyhow::Result<()> {
         kinds::table(&options.tiers, &methods, &trials, options.metric),
         reliability::tables(&methods, &trials),
     ]);
+    let mut answers = Vec::new();
     if options.decoys {
-        let answers = decoys::all(&cases, &methods, &options)?;
+        answers = decoys::all(&cases, &methods, &options)?;
         tables.push(decoys::table(&options, &methods, &trials, &answers));
     }
     if let Some(path) = &options.pairs_csv {
-        lines::write(path, &trials)?;
+        lines::write(path, &trials, &answers)?;
     }
     if let Some(dir) = &options.sheets {
         sheet::write(dir, &options, &methods, &trials)?;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use mocban::stages::AlignedPair;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -10,6 +11,16 @@ use serde_json::Value;
 pub(super) struct Numbers(BTreeMap<String, String>);
 
 impl Numbers {
+    /// Returns the numbers of the four stages that all metrics share.
+    pub(super) fn of_stages(aligned: &AlignedPair) -> anyhow::Result<Self> {
+        let mut numbers = Self::default();
+        numbers.add("fit", &aligned.fit)?;
+        numbers.add("depth", &aligned.depth.scale)?;
+        numbers.add("normalize", &aligned.normalized.outcome)?;
+        numbers.add("features", &aligned.registered.outcome.features)?;
+        Ok(numbers)
+    }
+
     /// Adds everything a value holds below `path`.
     pub(super) fn add(&mut self, path: &str, value: &impl Serialize) -> anyhow::Result<()> {
         self.flatten(path.to_owned(), &serde_json::to_value(value)?);

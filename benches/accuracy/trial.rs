@@ -131,10 +131,7 @@ fn found(
     truth: &TruthRecord,
     aligned: &AlignedPair,
 ) -> anyhow::Result<Vec<Found>> {
-    let mut shared = Numbers::default();
-    shared.add("fit", &aligned.fit)?;
-    shared.add("depth", &aligned.depth.scale)?;
-    shared.add("normalize", &aligned.normalized.outcome)?;
+    let shared = Numbers::of_stages(aligned)?;
     let held = |outcome: &MetricOutcome| {
         let mut numbers = shared.clone();
         numbers.add("metric", outcome)?;
