@@ -13,20 +13,16 @@ use super::export_folder::{Folder, FolderError, write_below};
 use super::export_logs::write_logs;
 use super::exporter_error::ExportError;
 use super::format::ExportFormat;
-use super::format_writer::{
-    EncodedFile, EncodedPair, ExportContext, FormatFolder, FormatWriter, PairView,
-};
+use super::format_writer::{ExportContext, FormatFolder};
 use super::formats;
 use super::manifest::{ExportManifest, MANIFEST, PairCounts};
 use super::options::ExportOptions;
-use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
+use super::pair_writer::{FormatOutput, PairWriter, WrittenPair};
 use super::readme;
-use super::record::{ManualAlignmentFields, PairRecord};
+use super::record::ManualAlignmentFields;
 use super::split::SplitPlan;
-use super::stage_outcomes::StageOutcomes;
-use crate::catalog::{Catalog, MetricRecord, PairResults, StoredAlignment};
-use crate::domain::{Affine2, Failure, FailureClass, PairName};
-use crate::report::pair_artifacts::PairArtifacts;
+use crate::catalog::{Catalog, PairResults, StoredAlignment};
+use crate::domain::PairName;
 use crate::store::Project;
 
 /// Pairs whose rows are in memory at a time.
@@ -111,14 +107,6 @@ pub async fn export(
     Ok(tokio::task::spawn_blocking(move || run.finish()).await??)
 }
 
-/// One format of an export.
-struct FormatOutput {
-    format: ExportFormat,
-    /// Path of its folder below the folder of the export: empty, or its name and a slash.
-    prefix: String,
-    writer: Box<dyn FormatWriter>,
-}
-
 /// An export in progress.
 struct ExportRun {
     project: Project,
@@ -129,17 +117,6 @@ struct ExportRun {
     /// Paths of files below the folder, with `*` in place of ids.
     files: BTreeSet<String>,
     summary: ExportSummary,
-}
-
-/// A pair that was encoded and whose own files were written.
-struct WrittenPair {
-    record: PairRecord,
-    /// What each format appends to shared files.
-    shared: Vec<Vec<Vec<u8>>>,
-    /// Patterns of the written files.
-    files: BTreeSet<String>,
-    /// Why its files are missing although it is finished.
-    unreadable: Option<String>,
 }
 
 impl ExportRun {
@@ -192,9 +169,16 @@ impl ExportRun {
             })
             .collect();
         for pairs in pairs.chunks(ENCODED_PER_CORE * rayon::current_num_threads()) {
+            let writer = PairWriter {
+                project: &self.project,
+                root: self.folder.path(),
+                outputs: &self.outputs,
+                context: &self.context,
+                plan: self.plan.as_ref(),
+            };
             let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
                 .par_iter()
-                .map(|(pair, alignment)| self.write_pair(pair, alignment.as_ref()))
+                .map(|(pair, alignment)| writer.write(pair, alignment.as_ref()))
                 .collect();
             for pair in written? {
                 match pair {
@@ -204,94 +188,6 @@ impl ExportRun {
             }
         }
         Ok(())
-    }
-
-    /// Encodes a pair in every format and writes its own files. Returns `None` if the pair is left out.
-    fn write_pair(
-        &self,
-        pair: &PairResults,
-        alignment: Option<&ManualAlignmentFields>,
-    ) -> Result<Option<WrittenPair>, FolderError> {
-        let options = &self.context.options;
-        let kept: Vec<_> = pair
-            .metrics
-            .iter()
-            .filter(|record| options.keeps(record))
-            .collect();
-        if options.is_filtered() && kept.is_empty() {
-            return Ok(None);
-        }
-        let complete = |mut record: PairRecord| {
-            record.pair.manual_alignment = alignment.cloned();
-            record.pair.split = self
-                .plan
-                .as_ref()
-                .and_then(|plan| plan.part(&pair.attributes));
-            record
-        };
-        let (record, encoded, unreadable) = match self.encode_result(pair, &kept, complete) {
-            Ok((record, encoded)) => (record, encoded, None),
-            Err(error) => {
-                let failure = Failure::new(FailureClass::Io, error.to_string());
-                let record = complete(PairRecord::unreadable(pair, &failure));
-                let encoded = self.encode(&record, None).expect("nothing is read");
-                (record, encoded, Some(failure.message))
-            }
-        };
-        let mut written = WrittenPair {
-            record,
-            shared: Vec::new(),
-            files: BTreeSet::new(),
-            unreadable,
-        };
-        let id = pair.attributes.name.as_str();
-        for (output, EncodedPair { files, shared }) in self.outputs.iter().zip(encoded) {
-            for EncodedFile { pattern, bytes } in files {
-                let pattern = format!("{}{pattern}", output.prefix);
-                write_below(self.folder.path(), &pattern.replace('*', id), &bytes)?;
-                written.files.insert(pattern);
-            }
-            written.shared.push(shared);
-        }
-        Ok(Some(written))
-    }
-
-    /// Reads the outcomes of a pair and encodes it in every format.
-    fn encode_result(
-        &self,
-        pair: &PairResults,
-        kept: &[&MetricRecord],
-        complete: impl Fn(PairRecord) -> PairRecord,
-    ) -> Result<(PairRecord, Vec<EncodedPair>), PictureError> {
-        let options = &self.context.options;
-        if kept.is_empty() {
-            let record = complete(PairRecord::of(pair, None, &[]));
-            let encoded = self.encode(&record, None)?;
-            return Ok((record, encoded));
-        }
-        let outcomes = StageOutcomes::read(&PairArtifacts::new(&self.project, pair))?;
-        let mut record = complete(PairRecord::of(pair, Some(&outcomes), kept));
-        record.pair.seconds = options.with_times.then(|| pair.seconds());
-        record.pair.picture_from_print = Some(match options.canvas_px {
-            None => Affine2::IDENTITY,
-            Some(side) => canvas_from_print(&outcomes, side).unwrap_or(Affine2::IDENTITY),
-        });
-        let kept = kept.to_vec();
-        let (limits, canvas) = (options.limits, options.canvas_px);
-        let pictures = PairPictures::new(&self.project, pair, &outcomes, kept, limits, canvas);
-        let encoded = self.encode(&record, Some(&pictures))?;
-        Ok((record, encoded))
-    }
-
-    /// Encodes a pair in every format.
-    fn encode(
-        &self,
-        record: &PairRecord,
-        result: Option<&PairPictures<'_>>,
-    ) -> Result<Vec<EncodedPair>, PictureError> {
-        let view = PairView { record, result };
-        let outputs = self.outputs.iter();
-        outputs.map(|output| output.writer.encode(&view)).collect()
     }
 
     fn append(&mut self, mut pair: WrittenPair) -> Result<(), FolderError> {

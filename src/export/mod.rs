@@ -16,6 +16,7 @@ mod mesh;
 mod options;
 mod pair_files;
 mod pair_pictures;
+mod pair_writer;
 mod parquet_columns;
 mod parquet_table;
 pub mod pictures;
