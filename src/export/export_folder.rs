@@ -100,6 +100,22 @@ pub(super) fn write_below(root: &Path, below: &str, bytes: &[u8]) -> Result<(), 
     fs::write(&path, bytes).map_err(at(&path))
 }
 
+/// Removes a file below a folder, and its parent folders if they are then empty.
+pub(super) fn remove_below(root: &Path, below: &str) -> Result<(), FolderError> {
+    let path = root.join(below);
+    fs::remove_file(&path).map_err(at(&path))?;
+    let parents = path
+        .ancestors()
+        .skip(1)
+        .take_while(|parent| *parent != root);
+    for parent in parents {
+        if fs::remove_dir(parent).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
 /// A file that pairs share, written in the order of the catalog.
 #[derive(Debug)]
 pub(super) struct SharedFile {

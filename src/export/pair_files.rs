@@ -35,7 +35,7 @@ pub(super) struct Files {
     pub(super) canvas_print_mask: String,
     /// Where the canvas masks disagree: 128 = stroke without ink, 255 = ink without wood, 0 = elsewhere.
     pub(super) stroke_map: String,
-    /// The print with the edges of the strokes, enlarged for viewing.
+    /// The print with the edges of the strokes, enlarged if it is small.
     pub(super) overlay: String,
 }
 
@@ -103,7 +103,7 @@ pub(super) fn write_files(
         Ok(compact_grey16(&pictures.aligned_depth(metric)?))
     })?;
     let aligned_masks = each.add("aligned_mask", same_alignment, |metric| {
-        Ok(compact_mask(&pictures.aligned_mask(metric)?))
+        Ok(compact_mask(pictures.aligned_mask(metric)?.as_ref()))
     })?;
     let overlays = each.add("overlay", same_alignment, |metric| {
         Ok(compact_rgb8(&pictures.overlay(metric)?))

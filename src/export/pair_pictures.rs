@@ -1,5 +1,6 @@
 //! Reads the inputs and artifacts of a finished pair when they are needed, and draws its pictures.
 
+use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::path::PathBuf;
 
@@ -75,8 +76,10 @@ pub(super) struct PairPictures<'a> {
     print: OnceCell<SourcePrint>,
     print_mask: OnceCell<Mask>,
     depth: OnceCell<DepthMap>,
-    /// The print, enlarged for overlays.
+    /// The print, as overlays show it.
     enlarged: OnceCell<Rgb>,
+    /// The strokes of each of `metrics` in the frame of the print.
+    on_print: Vec<OnceCell<Mask>>,
 }
 
 impl<'a> PairPictures<'a> {
@@ -95,6 +98,7 @@ impl<'a> PairPictures<'a> {
             canvas: canvas_px
                 .and_then(|side| Some((side as usize, canvas_from_print(outcomes, side)?))),
             outcomes,
+            on_print: metrics.iter().map(|_| OnceCell::new()).collect(),
             metrics,
             print: OnceCell::new(),
             print_mask: OnceCell::new(),
@@ -178,16 +182,19 @@ impl<'a> PairPictures<'a> {
         Ok((print.upright_file().into_owned(), print.extension()))
     }
 
-    /// Returns the strokes at the metric's threshold, in the frame of the print.
-    pub(super) fn mask_on_print(&self, outcome: &MetricOutcome) -> Result<Mask, PictureError> {
-        let (strokes, print) = (self.depth_mask(outcome)?, self.source_mask()?);
-        let (width, height) = (print.width(), print.height());
-        Ok(warp_mask(
-            &strokes,
-            &outcome.print_from_depth,
-            width,
-            height,
-        ))
+    /// Returns the strokes at the threshold of one of `metrics`, in the frame of the print.
+    pub(super) fn mask_on_print(&self, outcome: &MetricOutcome) -> Result<&Mask, PictureError> {
+        let place = self
+            .metrics
+            .iter()
+            .position(|record| record.outcome.metric == outcome.metric)
+            .expect("the metric is selected");
+        get_or_read(&self.on_print[place], || {
+            let (strokes, print) = (self.depth_mask(outcome)?, self.source_mask()?);
+            let (width, height) = (print.width(), print.height());
+            let map = &outcome.print_from_depth;
+            Ok(warp_mask(&strokes, map, width, height))
+        })
     }
 
     /// Returns the ink mask in the frame of the pictures.
@@ -212,19 +219,26 @@ impl<'a> PairPictures<'a> {
         Ok(warp_depth(depth, &to_depth, frame.width, frame.height))
     }
 
-    /// Returns the strokes at the metric's threshold, in the frame of the pictures.
-    pub(super) fn aligned_mask(&self, outcome: &MetricOutcome) -> Result<Mask, PictureError> {
+    /// Returns the strokes at the threshold of one of `metrics`, in the frame of the pictures.
+    pub(super) fn aligned_mask(
+        &self,
+        outcome: &MetricOutcome,
+    ) -> Result<Cow<'_, Mask>, PictureError> {
+        if self.canvas.is_none() {
+            return Ok(Cow::Borrowed(self.mask_on_print(outcome)?));
+        }
         let (strokes, frame) = (self.depth_mask(outcome)?, self.frame()?);
         let to_depth = frame.from_print.after(&outcome.print_from_depth);
-        Ok(warp_mask(&strokes, &to_depth, frame.width, frame.height))
+        let mask = warp_mask(&strokes, &to_depth, frame.width, frame.height);
+        Ok(Cow::Owned(mask))
     }
 
-    /// Returns the print with the edges of the strokes, enlarged for viewing.
+    /// Returns the print with the edges of the strokes of one of `metrics`, small prints enlarged.
     pub(super) fn overlay(&self, outcome: &MetricOutcome) -> Result<Rgb, PictureError> {
-        let (print, depth) = (&self.source_print()?.picture, self.depth()?);
+        let print = &self.source_print()?.picture;
         let view = PrintView::enlarged(print);
         let enlarged = get_or_read(&self.enlarged, || Ok(view.print(print)))?;
-        Ok(view.overlay_on(enlarged.clone(), depth, outcome))
+        Ok(view.overlay_on(enlarged.clone(), self.mask_on_print(outcome)?))
     }
 
     /// Reads the mesh file, and checks that it is the one that was aligned.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::export_folder::{FolderError, write_below};
+use super::export_folder::{FolderError, remove_below, write_below};
 use super::format::ExportFormat;
 use super::format_writer::{EncodedFile, EncodedPair, ExportContext, FormatWriter, PairView};
 use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
@@ -35,6 +35,26 @@ pub(super) struct WrittenPair {
     pub(super) files: BTreeSet<String>,
     /// Why its files are missing although it is finished.
     pub(super) unreadable: Option<String>,
+}
+
+/// What the formats made of a pair.
+#[derive(Default)]
+struct FormatFiles {
+    /// What each format appends to shared files.
+    shared: Vec<Vec<Vec<u8>>>,
+    /// Patterns of the written files.
+    files: BTreeSet<String>,
+}
+
+/// Why a pair was not written.
+#[derive(Debug, thiserror::Error)]
+enum WriteError {
+    /// An input or artifact cannot be read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
 }
 
 /// Writes pairs below the folder of an export. Several threads may use it.
@@ -72,47 +92,42 @@ impl PairWriter<'_> {
             record.pair.split = self.plan.and_then(|plan| plan.part(&pair.attributes));
             record
         };
-        let (record, encoded, unreadable) = match self.encode_result(pair, &kept, complete) {
-            Ok((record, encoded)) => (record, encoded, None),
-            Err(error) => {
+        let (record, output, unreadable) = match self.write_result(pair, &kept, complete) {
+            Ok((record, output)) => (record, output, None),
+            Err(WriteError::Folder(error)) => return Err(error),
+            Err(WriteError::Picture(error)) => {
                 let failure = Failure::new(FailureClass::Io, error.to_string());
                 let record = complete(PairRecord::unreadable(pair, &failure));
-                let encoded = self.encode(&record, None).expect("nothing is read");
-                (record, encoded, Some(failure.message))
+                let output = match self.write_formats(&record, None) {
+                    Err(WriteError::Folder(error)) => return Err(error),
+                    written => written.expect("nothing is read"),
+                };
+                (record, output, Some(failure.message))
             }
         };
-        let mut written = WrittenPair {
+        Ok(Some(WrittenPair {
             record,
-            shared: Vec::new(),
-            files: BTreeSet::new(),
+            shared: output.shared,
+            files: output.files,
             unreadable,
-        };
-        let id = pair.attributes.name.as_str();
-        for (output, EncodedPair { files, shared }) in self.outputs.iter().zip(encoded) {
-            for EncodedFile { pattern, bytes } in files {
-                let pattern = format!("{}{pattern}", output.prefix);
-                write_below(self.root, &pattern.replace('*', id), &bytes)?;
-                written.files.insert(pattern);
-            }
-            written.shared.push(shared);
-        }
-        Ok(Some(written))
+        }))
     }
 
-    /// Reads the outcomes of a pair and encodes it in every format.
-    fn encode_result(
+    /// Reads the outcomes of a pair and writes it in every format.
+    fn write_result(
         &self,
         pair: &PairResults,
         kept: &[&MetricRecord],
         complete: impl Fn(PairRecord) -> PairRecord,
-    ) -> Result<(PairRecord, Vec<EncodedPair>), PictureError> {
+    ) -> Result<(PairRecord, FormatFiles), WriteError> {
         let options = &self.context.options;
         if kept.is_empty() {
             let record = complete(PairRecord::of(pair, None, &[]));
-            let encoded = self.encode(&record, None)?;
-            return Ok((record, encoded));
+            let output = self.write_formats(&record, None)?;
+            return Ok((record, output));
         }
-        let outcomes = StageOutcomes::read(&PairArtifacts::new(self.project, pair))?;
+        let outcomes = StageOutcomes::read(&PairArtifacts::new(self.project, pair))
+            .map_err(PictureError::from)?;
         let mut record = complete(PairRecord::of(pair, Some(&outcomes), kept));
         record.pair.seconds = options.with_times.then(|| pair.seconds());
         record.pair.picture_from_print = Some(match options.canvas_px {
@@ -122,18 +137,37 @@ impl PairWriter<'_> {
         let kept = kept.to_vec();
         let (limits, canvas) = (options.limits, options.canvas_px);
         let pictures = PairPictures::new(self.project, pair, &outcomes, kept, limits, canvas);
-        let encoded = self.encode(&record, Some(&pictures))?;
-        Ok((record, encoded))
+        let output = self.write_formats(&record, Some(&pictures))?;
+        Ok((record, output))
     }
 
-    /// Encodes a pair in every format.
-    fn encode(
+    /// Encodes a pair in one format after the other, and writes the files of each before the next is encoded. Removes
+    /// the written files if a picture cannot be read.
+    fn write_formats(
         &self,
         record: &PairRecord,
         result: Option<&PairPictures<'_>>,
-    ) -> Result<Vec<EncodedPair>, PictureError> {
+    ) -> Result<FormatFiles, WriteError> {
         let view = PairView { record, result };
-        let outputs = self.outputs.iter();
-        outputs.map(|output| output.writer.encode(&view)).collect()
+        let path = |pattern: &str| pattern.replace('*', record.pair.id.as_str());
+        let mut written = FormatFiles::default();
+        for output in self.outputs {
+            let EncodedPair { files, shared } = match output.writer.encode(&view) {
+                Ok(encoded) => encoded,
+                Err(error) => {
+                    for pattern in &written.files {
+                        remove_below(self.root, &path(pattern))?;
+                    }
+                    return Err(error.into());
+                }
+            };
+            for EncodedFile { pattern, bytes } in files {
+                let pattern = format!("{}{pattern}", output.prefix);
+                write_below(self.root, &path(&pattern), &bytes)?;
+                written.files.insert(pattern);
+            }
+            written.shared.push(shared);
+        }
+        Ok(written)
     }
 }

@@ -140,7 +140,7 @@ pub(super) fn pictures(
         compact_mask(&result.print_mask()?),
         compact_grey16(&result.depth()?.levels),
         compact_grey16(&result.aligned_depth(outcome)?),
-        compact_mask(&result.aligned_mask(outcome)?),
+        compact_mask(result.aligned_mask(outcome)?.as_ref()),
     ];
     let files = PICTURES.into_iter().zip(files).enumerate();
     let pictures = files.map(|(i, (name, bytes))| SamplePicture {

@@ -175,8 +175,12 @@ pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
 fn palette(grid: &Grid<[u8; 3]>) -> Option<(Vec<u8>, Vec<u8>)> {
     let mut known: HashMap<[u8; 3], u8> = HashMap::new();
     let (mut colours, mut indices) = (Vec::new(), Vec::with_capacity(grid.data().len()));
+    // Neighbours are often equal.
+    let mut last: Option<(&[u8; 3], u8)> = None;
     for colour in grid.data() {
-        let index = if let Some(index) = known.get(colour) {
+        let index = if let Some((_, index)) = last.filter(|(same, _)| *same == colour) {
+            index
+        } else if let Some(index) = known.get(colour) {
             *index
         } else {
             let index = u8::try_from(known.len()).ok()?;
@@ -184,6 +188,7 @@ fn palette(grid: &Grid<[u8; 3]>) -> Option<(Vec<u8>, Vec<u8>)> {
             colours.extend(colour);
             index
         };
+        last = Some((colour, index));
         indices.push(index);
     }
     Some((colours, indices))

@@ -143,7 +143,7 @@ impl FormatWriter for AnnotationWriter {
                 pair.id.clone(),
                 pair.character.clone(),
                 file_name,
-                &mask,
+                mask,
                 attributes,
             ),
             print_bytes,

@@ -63,7 +63,7 @@ impl FormatWriter for FijiWriter {
         let aligned = AlignedPictures {
             print: pictures.print_rgb()?,
             levels: pictures.aligned_depth(outcome)?,
-            mask: pictures.aligned_mask(outcome)?,
+            mask: pictures.aligned_mask(outcome)?.into_owned(),
             from_depth: pictures
                 .frame()?
                 .from_print

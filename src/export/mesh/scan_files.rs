@@ -20,6 +20,12 @@ const PLY: &str = "scan.ply";
 /// Metres per unit of the frame.
 const METRES: f64 = 1e-3;
 
+/// Bytes of a vertex and of a face, in the larger of the two mesh files.
+const VERTEX_BYTES: usize = 20;
+const FACE_BYTES: usize = 13;
+/// At least the bytes of what precedes the vertices.
+const HEADER_BYTES: usize = 8192;
+
 /// What the files name the scan.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::export) struct ScanTitle<'a> {
@@ -55,7 +61,10 @@ impl ScanFiles {
     ) -> io::Result<Self> {
         let placed = PlacedMesh::new(mesh.welded(), placement, print);
         let png = print_png(print);
-        let mut ply = Vec::new();
+        let bytes = VERTEX_BYTES * placed.positions.len()
+            + FACE_BYTES * placed.source.triangles.len()
+            + HEADER_BYTES;
+        let mut ply = Vec::with_capacity(bytes);
         write_ply(&placed, placement.unit(), &mut ply)?;
         let content = GlbContent {
             name: title.pair.as_str(),
@@ -63,7 +72,7 @@ impl ScanFiles {
             size: [print.width(), print.height()],
             extras: extras(placement, title),
         };
-        let mut glb = Vec::new();
+        let mut glb = Vec::with_capacity(bytes + png.len());
         write_glb(&placed, &content, &mut glb)?;
         Ok(Self {
             ply,

@@ -11,8 +11,8 @@ const EDGE: [u8; 3] = [213, 94, 0];
 const TRUE_EDGE: [u8; 3] = [0, 114, 178];
 /// Pixels of the longest side per pixel of edge width.
 const SIDE_PER_EDGE_PX: usize = 240;
-/// Minimal longest side of a saved overlay, pixels.
-const OVERLAY_SIDE: usize = 480;
+/// Minimal longest side of a saved overlay, pixels. An edge of one pixel then hides little of a stroke.
+const OVERLAY_SIDE: usize = 240;
 
 /// The frame of the print image, scaled for viewing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,12 +63,18 @@ impl PrintView {
 
     /// Draws the print with the edges of the aligned depth mask.
     pub fn overlay(&self, print: &PrintImage, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
-        self.overlay_on(self.print(print), depth, outcome)
+        let mut picture = self.print(print);
+        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
+        picture
     }
 
-    /// Draws the edges of the aligned depth mask on a picture of the view.
-    pub fn overlay_on(&self, mut picture: Rgb, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
-        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
+    /// Draws the edges of a mask on a picture of the view. `strokes` is in the print's frame.
+    pub fn overlay_on(&self, mut picture: Rgb, strokes: &Mask) -> Rgb {
+        if (strokes.width(), strokes.height()) == (self.width, self.height) {
+            self.draw_edges(&mut picture, strokes, EDGE);
+        } else {
+            self.draw_edges(&mut picture, &self.mask(strokes, &Affine2::IDENTITY), EDGE);
+        }
         picture
     }
 
@@ -168,14 +174,18 @@ mod tests {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::IDENTITY;
         let view = PrintView::enlarged(&blank_print());
-        let picture = view.overlay(&blank_print(), &depth(), &outcome);
-        assert_eq!((picture.width(), picture.height()), (480, 480));
-        let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
-        // The bar covers print pixels 8 to 11. Enlarged 16 times, it covers view pixels 128 to 191.
-        assert!(
-            row[0].abs_diff(128) <= 1 && row[row.len() - 1].abs_diff(191) <= 1,
-            "{row:?}"
-        );
+        assert_eq!((view.width, view.height), (240, 240));
+        let strokes = depth().stroke_mask(outcome.threshold_level);
+        let of_depth = view.overlay(&blank_print(), &depth(), &outcome);
+        let of_mask = view.overlay_on(view.print(&blank_print()), &strokes);
+        for picture in [of_depth, of_mask] {
+            let row: Vec<_> = (0..240).filter(|x| picture.at(*x, 120) == EDGE).collect();
+            // The bar covers print pixels 8 to 11. Enlarged 8 times, it covers view pixels 64 to 95.
+            assert!(
+                row[0].abs_diff(64) <= 1 && row[row.len() - 1].abs_diff(95) <= 1,
+                "{row:?}"
+            );
+        }
     }
 
     #[test]
