@@ -10,6 +10,7 @@ use super::exit::{ExitCode, Refusal};
 use super::time_text::utc;
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use crate::config::ConfigError;
+use crate::export::FolderError;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, StoreError, TargetLockError};
 
@@ -28,6 +29,9 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     if let Some(TargetLockError::InUse { .. }) = cause.downcast_ref() {
         return Some(ExitCode::InUse);
+    }
+    if let Some(FolderError::NotAnExport(_)) = cause.downcast_ref() {
+        return Some(ExitCode::Usage);
     }
     match cause.downcast_ref() {
         Some(RunError::InUse(_)) => return Some(ExitCode::InUse),

@@ -13,7 +13,7 @@ use super::table::count;
 use crate::domain::ThresholdMetric;
 use crate::export::{
     ExportFormat, ExportOptions, ExportSummary, InputFileLimits, ResultFilter, SplitBy,
-    SplitSettings, SplitShares,
+    SplitCounts, SplitSettings, SplitShares,
 };
 
 /// Arguments of `export`.
@@ -190,6 +190,9 @@ fn print_summary(
         "done": summary.pairs.done,
         "without_result": summary.pairs.without_result,
         "left_out": summary.pairs.left_out,
+        "split": summary.split.map(|SplitCounts { pairs: [train, validation, test], .. }| {
+            json!({"train": train, "validation": validation, "test": test})
+        }),
         "unreadable": unreadable.collect::<Vec<_>>(),
         "kept_earlier": summary.kept_earlier,
     }))?;
@@ -234,4 +237,17 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         args.output.display(),
         summary.pairs.without_result
     ));
+    if let Some(counts) = &summary.split {
+        let [train, validation, test] = counts.pairs;
+        context.info(&format!(
+            "split: {train} train, {validation} validation, {test} test"
+        ));
+        if counts.is_uneven() {
+            let why = match args.by {
+                SplitBy::Pair => "there are too few pairs".to_owned(),
+                by => format!("the pairs of a {by} stay together, and there are too few {by}s"),
+            };
+            context.warn(&format!("the split differs from its percentages: {why}"));
+        }
+    }
 }

@@ -20,7 +20,7 @@ use super::options::ExportOptions;
 use super::pair_writer::{FormatOutput, PairWriter, WrittenPair};
 use super::readme;
 use super::record::ManualAlignmentFields;
-use super::split::SplitPlan;
+use super::split::{SplitCounts, SplitPlan};
 use crate::catalog::{Catalog, PairResults, StoredAlignment};
 use crate::domain::PairName;
 use crate::store::Project;
@@ -35,6 +35,8 @@ const ENCODED_PER_CORE: usize = 2;
 pub struct ExportSummary {
     /// Numbers of pairs.
     pub pairs: PairCounts,
+    /// How the exported pairs were divided, if a split was requested.
+    pub split: Option<SplitCounts>,
     /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
     /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs cannot be read.
@@ -148,10 +150,16 @@ impl ExportRun {
             project: project.clone(),
             folder,
             outputs,
+            files: BTreeSet::new(),
+            summary: ExportSummary {
+                split: context
+                    .options
+                    .split
+                    .map(|split| SplitCounts::new(split.shares)),
+                ..ExportSummary::default()
+            },
             context,
             plan,
-            files: BTreeSet::new(),
-            summary: ExportSummary::default(),
         })
     }
 
@@ -193,6 +201,9 @@ impl ExportRun {
     fn append(&mut self, mut pair: WrittenPair) -> Result<(), FolderError> {
         for (output, shared) in self.outputs.iter_mut().zip(pair.shared) {
             output.writer.append(&pair.record, shared)?;
+        }
+        if let (Some(counts), Some(part)) = (&mut self.summary.split, pair.record.pair.split) {
+            counts.add(part);
         }
         self.files.append(&mut pair.files);
         if let Some(why) = pair.unreadable {

@@ -45,4 +45,4 @@ pub use record::{
     SplitName,
 };
 pub use source_print::{SourcePrint, SourcePrintError};
-pub use split::{SplitBy, SplitSettings, SplitShares};
+pub use split::{SplitBy, SplitCounts, SplitSettings, SplitShares};

@@ -78,6 +78,41 @@ impl SplitBy {
     }
 }
 
+/// Difference between the requested and the real share of a part, in percent points, above which a split is uneven.
+const UNEVEN: f64 = 10.0;
+
+/// Numbers of pairs in the parts of a split.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SplitCounts {
+    wanted: SplitShares,
+    /// Pairs in train, validation and test.
+    pub pairs: [u64; 3],
+}
+
+impl SplitCounts {
+    pub(super) const fn new(wanted: SplitShares) -> Self {
+        Self {
+            wanted,
+            pairs: [0; 3],
+        }
+    }
+
+    pub(super) const fn add(&mut self, part: SplitName) {
+        self.pairs[part as usize] += 1;
+    }
+
+    /// Returns whether the share of a part differs from the requested one by more than 10 percent points, or a requested
+    /// part is empty. Few or large groups are the reason.
+    pub fn is_uneven(&self) -> bool {
+        let total = self.pairs.iter().sum::<u64>().max(1) as f64;
+        let mut parts = self.pairs.into_iter().zip(self.wanted.0);
+        parts.any(|(pairs, wanted)| {
+            let share = 100.0 * pairs as f64 / total;
+            (share - f64::from(wanted)).abs() > UNEVEN || (pairs == 0 && wanted > 0)
+        })
+    }
+}
+
 /// A group of pairs: whether it is a single pair, and its name.
 pub(super) type SplitGroup = (bool, String);
 
@@ -133,7 +168,7 @@ impl SplitPlan {
 
 #[cfg(test)]
 mod tests {
-    use super::{SplitBy, SplitName, SplitPlan, SplitSettings, SplitShares};
+    use super::{SplitBy, SplitCounts, SplitName, SplitPlan, SplitSettings, SplitShares};
     use crate::report::test_fixtures;
     use std::collections::BTreeMap;
 
@@ -189,6 +224,19 @@ mod tests {
         pair.block = Some("a".to_owned());
         assert_eq!(SplitBy::Block.group(&pair), (false, "a".to_owned()));
         assert_eq!(SplitBy::Character.group(&pair), (true, "a".to_owned()));
+    }
+
+    #[test]
+    fn a_split_is_uneven_if_a_part_is_empty_or_far_from_its_share() {
+        let of = |pairs| SplitCounts {
+            wanted: SplitShares([80, 10, 10]),
+            pairs,
+        };
+        assert!(!of([80, 10, 10]).is_uneven());
+        assert!(!of([71, 19, 10]).is_uneven());
+        assert!(of([69, 21, 10]).is_uneven());
+        assert!(of([90, 10, 0]).is_uneven());
+        assert!(of([5, 5, 0]).is_uneven());
     }
 
     #[test]

@@ -324,7 +324,7 @@ fn an_export_replaces_one_of_another_format_and_nothing_else() {
     );
     fs::write(out.join("csv/notes.txt"), "mine").expect("written");
     let before = contents(&out);
-    let refused = export(dir.path(), &["-o", "out"]).expect(1);
+    let refused = export(dir.path(), &["-o", "out"]).expect(2);
     assert!(
         refused
             .err

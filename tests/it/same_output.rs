@@ -203,7 +203,7 @@ fn an_export_replaces_no_foreign_folder_with_a_file_of_the_same_name() {
     let mine = dir.path().join("mine");
     std::fs::create_dir(&mine).expect("a folder");
     std::fs::write(mine.join("verdicts.jsonl"), "guilty\n").expect("written");
-    let refused = at(&project, &["export", "-o", "../mine"]).expect(1);
+    let refused = at(&project, &["export", "-o", "../mine"]).expect(2);
     let wanted = "mine/verdicts.jsonl is not part of an export";
     assert!(refused.err.contains(wanted), "{}", refused.err);
     assert_eq!(
@@ -212,7 +212,7 @@ fn an_export_replaces_no_foreign_folder_with_a_file_of_the_same_name() {
     );
     at(&project, &["export", "-o", "../out"]).expect(0);
     std::fs::write(dir.path().join("out/pairs/notes.txt"), "mine").expect("written");
-    let refused = at(&project, &["export", "-o", "../out"]).expect(1);
+    let refused = at(&project, &["export", "-o", "../out"]).expect(2);
     assert!(
         refused.err.contains("out/pairs/notes.txt is not part"),
         "{}",
