@@ -26,7 +26,7 @@ pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
-use crate::domain::PoseFeatures;
+use crate::domain::{InkHypothesis, PoseFeatures};
 use crate::raster::DepthMap;
 use crate::stages::binarize::rim_share;
 use half_canvas::HalfCanvas;
@@ -34,7 +34,7 @@ use metric_thresholds::ChosenThreshold;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 19;
+pub const REVISION: u32 = 20;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
@@ -100,8 +100,13 @@ pub fn register(
         normalized.outcome.canvas_px,
     );
     let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
-    let light_on_dark = normalized.outcome.inks[search.ink].light_on_dark;
-    require_tops(depth, light_on_dark, &thresholds, params)?;
+    require_tops(
+        depth,
+        &normalized.outcome.inks,
+        search.ink,
+        &thresholds,
+        params,
+    )?;
     let features = with_unmatched(refined.features, &canvas, &thresholds);
     require_character(&features, params)?;
     let alignments: Vec<Alignment> = thresholds
@@ -134,7 +139,8 @@ pub fn register(
     Ok(registered)
 }
 
-/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character.
+/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also
+/// refuses less unlikely pairs whose mirrored relief matches better.
 fn require_character(
     features: &PoseFeatures,
     params: &RegisterParams,
@@ -143,26 +149,37 @@ fn require_character(
         confidence::of_pose(features),
         confidence::of_character(features),
     ];
+    if features.mirrored > 1.0 && pose * character < params.min_confidence {
+        return Err(RegisterError::Mirrored {
+            times: features.mirrored,
+        });
+    }
     if pose * character < UNLIKELY * params.min_confidence {
         return Err(RegisterError::OtherCharacter { pose, character });
     }
     Ok(())
 }
 
-/// Refuses pairs whose print was read as light strokes on dark, and whose tops surround the character.
+/// Refuses pairs whose print was read as light strokes on dark, if dark strokes are likelier or the tops surround the
+/// character. A mirrored relief that is seen from the back matches the light background of a dark print, and no score of
+/// the alignment shows it.
 fn require_tops(
     depth: &DepthMap,
-    light_on_dark: bool,
+    inks: &[InkHypothesis],
+    ink: usize,
     thresholds: &[ChosenThreshold],
     params: &RegisterParams,
 ) -> Result<(), RegisterError> {
-    // The last threshold is that of the metric `relief`.
-    let Some(chosen) = thresholds.last().filter(|_| light_on_dark) else {
+    if !inks[ink].light_on_dark || params.min_confidence == 0.0 {
         return Ok(());
-    };
-    let tops = depth.stroke_mask(chosen.choice.level);
-    let known = depth.levels.map(|level| *level != 0);
-    if params.min_confidence > 0.0 && rim_share(&tops, &known) > TOPS_AT_RIM {
+    }
+    // The last threshold is that of the metric `relief`.
+    let surround = thresholds.last().is_some_and(|chosen| {
+        let tops = depth.stroke_mask(chosen.choice.level);
+        let known = depth.levels.map(|level| *level != 0);
+        rim_share(&tops, &known) > TOPS_AT_RIM
+    });
+    if surround || !inks[0].light_on_dark {
         return Err(RegisterError::Inverted);
     }
     Ok(())

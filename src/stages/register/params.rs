@@ -68,7 +68,8 @@ pub enum RegisterError {
         /// Smallest that counts.
         needs: f64,
     },
-    /// The print was read as light strokes on dark, and its strokes match the valleys of the relief.
+    /// The relief matches the print only if light areas are ink. The print shows dark ink, or the areas surround the
+    /// character.
     #[error(
         "the strokes of the print match the valleys of the relief, not its tops; was the mesh mirrored, or does it show the back of the scanned surface?"
     )]
@@ -101,7 +102,7 @@ const LARGEST_RATIO: f64 = 100.0;
 /// Formats the ratio of two scores.
 fn ratio(times: f64) -> String {
     if times < LARGEST_RATIO {
-        format!("{times:.1} times")
+        format!("{times:.2} times")
     } else {
         format!("more than {LARGEST_RATIO} times")
     }

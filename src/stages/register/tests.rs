@@ -3,7 +3,10 @@
 use super::{
     ChosenThreshold, RegisterError, RegisterParams, require_character, require_match, require_tops,
 };
-use crate::domain::{MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice, ThresholdMetric};
+use crate::domain::{
+    Affine2, InkHypothesis, MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice,
+    ThresholdMetric,
+};
 use crate::mesh::Mesh;
 use crate::raster::{DepthMap, Grid};
 use crate::stages::StageError;
@@ -77,7 +80,7 @@ fn a_mirrored_mesh_never_passes() {
         "{error}"
     );
     let text = |times| RegisterError::Mirrored { times }.to_string();
-    assert!(text(2.34).contains("(2.3 times as well)"));
+    assert!(text(2.34).contains("(2.34 times as well)"));
     assert!(text(34_847.79).contains("(more than 100 times as well)"));
 }
 
@@ -252,6 +255,14 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
         ..alike
     };
     assert_eq!(require_character(&dry, &params), Ok(()));
+    let mirrored = PoseFeatures {
+        mirrored: 1.02,
+        ..dry
+    };
+    assert_eq!(
+        require_character(&mirrored, &params),
+        Err(RegisterError::Mirrored { times: 1.02 })
+    );
     let any = RegisterParams {
         min_confidence: 0.0,
         ..params
@@ -277,9 +288,21 @@ fn light_prints_of_a_surface_seen_from_its_back_are_refused() {
         probability_right: 1.0,
     }];
     let (front, back) = (map(2000, 1), map(1, 2000));
-    let check = |map: &DepthMap, is_light| require_tops(map, is_light, &thresholds, &params);
-    assert_eq!(check(&front, true), Ok(()));
-    assert_eq!(check(&front, false), Ok(()));
-    assert_eq!(check(&back, false), Ok(()));
-    assert_eq!(check(&back, true), Err(RegisterError::Inverted));
+    let ink = |light_on_dark| InkHypothesis {
+        threshold_print: 30_000.0,
+        light_on_dark,
+        canvas_from_print: Affine2::IDENTITY,
+    };
+    let (dark_first, light_first) = ([ink(false), ink(true)], [ink(true), ink(false)]);
+    let check = |map: &DepthMap, inks: &[InkHypothesis], chosen| {
+        require_tops(map, inks, chosen, &thresholds, &params)
+    };
+    for map in [&front, &back] {
+        assert_eq!(check(map, &dark_first, 0), Ok(()));
+        assert_eq!(check(map, &light_first, 1), Ok(()));
+        // The dark areas are more likely to be ink.
+        assert_eq!(check(map, &dark_first, 1), Err(RegisterError::Inverted));
+    }
+    assert_eq!(check(&front, &light_first, 0), Ok(()));
+    assert_eq!(check(&back, &light_first, 0), Err(RegisterError::Inverted));
 }
