@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 /// Largest number of faces that are sampled.
 const SAMPLES: usize = 30_000;
 /// Normals within this angle, in radians, belong to the same plane.
-const SAME: f64 = 0.26;
+pub(super) const SAME: f64 = 0.26;
 /// Directions closer than this angle, in radians, count as one, because the fit of a side corrects smaller tilts.
 const DISTINCT: f64 = 0.2;
 /// A plane is large if the faces with normals within [`SAME`] of its normal have at least this share of the area of all

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use super::carved_side::AGREEMENT;
 use super::directions::{candidates, facets};
 use super::height_samples::DEEPEST;
+use super::near_plane::near_plane;
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
@@ -90,9 +91,18 @@ pub(super) fn search(
             found.extend(search.middle_of_grid(whole, share));
         }
     }
+    if found.iter().all(|side| side.agreement < LEAST)
+        && let Some(whole) = blocks.first()
+    {
+        found.extend(search.near_planes(whole));
+    }
     let best = found
         .iter()
         .max_by(|a, b| a.agreement.total_cmp(&b.agreement))?;
+    eprintln!(
+        "usual {usual:.3} best {:.3} normal {:?}",
+        best.agreement, best.plane_from_mesh.0[2]
+    );
     if best.agreement < least_agreement(usual) {
         return None;
     }
@@ -162,6 +172,17 @@ impl SideSearch<'_> {
         let indexed = IndexedSurface::new(&face);
         let seen = fit_view(&indexed, &seen.plane_from_mesh, curved, COARSE)?;
         self.judged(&face, &indexed, &seen, start)
+    }
+
+    /// Returns the carved sides among the parts near large planes.
+    fn near_planes(self, mesh: &Mesh) -> Vec<JudgedSide> {
+        let facets = facets(mesh);
+        let axes = Axes::of_surface(mesh, &IndexedSurface::new(mesh));
+        let normals = candidates(&axes, &facets).into_iter();
+        let parts = normals.filter_map(|normal| near_plane(mesh, &facets, normal));
+        parts
+            .filter_map(|(part, start)| self.candidate(&part, &IndexedSurface::new(&part), &start))
+            .collect()
     }
 
     /// Returns a fitted side with its agreement, or `None` if the side is not carved.
