@@ -12,6 +12,8 @@ const LEAST_POINTS: usize = 16;
 /// A carving is at most about this many times as deep as the median of its ground. Lower points are side walls of the
 /// block, its foot, or a table.
 pub(super) const DEEPEST: f64 = 1.8;
+/// A carving is not deeper than this share of the extent of its side.
+pub(super) const DEEPEST_CARVING: f64 = 0.2;
 /// Least share of the points below the carving at which they are left out.
 const DEEP_SHARE: f64 = 0.01;
 
@@ -119,10 +121,19 @@ impl HeightSamples {
         residuals.iter().zip(&self.places).map(sample).collect()
     }
 
+    /// Returns the heights of the carved face. Side walls and a protruding foot of the block may be visible around the
+    /// face, and debris higher above the surface than any carving; they are neither tops nor ground.
+    pub(super) fn face_heights(&self, samples: &[PositionedHeight]) -> Vec<f32> {
+        let highest = (DEEPEST_CARVING * self.extent) as f32;
+        let low = samples.iter().filter(|sample| sample.height < highest);
+        let low: Vec<PositionedHeight> = low.copied().collect();
+        Face::of(&low).heights(&low)
+    }
+
     /// Leaves out the points that are deeper below the mean plane than any carving. Does nothing if there are few.
     fn without_depths(self) -> Self {
         let samples = self.positioned_heights(&self.mean_plane);
-        let Some(split) = binarize::split(&mut Face::of(&samples).heights(&samples)) else {
+        let Some(split) = binarize::split(&mut self.face_heights(&samples)) else {
             return self;
         };
         let lowest = split.high - DEEPEST * (split.high - split.low);

@@ -20,6 +20,9 @@ const MIN_TOPS: f64 = 0.02;
 /// When the depth of the carving is measured, one height in this many is ignored at either end.
 const TRIMMED_ONE_IN: usize = 100;
 
+/// Largest share of the visible area that is debris.
+const DEBRIS: f64 = 0.04;
+
 /// Surface and measurements of one side.
 #[derive(Debug)]
 pub(super) struct FittedSide {
@@ -231,6 +234,46 @@ fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
 }
 
 /// Returns the depth of the carving: the median of the tops minus the median of the ground, without extreme heights.
+/// Leaves out debris, which is a small area far above the surface of the tops.
 fn relief(residuals: &mut [f32]) -> f64 {
-    binarize::split_inner(residuals, TRIMMED_ONE_IN).map_or(0.0, |split| split.high - split.low)
+    let Some(split) = binarize::split_inner(residuals, TRIMMED_ONE_IN) else {
+        return 0.0;
+    };
+    let relief = split.high - split.low;
+    // The heights are sorted now.
+    let below = residuals.partition_point(|height| f64::from(*height) < split.threshold);
+    let above = residuals.len() - below;
+    if split.high < relief / 2.0 || above as f64 > DEBRIS * residuals.len() as f64 {
+        return relief;
+    }
+    self::relief(&mut residuals[..below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::relief;
+
+    /// Returns heights over the surface of the tops: `tops` at 0, 60 at -1, and `debris` at 7.
+    fn heights(tops: usize, debris: usize) -> Vec<f32> {
+        let noise = |k: usize| (k % 7) as f32 * 0.005;
+        let of = |count: usize, height: f32| (0..count).map(move |k| height + noise(k));
+        of(60, -1.0)
+            .chain(of(tops, 0.0))
+            .chain(of(debris, 7.0))
+            .collect()
+    }
+
+    #[test]
+    fn a_small_area_far_above_the_tops_does_not_change_the_relief() {
+        let measured = [0, 1, 3].map(|debris| relief(&mut heights(40, debris)));
+        assert!(
+            measured.iter().all(|relief| (relief - 1.0).abs() < 0.02),
+            "{measured:?}"
+        );
+    }
+
+    #[test]
+    fn a_larger_area_above_the_surface_is_a_carving() {
+        assert!(relief(&mut heights(0, 10)) > 7.0);
+    }
 }

@@ -7,7 +7,6 @@ use super::height_samples::{HeightSamples, quantile};
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
-use crate::stages::face::Face;
 use crate::stages::pose::SoftMask;
 
 /// Weight of points above the surface in the first passes, which solve a convex problem. Points below weigh
@@ -190,11 +189,9 @@ impl HeightSamples {
         residuals
     }
 
-    /// Returns the heights of the carved face over a surface, in mesh units. Side walls and a protruding foot of the
-    /// block may be visible around the face, and are neither tops nor ground.
+    /// Returns the heights of the carved face over a surface, in mesh units.
     pub(super) fn face_residuals(&self, surface: &Surface) -> Vec<f32> {
-        let samples = self.positioned_heights(&surface.coefficients);
-        Face::of(&samples).heights(&samples)
+        self.face_heights(&self.positioned_heights(&surface.coefficients))
     }
 
     /// Returns an image of the nearness to the surface: 1 on or above it, falling to 0 at half the relief below it.

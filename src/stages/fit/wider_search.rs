@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use super::carved_side::AGREEMENT;
 use super::directions::{candidates, facets};
-use super::height_samples::DEEPEST;
+use super::height_samples::{DEEPEST, DEEPEST_CARVING};
 use super::near_plane::near_plane;
 use super::params::FitParams;
 use super::pca::{Axes, frame, frame_along};
@@ -37,8 +37,6 @@ const RIVAL: f64 = 0.5;
 const LEAST_RIVAL: f64 = 0.1;
 /// A region extends above the surface by this many times the relief. Anything higher floats or is a spike.
 const HIGHEST: f64 = 1.0;
-/// A carving is not deeper than this share of the extent of its side.
-const DEEPEST_CARVING: f64 = 0.2;
 /// If at least this share of the visible area lies deeper than any carving, that area is cut off.
 const DEEP_AREA: f64 = 0.02;
 /// Shares of the width and height of a grid of characters that are tried for the middle character.

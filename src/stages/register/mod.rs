@@ -40,6 +40,10 @@ pub const REVISION: u32 = 20;
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
+/// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
+/// symmetric character by a few percent.
+const MIRROR_LIKELY: f64 = 1.04;
+
 /// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
 /// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
 /// strokes without a partner too.
@@ -149,7 +153,7 @@ fn require_character(
         confidence::of_pose(features),
         confidence::of_character(features),
     ];
-    if features.mirrored > 1.0 && pose * character < params.min_confidence {
+    if features.mirrored > MIRROR_LIKELY && pose * character < params.min_confidence {
         return Err(RegisterError::Mirrored {
             times: features.mirrored,
         });

@@ -256,12 +256,12 @@ fn a_pair_with_strokes_elsewhere_is_refused() {
     };
     assert_eq!(require_character(&dry, &params), Ok(()));
     let mirrored = PoseFeatures {
-        mirrored: 1.02,
+        mirrored: 1.05,
         ..dry
     };
     assert_eq!(
         require_character(&mirrored, &params),
-        Err(RegisterError::Mirrored { times: 1.02 })
+        Err(RegisterError::Mirrored { times: 1.05 })
     );
     let any = RegisterParams {
         min_confidence: 0.0,
