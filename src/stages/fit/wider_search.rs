@@ -97,10 +97,6 @@ pub(super) fn search(
     let best = found
         .iter()
         .max_by(|a, b| a.agreement.total_cmp(&b.agreement))?;
-    eprintln!(
-        "usual {usual:.3} best {:.3} normal {:?}",
-        best.agreement, best.plane_from_mesh.0[2]
-    );
     if best.agreement < least_agreement(usual) {
         return None;
     }
