@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use clap::builder::{Resettable, StyledStr};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
+use super::examples::{with_examples, without_global_options};
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
@@ -72,9 +73,9 @@ pub(super) enum Command {
     Man(man::ManArgs),
 }
 
-/// Returns the clap command. Backticks are removed from its help texts.
+/// Returns the clap command with examples. Backticks are removed from its help texts.
 pub(super) fn command() -> clap::Command {
-    without_backticks(Cli::command())
+    with_examples(without_backticks(Cli::command()))
 }
 
 fn without_backticks(command: clap::Command) -> clap::Command {
@@ -101,7 +102,7 @@ const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 
 /// Parses a command line.
 pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
-    let command = command().color(help_color(args));
+    let command = without_global_options(command().color(help_color(args)));
     let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
     // If a flag is given before and after the command's name, clap keeps only the values after it.
     cli.global.set = values_of("--set", args);

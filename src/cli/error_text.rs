@@ -7,7 +7,7 @@ use rustix::io::Errno;
 use rustix::process::{Resource, getrlimit};
 
 use super::exit::{ExitCode, Refusal};
-use super::time_text::utc;
+use super::time_text::local;
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use crate::config::ConfigError;
 use crate::export::FolderError;
@@ -211,7 +211,7 @@ fn log_lost(path: &str, loss: LogLoss) -> String {
         LogLoss::Since(at) => format!(
             "{what}; results and verdicts stored since {} may be lost: `check` tells whether the catalog is whole, \
              `run` computes missing results again, a backup replaces a damaged catalog",
-            utc(at)
+            local(at)
         ),
     }
 }

@@ -12,6 +12,7 @@ use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::files;
 use super::manifest_file::Listing;
+use super::missing_files::MissingFiles;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary, NewCatalog};
@@ -24,8 +25,6 @@ const CHUNK_ROWS: usize = 2_000;
 const WAITING_CHUNKS: usize = 2;
 /// A chunk ends with the row that reaches this many bytes of memory.
 const CHUNK_BYTES: usize = 2 << 20;
-/// Maximum number of missing files that `--json` lists.
-const MAX_MISSING: usize = 1000;
 
 /// End of the message when the file of true alignments is refused.
 const NOT_IMPORTED: &str = "nothing was imported";
@@ -49,6 +48,9 @@ pub(super) struct ImportArgs {
     /// True alignments, one JSON object per line; the report then gives the errors against them
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
+    /// Import pairs whose files do not exist yet; they fail if they are run before
+    #[arg(long)]
+    pub(super) allow_missing: bool,
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -68,23 +70,6 @@ pub(super) struct ImportOutcome {
     warnings: Vec<String>,
 }
 
-/// Files of a list that do not exist.
-#[derive(Debug, Default)]
-struct MissingFiles {
-    /// Messages of the first [`MAX_MISSING`] files.
-    lines: Vec<String>,
-    count: usize,
-}
-
-impl MissingFiles {
-    fn add(&mut self, line: String) {
-        self.count += 1;
-        if self.lines.len() < MAX_MISSING {
-            self.lines.push(line);
-        }
-    }
-}
-
 /// Imports pairs. If the import fails, no pair is imported.
 ///
 /// # Errors
@@ -102,7 +87,11 @@ pub(super) async fn import_pairs(
     };
     let project = Project::at(&dir);
     let truths = stored_truths(truths, &project)?;
-    let list = Arc::new(ImportList { listing, truths });
+    let list = Arc::new(ImportList {
+        listing,
+        truths,
+        allow_missing: args.allow_missing,
+    });
     let missing_dirs = missing_dirs(&dir);
     let stored = store(&project, &list).await;
     if stored.is_err() {
@@ -122,6 +111,8 @@ pub(super) async fn import_pairs(
 struct ImportList {
     listing: Listing,
     truths: Vec<(PairName, Value)>,
+    /// Whether files may be missing.
+    allow_missing: bool,
 }
 
 /// The summary of an import, the number of stored true alignments, and the missing files.
@@ -180,7 +171,7 @@ async fn store_in(
 ) -> anyhow::Result<StoredList> {
     let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
     let (project, shared) = (project.clone(), Arc::clone(list));
-    let sent = tokio::task::spawn_blocking(move || send_rows(&shared.listing, &project, &sender));
+    let sent = tokio::task::spawn_blocking(move || send_rows(&shared, &project, &sender));
     let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
     // Return a row's error first, because the catalog then only reports that the list ended early.
     let missing = sent
@@ -191,14 +182,18 @@ async fn store_in(
 }
 
 /// Sends the rows to the catalog in chunks. Returns the missing files.
+///
+/// # Errors
+/// Returns an error if files are missing that must exist, or the path of a file cannot be stored. The catalog then
+/// imports nothing.
 fn send_rows(
-    listing: &Listing,
+    list: &ImportList,
     project: &Project,
     sender: &mpsc::Sender<ImportChunk>,
 ) -> anyhow::Result<MissingFiles> {
     let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
     let mut outcome = Ok(());
-    listing.rows(|row, lines| {
+    list.listing.rows(|row, lines| {
         for line in lines {
             missing.add(line);
         }
@@ -217,6 +212,9 @@ fn send_rows(
         }
     });
     outcome?;
+    if missing.count > 0 && !list.allow_missing {
+        return Err(missing.refusal().into());
+    }
     for last in [ImportChunk::Rows(chunk), ImportChunk::End] {
         let _ = sender.blocking_send(last);
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
+use super::input_paths::on_disk;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
@@ -109,7 +110,12 @@ impl Listing {
 
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
     pub(super) fn rows(&self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
-        let mut each = |row: ManifestRow| {
+        let mut each = |mut row: ManifestRow| {
+            for path in [&mut row.mesh, &mut row.print] {
+                if let Some(found) = on_disk(path) {
+                    *path = found;
+                }
+            }
             let missing = missing_files(&self.row_label, &row);
             each(row, missing);
         };
@@ -142,7 +148,7 @@ struct SimilarIds {
 
 impl SimilarIds {
     fn add(&mut self, name: &PairName) {
-        let hash = ContentHash::of(name.as_str().to_ascii_lowercase().as_bytes());
+        let hash = ContentHash::of(name.as_str().to_lowercase().as_bytes());
         let prefix = std::array::from_fn(|at| hash.as_bytes()[at]);
         let is_new = self.seen.insert(prefix);
         match (is_new, &self.first) {

@@ -8,7 +8,7 @@ use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
-use super::time_text::utc;
+use super::time_text::local;
 use super::verdict;
 use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, Stage, ThresholdMetric};
@@ -66,7 +66,11 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
             "  nothing left to do".to_owned()
         }
     });
-    lines.extend(detail.run_at.map(|at| format!("  not before {}", utc(at))));
+    lines.extend(
+        detail
+            .run_at
+            .map(|at| format!("  not before {}", local(at))),
+    );
     lines.join("\n")
 }
 

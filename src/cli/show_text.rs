@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use super::time_text::{duration, utc};
+use super::time_text::{duration, local};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
@@ -109,7 +109,7 @@ impl PairPage<'_> {
                 one_line(&failed.failure.message),
                 failed.failure.class,
                 failed.stage,
-                utc(failed.at)
+                local(failed.at)
             ),
             None => String::new(),
         }
@@ -160,7 +160,7 @@ impl PairPage<'_> {
             }
         };
         vec![
-            format!("  {}", utc(attempt.at)),
+            format!("  {}", local(attempt.at)),
             attempt.stage.to_string(),
             attempt.ms.map_or_else(String::new, duration),
             outcome,
@@ -293,7 +293,7 @@ fn manual_line(manual: &ManualResult) -> String {
     let note = made.note.as_deref().map(|note| format!(" ({note})"));
     format!(
         "  {}  {}: {change}{}",
-        utc(manual.stored.at),
+        local(manual.stored.at),
         made.reviewer,
         note.unwrap_or_default()
     )

@@ -6,20 +6,24 @@ use jiff::tz::TimeZone;
 
 use crate::domain::UnixMillis;
 
-/// Formats a time in UTC: `2026-11-21 04:10:03`.
-pub(super) fn utc(at: UnixMillis) -> String {
-    datetime(at).strftime("%Y-%m-%d %H:%M:%S").to_string()
+/// Formats a time in the time zone of the computer, with its offset from UTC: `2026-11-21 11:10:03 +07:00`.
+pub(super) fn local(at: UnixMillis) -> String {
+    in_zone(at, TimeZone::system())
+}
+
+fn in_zone(at: UnixMillis, zone: TimeZone) -> String {
+    let time = timestamp(at).to_zoned(zone);
+    time.strftime("%Y-%m-%d %H:%M:%S %:z").to_string()
 }
 
 /// Formats a day in UTC: `2026-11-21`.
 pub(super) fn day(at: UnixMillis) -> String {
-    datetime(at).date().to_string()
+    TimeZone::UTC.to_datetime(timestamp(at)).date().to_string()
 }
 
-/// Returns the calendar time in UTC. Returns the Unix epoch for times outside the years -9999 to 9999.
-fn datetime(at: UnixMillis) -> DateTime {
-    let time = Timestamp::from_millisecond(at).unwrap_or(Timestamp::UNIX_EPOCH);
-    TimeZone::UTC.to_datetime(time)
+/// Returns a time; the Unix epoch for times outside the years -9999 to 9999.
+fn timestamp(at: UnixMillis) -> Timestamp {
+    Timestamp::from_millisecond(at).unwrap_or(Timestamp::UNIX_EPOCH)
 }
 
 /// Parses a time: `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`. A time without an offset is in UTC.
@@ -52,14 +56,21 @@ pub(super) fn rough_duration(ms: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{day, duration, parse_utc, utc};
+    use jiff::tz::{Offset, TimeZone};
+
+    use super::{day, duration, in_zone, parse_utc};
 
     #[test]
-    fn known_times_are_formatted_in_utc() {
-        assert_eq!(utc(0), "1970-01-01 00:00:00");
-        assert_eq!(utc(951_782_400_000), "2000-02-29 00:00:00");
-        assert_eq!(utc(1_795_234_203_999), "2026-11-21 04:10:03");
-        assert_eq!(utc(-1000), "1969-12-31 23:59:59");
+    fn known_times_are_formatted_with_their_zone() {
+        let utc = |at| in_zone(at, TimeZone::UTC);
+        assert_eq!(utc(0), "1970-01-01 00:00:00 +00:00");
+        assert_eq!(utc(951_782_400_000), "2000-02-29 00:00:00 +00:00");
+        assert_eq!(utc(-1000), "1969-12-31 23:59:59 +00:00");
+        let hanoi = TimeZone::fixed(Offset::constant(7));
+        assert_eq!(
+            in_zone(1_795_234_203_999, hanoi),
+            "2026-11-21 11:10:03 +07:00"
+        );
         assert_eq!(day(1_795_234_203_999), "2026-11-21");
     }
 
@@ -72,7 +83,7 @@ mod tests {
             -1000,
             4_102_444_799_000,
         ] {
-            assert_eq!(parse_utc(&utc(at)), Some(at));
+            assert_eq!(parse_utc(&super::timestamp(at).to_string()), Some(at));
         }
         assert_eq!(parse_utc("2000-02-29"), Some(951_782_400_000));
         for text in ["2026-11-21T04:10:03Z", "2026-11-21T11:10:03+07:00"] {

@@ -12,7 +12,7 @@ use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::table::{columns, count};
-use super::time_text::{duration, utc};
+use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
 use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
@@ -240,12 +240,12 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         Verdict::Unsure => Tone::Warn,
     };
     let state = match (event.undone_at, event.current) {
-        (Some(at), _) => format!("undone {}", utc(at)),
+        (Some(at), _) => format!("undone {}", local(at)),
         (None, true) => String::new(),
         (None, false) => "on an older result".to_owned(),
     };
     vec![
-        utc(event.at),
+        local(event.at),
         event.pair.to_string(),
         event.metric.to_string(),
         palette.paint(tone, event.verdict),

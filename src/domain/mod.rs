@@ -12,6 +12,7 @@ mod ids;
 mod job;
 mod metric;
 mod outcome;
+mod pair_name;
 mod print_outline;
 mod review_order;
 mod sanitize;
@@ -31,7 +32,7 @@ pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use height_from_mesh::HeightFromMesh;
-pub use ids::{PairId, PairName, PairNameError, WorkerId};
+pub use ids::{PairId, WorkerId};
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
@@ -39,6 +40,7 @@ pub use outcome::{
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };
+pub use pair_name::{PairName, PairNameError};
 pub use print_outline::PrintOutline;
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};

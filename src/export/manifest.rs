@@ -13,6 +13,7 @@ use serde_json::Value;
 
 use super::format::ExportFormat;
 use super::options::ExportOptions;
+use crate::domain::PairName;
 
 /// Name of the manifest.
 pub(super) const MANIFEST: &str = "export.json";
@@ -148,7 +149,7 @@ fn matches(pattern: &[&str], path: &[String]) -> bool {
                     let id = name
                         .strip_prefix(before)
                         .and_then(|rest| rest.strip_suffix(after));
-                    id.is_some_and(|id| crate::domain::PairName::new(id).is_ok())
+                    id.is_some_and(|id| PairName::of_file_name(id).is_some())
                 }
             })
 }
@@ -190,7 +191,7 @@ mod tests {
         let all = [
             "pairs.jsonl",
             "pairs/a/print.png",
-            "pairs/b-1/relief/overlay.png",
+            "pairs/chữ số 1%3F/relief/overlay.png",
             "train/a.mask.png",
         ];
         assert_eq!(found(FILES, &all), None);
@@ -206,7 +207,7 @@ mod tests {
             (FILES, "pairs/a/notes.txt", "pairs/a/notes.txt"),
             (FILES, "pairs/a/mine/overlay.png", "pairs/a/mine"),
             (FILES, "pairs/a/print.png/x", "pairs/a/print.png"),
-            (FILES, "pairs/a b/print.png", "pairs/a b"),
+            (FILES, "pairs/a:b/print.png", "pairs/a:b"),
             (FILES, "train/.mask.png", "train/.mask.png"),
             (FILES, "train/a.mask.png.orig", "train/a.mask.png.orig"),
         ] {

@@ -7,7 +7,7 @@ use super::format_writer::EncodedPair;
 use super::pair_pictures::{PairPictures, PictureError};
 use crate::catalog::MetricRecord;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
-use crate::domain::{DepthScale, LengthUnit, MetricOutcome, Stage, ThresholdMetric};
+use crate::domain::{DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric};
 use crate::raster::{compact_grey16, compact_mask, compact_rgb8};
 use crate::report::pair_artifacts::same_alignment;
 
@@ -40,9 +40,9 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Returns the paths of a pair: replaces `*` by its id.
-    pub(super) fn of_pair(self, id: &str) -> Self {
-        let path = |pattern: String| pattern.replace('*', id);
+    /// Returns the paths of a pair: replaces `*` by the file name of its id.
+    pub(super) fn of_pair(self, id: &PairName) -> Self {
+        let path = |pattern: String| pattern.replace('*', &id.file_name());
         Self {
             print: path(self.print),
             print_mask: path(self.print_mask),

@@ -149,13 +149,14 @@ impl PairWriter<'_> {
         result: Option<&PairPictures<'_>>,
     ) -> Result<FormatFiles, WriteError> {
         let view = PairView { record, result };
-        let path = |pattern: &str| pattern.replace('*', record.pair.id.as_str());
+        let path = |pattern: &str| pattern.replace('*', &record.pair.id.file_name());
         let mut written = FormatFiles::default();
         for output in self.outputs {
             let EncodedPair { files, shared } = match output.writer.encode(&view) {
                 Ok(encoded) => encoded,
                 Err(error) => {
-                    for pattern in &written.files {
+                    // Other pairs may share files without the id in their names.
+                    for pattern in written.files.iter().filter(|name| name.contains('*')) {
                         remove_below(self.root, &path(pattern))?;
                     }
                     return Err(error.into());

@@ -60,7 +60,7 @@ pub struct PairRecord {
 /// The fields of a pair that its metrics share.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PairFields {
-    /// Id of the pair: letters A-Z and a-z, digits, `_` and `-`.
+    /// Id of the pair, in Unicode's composed form.
     pub id: PairName,
     /// The character, as text from the manifest.
     pub character: Option<String>,

@@ -76,7 +76,7 @@ impl SamplePicture {
     /// Returns the name of the picture's file and its content, as `picture_cells` reads them. `id` is the id of the
     /// pair.
     pub(super) fn named(self, id: &PairName) -> [Vec<u8>; 2] {
-        let name = format!("{id}.{}.{}", self.name, self.extension);
+        let name = format!("{}.{}.{}", id.file_name(), self.name, self.extension);
         [name.into_bytes(), self.bytes]
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
 use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
-use super::text::{LineCounter, as_utf8, delimiter};
+use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
 /// ignored.
@@ -100,7 +100,8 @@ impl CsvHeader {
         let mut columns = Vec::new();
         for (number, field) in (1..).zip(record) {
             let Ok(name) = std::str::from_utf8(field) else {
-                let reason = format!("the name of column {number} is not UTF-8");
+                let hint = encoding_hint(field);
+                let reason = format!("the name of column {number} is not UTF-8{hint}");
                 problems.add(at_line(line, &reason));
                 continue;
             };
@@ -143,7 +144,8 @@ impl CsvHeader {
         for ((known, name), cell) in columns.iter().zip(record) {
             let Ok(cell) = std::str::from_utf8(cell) else {
                 let name = known.unwrap_or(name);
-                return Err(format!("the cell of column {name:?} is not UTF-8"));
+                let hint = encoding_hint(cell);
+                return Err(format!("the cell of column {name:?} is not UTF-8{hint}"));
             };
             if let Some(known) = known {
                 draft.cells.insert(known, cell.to_owned());
@@ -155,15 +157,27 @@ impl CsvHeader {
     }
 }
 
+/// Largest number of wrong, missing or swapped letters in a misspelt name of a column.
+const SIMILAR: usize = 2;
+
 fn missing_column(name: &str, record: &::csv::ByteRecord) -> String {
     let found: Vec<_> = record
         .iter()
         .take(12)
         .map(|field| String::from_utf8_lossy(field))
         .collect();
+    let shown = found.join(", ");
+    let is_similar = |field: &&std::borrow::Cow<'_, str>| {
+        let field = field.trim().to_lowercase();
+        known_column(&field).is_none() && strsim::osa_distance(&field, name) <= SIMILAR
+    };
+    let hint = found.iter().find(is_similar).map(|field| {
+        let field = field.trim();
+        format!("; rename {field:?} to {name:?} if it is meant")
+    });
     format!(
-        "column {name:?} is missing; the header has: {}",
-        found.join(", ")
+        "column {name:?} is missing{}; the header has: {shown}",
+        hint.unwrap_or_default()
     )
 }
 
@@ -234,7 +248,7 @@ mod tests {
         assert_eq!(
             refusal(text).lines().collect::<Vec<_>>(),
             [
-                "line 3: id \"a/b\" holds '/'; an id is made of letters A-Z, digits, _ and -",
+                "line 3: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
                 "line 4: the id is empty",
                 "line 5: id \"a\" is already on line 2",
                 "line 6: mesh is empty",
@@ -267,7 +281,7 @@ mod tests {
         assert_eq!(
             refusal(&text).lines().collect::<Vec<_>>(),
             [
-                "line 4: id \"a/b\" holds '/'; an id is made of letters A-Z, digits, _ and -",
+                "line 4: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
                 "line 6: the row has more than 1048576 bytes; a closing quotation mark may be missing",
             ]
         );
@@ -294,6 +308,22 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "line 3: the cell of column \"mesh\" is not UTF-8"
+        );
+        // "chữ" in Windows-1258: "ch", "ư" and a combining tilde.
+        let error = super::parse_csv(b"id,mesh,print\na,ch\xfd\xde.stl,c\n").expect_err("bytes");
+        assert_eq!(
+            error.to_string(),
+            "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
+             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
+        );
+    }
+
+    #[test]
+    fn a_misspelt_column_is_named() {
+        assert_eq!(
+            refusal("id,mech,print\na,b,c\n"),
+            "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
+             mech, print"
         );
     }
 }

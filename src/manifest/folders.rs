@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 
+use unicode_normalization::UnicodeNormalization as _;
+
 use super::error::{ManifestError, at_file};
 use super::row::ManifestRow;
 use crate::domain::PairName;
@@ -86,7 +88,8 @@ struct Stem {
 
 impl Stem {
     fn of(path: &Path) -> Option<Self> {
-        let text = path.file_stem()?.to_string_lossy().into_owned();
+        // A mesh named on macOS and a print named on Windows may have different forms of the same letters.
+        let text: String = path.file_stem()?.to_string_lossy().nfc().collect();
         let number = text.parse().ok();
         Some(Self {
             rank: (number.is_none(), number.unwrap_or(0)),
@@ -165,6 +168,12 @@ mod tests {
         assert_eq!(found.meshes_alone, files(&["m/9.stl"]));
         assert_eq!(found.prints_alone, files(&["p/77.png"]));
         assert_eq!(found.ignored, files(&["m/a.mtl"]));
+        let vietnamese = pair_folders(
+            &files(&["m/chữ số 1.stl"]),
+            &files(&["p/chu\u{31b}\u{303} so\u{302}\u{301} 1.png"]),
+        );
+        let vietnamese = vietnamese.expect("a pair");
+        assert_eq!(vietnamese.rows[0].name.as_str(), "chữ số 1");
         let reversed: Vec<_> = meshes.into_iter().rev().collect();
         assert_eq!(pair_folders(&reversed, &prints).expect("pairs"), found);
     }
@@ -180,10 +189,13 @@ mod tests {
 
     #[test]
     fn stems_that_are_not_valid_ids_are_reported_by_file() {
-        let error = pair_folders(&files(&["x y.stl", "b.stl"]), &files(&["x y.png", "b.png"]));
+        let error = pair_folders(
+            &files(&["x\ty.stl", "b.stl"]),
+            &files(&["x\ty.png", "b.png"]),
+        );
         assert_eq!(
-            error.expect_err("space").to_string(),
-            "x y.stl: id \"x y\" holds ' '; an id is made of letters A-Z, digits, _ and -"
+            error.expect_err("a tab").to_string(),
+            "x y.stl: id \"x y\" holds '\\t'; an id has no slashes, control or invisible characters"
         );
         let none = pair_folders(&files(&["a.stl"]), &files(&["b.png"]));
         assert_eq!(

@@ -25,6 +25,33 @@ pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
     }
 }
 
+/// Bytes of the combining tone marks of Windows-1258.
+const VIETNAMESE_TONES: [u8; 5] = [0xcc, 0xd2, 0xde, 0xec, 0xf2];
+/// Bytes of Đ, Ơ and Ư and their small letters in Windows-1258. In Windows-1252 they are Ð, Õ and Ý.
+const VIETNAMESE_LETTERS: [u8; 6] = [0xd0, 0xf0, 0xd5, 0xf5, 0xdd, 0xfd];
+
+/// Returns what to do about a text that is not UTF-8, with the encoding that it seems to have: Windows-1258 or
+/// Windows-1252, in which spreadsheet programs save CSV files in Vietnam and in western countries. Returns nothing for
+/// bytes that are not text.
+pub(super) fn encoding_hint(text: &[u8]) -> String {
+    let is_text = |byte: &u8| *byte >= 0x20 || byte.is_ascii_whitespace();
+    // In both encodings, words mix ASCII letters with bytes above 0xc0.
+    if !text.iter().all(is_text) || !text.iter().any(u8::is_ascii_alphabetic) {
+        return String::new();
+    }
+    let is_vowel = |byte: u8| b"aeiouyAEIOUY".contains(&byte) || byte >= 0xc0;
+    let has_tone = text
+        .windows(2)
+        .any(|pair| is_vowel(pair[0]) && VIETNAMESE_TONES.contains(&pair[1]));
+    let has_letter = text.iter().any(|byte| VIETNAMESE_LETTERS.contains(byte));
+    let name = if has_tone || has_letter {
+        "Windows-1258 (Vietnamese)"
+    } else {
+        "Windows-1252 (Western European)"
+    };
+    format!("; it seems to be {name}: save the list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")")
+}
+
 fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, NotText> {
     let (pairs, []) = bytes.as_chunks::<2>() else {
         return Err(NotText);

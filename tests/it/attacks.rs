@@ -138,7 +138,11 @@ fn a_retry_survives_kills() {
     let list = "id,mesh,print\nx1,no.obj,no.png\nx2,no.obj,no.png\n";
     let path = target.done.dir().join("more.csv");
     std::fs::write(&path, list).expect("written");
-    mocban(target.done.dir(), &["import", "more.csv"]).expect(0);
+    mocban(
+        target.done.dir(),
+        &["import", "more.csv", "--allow-missing"],
+    )
+    .expect(0);
     call(&mut run(&target.done, &[])).expect(3);
     for _ in 0..trials(6) {
         let p = target.copy_of(&target.done);
@@ -317,7 +321,7 @@ fn processes_suspended_at_random_moments_for_two_leases_change_nothing() {
 fn import(list: &str) -> (Call, u64) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     std::fs::write(dir.path().join("pairs.csv"), list).expect("written");
-    let (ended, kib) = watched(dir.path(), &["import", "pairs.csv"]);
+    let (ended, kib) = watched(dir.path(), &["import", "pairs.csv", "--allow-missing"]);
     (ended, kib >> 10)
 }
 

@@ -71,8 +71,9 @@ pub(crate) fn shell(script: &str) -> Command {
     command
 }
 
-/// Removes the environment variables that change the binary's output.
+/// Removes the environment variables that change the binary's output, and sets the time zone to UTC.
 fn without_settings(mut command: Command) -> Command {
+    command.env("TZ", "UTC");
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("MOCBAN_") || name == "RUST_LOG" {
             command.env_remove(name);
@@ -227,7 +228,11 @@ fn imported() -> tempfile::TempDir {
     let dir = empty();
     let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
     std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
-    mocban(dir.path(), &["-C", "p", "-q", "import", "pairs.csv"]).expect(0);
+    mocban(
+        dir.path(),
+        &["-C", "p", "-q", "import", "pairs.csv", "--allow-missing"],
+    )
+    .expect(0);
     dir
 }
 
@@ -268,7 +273,14 @@ fn missing_files_cause_a_warning_by_line_and_fail_only_their_pairs() {
     let dir = empty();
     let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
     std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
-    let import = ["-C", "p", "--json", "import", "pairs.csv"];
+    let import = [
+        "-C",
+        "p",
+        "--json",
+        "import",
+        "pairs.csv",
+        "--allow-missing",
+    ];
     let first = mocban(dir.path(), &import).expect(0);
     assert_eq!(first.json()["added"], 2);
     assert!(
@@ -358,6 +370,7 @@ fn every_next_line_can_be_run_unchanged() {
         "run.workers=1",
         "import",
         "pairs.csv",
+        "--allow-missing",
     ];
     let mut lines = mocban(dir.path(), &import).expect(0).next();
     for wanted in [3, 0] {

@@ -22,7 +22,9 @@ fn import(root: &Path, name: &str) -> Command {
     let manifest = root.join(format!("{name}.csv"));
     std::fs::write(&manifest, format!("id,mesh,print\n{name},a.stl,a.png\n")).expect("written");
     let mut command = binary();
-    command.args(["-C", "new/p", "-q", "import"]).arg(&manifest);
+    command
+        .args(["-C", "new/p", "-q", "import", "--allow-missing"])
+        .arg(&manifest);
     command.current_dir(root);
     command
 }

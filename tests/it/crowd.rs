@@ -187,7 +187,8 @@ fn many_hostile_pairs_are_reported_one_by_one_and_change_no_other_result() {
     write_lists(&data, &hostile);
 
     let start = Instant::now();
-    let (imported, import_kib) = watched(dir.path(), &["import", "data/crowd.csv"]);
+    let (imported, import_kib) =
+        watched(dir.path(), &["import", "data/crowd.csv", "--allow-missing"]);
     assert_plain(&imported.expect(0));
     let limit = format!("run.stage_timeout_s={STAGE_LIMIT_S}");
     let memory = format!("{MEMORY_MIB}M");

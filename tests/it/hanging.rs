@@ -189,7 +189,7 @@ fn an_input_that_became_a_pipe_is_named_by_every_command() {
 #[test]
 fn a_list_is_read_from_standard_input_and_not_from_a_device() {
     let disk = HangingDisk::new("1");
-    let mut import = disk.command(&["import", "/dev/stdin"]);
+    let mut import = disk.command(&["import", "/dev/stdin", "--allow-missing"]);
     import.stdin(Stdio::piped()).stdout(Stdio::null());
     let mut child = import.spawn().expect("the binary starts");
     let list = "id,mesh,print\nanother,a.ply,a.png\n";

@@ -248,7 +248,7 @@ fn every_bad_input_gives_one_line_and_does_not_affect_others() {
     let good = good_pair(&data);
     write_misnamed_jpeg(&data, &good);
     write_manifest(&data, &good);
-    let imported = mocban(dir.path(), &["import", "data/bad.csv"]).expect(0);
+    let imported = mocban(dir.path(), &["import", "data/bad.csv", "--allow-missing"]).expect(0);
     for id in ["missing_mesh", "missing_print"] {
         let warned = imported.err.lines().filter(|line| line.contains(id));
         assert!(warned.count() == 1, "{}", imported.err);
@@ -283,7 +283,7 @@ fn retry_runs_a_pair_whose_missing_file_was_added() {
     let print = png_rgb8(&Grid::new(64, 64, [200; 3]));
     fs::write(dir.path().join("a.png"), print).expect("writes");
     fs::write(dir.path().join("a.csv"), "id,mesh,print\na,a.xyz,a.png\n").expect("writes");
-    mocban(dir.path(), &["import", "a.csv"]).expect(0);
+    mocban(dir.path(), &["import", "a.csv", "--allow-missing"]).expect(0);
     mocban(dir.path(), &["run"]).expect(3);
     assert_eq!(show(dir.path(), "a")["failure"]["class"], "io");
     fs::write(dir.path().join("a.xyz"), points_on_a_line()).expect("writes");
@@ -337,7 +337,7 @@ fn invalid_manifests_are_rejected_by_line_and_leave_no_files() {
 fn a_rejected_manifest_does_not_change_an_existing_project() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     fs::write(dir.path().join("one.csv"), "id,mesh,print\na,a.stl,a.png\n").expect("writes");
-    mocban(dir.path(), &["import", "one.csv"]).expect(0);
+    mocban(dir.path(), &["import", "one.csv", "--allow-missing"]).expect(0);
     let two = "id,mesh,print\nb,b.stl,b.png\na,elsewhere.stl,a.png\nb,c.stl,c.png\n";
     fs::write(dir.path().join("two.csv"), two).expect("writes");
     mocban(dir.path(), &["import", "two.csv"]).expect(2);

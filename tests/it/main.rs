@@ -51,6 +51,7 @@ mod limits;
 mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
+mod names;
 mod odd;
 mod one_pair;
 mod page;

@@ -23,7 +23,7 @@ fn missing_file_is_a_usage_error() {
     .expect("written");
     let truth = ["import", "pairs.csv", "--truth", "nothere.jsonl"];
     mocban(dir.path(), &truth).expect(2);
-    mocban(dir.path(), &["import", "pairs.csv"]).expect(0);
+    mocban(dir.path(), &["import", "pairs.csv", "--allow-missing"]).expect(0);
     mocban(dir.path(), &["verdict", "import", "nothere.csv"]).expect(2);
 }
 
@@ -33,7 +33,7 @@ fn status_lists_every_failed_pair_on_request() {
     let rows = (0..5).map(|i| format!("p{i},p{i}.stl,p{i}.png\n"));
     let list = format!("id,mesh,print\n{}", rows.collect::<String>());
     std::fs::write(dir.path().join("pairs.csv"), list).expect("written");
-    mocban(dir.path(), &["import", "pairs.csv"]).expect(0);
+    mocban(dir.path(), &["import", "pairs.csv", "--allow-missing"]).expect(0);
     mocban(dir.path(), &["run"]).expect(3);
     let short = mocban(dir.path(), &["status"]).expect(0).out;
     assert!(

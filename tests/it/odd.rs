@@ -35,7 +35,7 @@ fn plain(message: &str, expected: &str) {
 fn file_that_is_not_a_catalog_is_reported_in_a_sentence() {
     let dir = empty();
     let file = dir.path().join("catalog.sqlite");
-    let import = ["import", "pairs.csv"];
+    let import = ["import", "pairs.csv", "--allow-missing"];
     let manifest = "id,mesh,print\na,a.stl,a.png\n";
     std::fs::write(dir.path().join("pairs.csv"), manifest).expect("written");
     let cases: [(&[u8], &str); 3] = [

@@ -49,7 +49,17 @@ fn hostile_project(dir: &Path) {
     });
     std::fs::write(data.join("more.jsonl"), format!("{row}\n")).expect("written");
     for colour in ["never", "always"] {
-        let import = mocban(&dir, &["import", "data/more.jsonl", "--color", colour]).expect(0);
+        let import = mocban(
+            &dir,
+            &[
+                "import",
+                "data/more.jsonl",
+                "--allow-missing",
+                "--color",
+                colour,
+            ],
+        )
+        .expect(0);
         assert!(import.err.contains("does not exist"), "{}", import.err);
         assert_visible(&import);
     }

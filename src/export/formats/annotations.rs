@@ -106,7 +106,7 @@ impl AnnotationWriter {
         match self.folder.context.shared_prints.get(&pair.print) {
             // All pairs of a page write the same bytes, so the first of them that is encoded may do it.
             Some(first) if *first != pair.id => {
-                let path = format!("images/{first}.{extension}");
+                let path = format!("images/{}.{extension}", first.file_name());
                 if !self.folder.root.join(&path).exists() {
                     encoded.add_file(&path, bytes);
                 }
@@ -114,7 +114,7 @@ impl AnnotationWriter {
             }
             _ => {
                 encoded.add_file(format!("images/*.{extension}"), bytes);
-                Ok((format!("images/{}.{extension}", pair.id), size))
+                Ok((format!("images/{}.{extension}", pair.id.file_name()), size))
             }
         }
     }

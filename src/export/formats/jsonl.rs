@@ -68,7 +68,7 @@ impl FormatWriter for JsonlWriter {
                 let line = |(metric, files): (_, Files)| ExportLine {
                     pair,
                     metric,
-                    files: Some(files.of_pair(pair.id.as_str())),
+                    files: Some(files.of_pair(&pair.id)),
                 };
                 let lines = view.record.metrics.iter().zip(files).map(line);
                 json_lines(&lines.collect::<Vec<_>>())

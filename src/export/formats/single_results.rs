@@ -117,11 +117,11 @@ impl SingleResults {
         view: &PairView<'_>,
         shown: Option<(&MetricFields, NamedFiles)>,
     ) -> Vec<u8> {
-        let id = view.record.pair.id.as_str();
+        let id = view.record.pair.id.file_name();
         let missing = MetricFields::without_result(self.metric);
         let (metric, files) = shown.map_or((&missing, None), |(metric, files)| {
             let files = files.into_iter();
-            let paths = files.map(|(name, path)| (name, path.replace('*', id)));
+            let paths = files.map(|(name, path)| (name, path.replace('*', &id)));
             (metric, Some(paths.collect()))
         });
         let line = SingleResult {

@@ -91,9 +91,11 @@ impl FormatWriter for WebDatasetWriter {
             shard
         };
         let mut files = shared.into_iter();
+        // The reader takes the text before the first dot as the key.
+        let key = record.pair.id.file_name().replace('.', "%2E");
         while let (Some(extension), Some(bytes)) = (files.next(), files.next()) {
             let extension = String::from_utf8_lossy(&extension).into_owned();
-            shard.append(&format!("{}.{extension}", record.pair.id), &bytes)?;
+            shard.append(&format!("{key}.{extension}"), &bytes)?;
         }
         shard.bytes += size;
         series.shard = Some(shard);
