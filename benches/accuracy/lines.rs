@@ -92,14 +92,20 @@ fn line(trial: &Trial, found: Result<&Found, &String>, paths: &BTreeSet<&String>
 }
 
 fn decoy_line(decoy: &Answer, paths: &BTreeSet<&String>) -> Vec<String> {
-    let mut cells = vec![String::new(); HEADS.len() + Part::ALL.len()];
-    cells[0] = decoy.case.tier.to_string();
-    cells[1] = decoy.case.seed.to_string();
-    cells[2] = decoy.case.index.to_string();
-    cells[3] = decoy.kind.name().to_owned();
-    cells[5] = decoy.method.to_owned();
-    cells[7] = decoy.outcome.as_ref().err().cloned().unwrap_or_default();
-    cells[8] = false.to_string();
+    let error = decoy.outcome.as_ref().err().cloned().unwrap_or_default();
+    let case = &decoy.case;
+    let mut cells = vec![
+        case.tier.to_string(),
+        case.seed.to_string(),
+        case.index.to_string(),
+        decoy.kind.name().to_owned(),
+        String::new(),
+        decoy.method.to_owned(),
+        String::new(),
+        error,
+        false.to_string(),
+    ];
+    cells.resize(HEADS.len() + Part::ALL.len(), String::new());
     cells.extend(values(decoy.outcome.as_ref().ok(), paths));
     cells
 }

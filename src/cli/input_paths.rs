@@ -14,10 +14,8 @@ pub(super) fn on_disk(path: &Path) -> Option<PathBuf> {
     }
     let text = path.to_str()?;
     let slashes = (cfg!(unix) && text.contains('\\')).then(|| text.replace('\\', "/"));
-    let written = [Some(text.to_owned()), slashes].into_iter().flatten();
-    written
-        .filter_map(|text| in_any_form(Path::new(&text)))
-        .next()
+    let mut written = [Some(text.to_owned()), slashes].into_iter().flatten();
+    written.find_map(|text| in_any_form(Path::new(&text)))
 }
 
 /// Returns the existing path whose parts are those of a path, as written, composed or decomposed.
