@@ -144,6 +144,7 @@
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
+//! | `local_server` | a web server for the browser of one user: guard, session, connection limits | `domain` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
 //! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint` |
@@ -151,7 +152,7 @@
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
-//! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `stages`, `store`, `catalog`, `report`, `export` |
+//! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
@@ -174,6 +175,7 @@ pub mod demo;
 pub mod domain;
 pub mod export;
 mod failpoint;
+pub mod local_server;
 pub mod manifest;
 pub mod mesh;
 pub mod page_vec;

@@ -7,9 +7,6 @@ mod alignment_editor;
 mod answer;
 mod assets;
 mod check_items;
-mod connection;
-mod connections;
-mod guard;
 mod history;
 mod i18n;
 mod item;
@@ -21,7 +18,6 @@ mod page;
 mod review_queue;
 mod routes;
 mod server;
-mod session;
 mod state;
 
 pub use check_items::CheckRates;

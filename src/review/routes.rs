@@ -6,7 +6,7 @@ use std::sync::Arc;
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, RawQuery, State};
 use axum::http::{StatusCode, header};
-use axum::response::{Html, IntoResponse, Redirect, Response};
+use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router, middleware};
 use serde_json::{Value, json};
@@ -14,7 +14,6 @@ use serde_json::{Value, json};
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
 use super::answer::{AnswerBody, InvalidInput, UndoBody};
 use super::assets;
-use super::guard::{START, guard};
 use super::history::ReviewerHistory;
 use super::i18n::Language;
 use super::item::ReviewItem;
@@ -24,6 +23,7 @@ use super::review_queue::QueueError;
 use super::state::ServerState;
 use crate::catalog::{CatalogError, ManualAlignment};
 use crate::domain::{PairName, ReviewOrder, Stage, one_line};
+use crate::local_server::{START, guard};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// Returns the router with all routes behind the guard.
@@ -41,7 +41,10 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
-        .layer(middleware::from_fn_with_state(Arc::clone(state), guard))
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(&state.access),
+            guard,
+        ))
         .with_state(Arc::clone(state))
 }
 
@@ -94,25 +97,15 @@ impl IntoResponse for ApiError {
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
-/// Accepts the one-time token and sets the session cookie. Responds with a page that leads on to the review page. A
-/// redirect would not work: a browser sends a `SameSite=Strict` cookie only if the navigation starts on this site.
+/// Opens the session.
 async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
-    let query = query.unwrap_or_default();
-    let token = query.strip_prefix("token=").unwrap_or_default();
-    if state.session.open(token) {
-        let cookie = [(header::SET_COOKIE, state.session.set_cookie())];
-        return (
-            cookie,
-            Html(page::forward(state.options.language).into_string()),
-        )
-            .into_response();
-    }
-    // Without a token, the review page opens if the browser already has the cookie.
-    if token.is_empty() {
-        return Redirect::to("/").into_response();
-    }
-    let refused = page::token_used(state.options.language).into_string();
-    (StatusCode::FORBIDDEN, Html(refused)).into_response()
+    let language = state.options.language;
+    let (forward, refused) = (page::forward, page::token_used);
+    state.access.start(
+        query.as_deref(),
+        || forward(language).into_string(),
+        || refused(language).into_string(),
+    )
 }
 
 async fn index(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Html<String> {
@@ -133,7 +126,7 @@ async fn asset(Path(name): Path<String>) -> Response {
 async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
     let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
-        "csrf_token": state.session.csrf_token,
+        "csrf_token": state.access.csrf_token(),
         "keys": state.options.keys,
         "review_order": state.options.queue.order,
         "min_view_ms": state.options.min_view_ms,

@@ -5,17 +5,13 @@ use std::sync::Arc;
 
 use tokio::net::TcpListener;
 
-use super::connection::ConnectionLimits;
-use super::connections;
-use super::guard::START;
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::routes;
-use super::session::Session;
 use super::state::ServerState;
 use crate::catalog::{Catalog, CatalogError};
-use crate::domain::ContentHash;
+use crate::local_server::{AccessControl, ConnectionLimits, listen, serve};
 use crate::store::Project;
 
 /// Why the server cannot start or run.
@@ -71,13 +67,12 @@ pub async fn bind(
 ) -> Result<ReviewServer, ReviewError> {
     let address = options.listen;
     let failed = |source| ReviewError::Listen { address, source };
-    let preferred = preferred_port(&project, &options.queue.reviewer);
-    let listener = listen(address, preferred).await.map_err(failed)?;
+    let name = origin_name(&project, &options.queue.reviewer);
+    let listener = listen(address, &name).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let state = ServerState {
         images: ImageCache::new(catalog.clone(), project.clone(), options.limits),
-        session: Session::new(address.port()).map_err(ReviewError::Token)?,
-        hosts: hosts(address),
+        access: Arc::new(AccessControl::new("review", address).map_err(ReviewError::Token)?),
         catalog,
         project,
         options,
@@ -103,8 +98,7 @@ pub async fn bind(
 impl ReviewServer {
     /// Returns the start URL with the one-time token.
     pub fn url(&self) -> String {
-        let token = &self.state.session.token;
-        format!("http://{}{START}?token={token}", self.address)
+        self.state.access.url()
     }
 
     /// Returns the bound address.
@@ -121,60 +115,14 @@ impl ReviewServer {
     /// were cut off without a response.
     pub async fn serve(self, stop: impl Future<Output = ()>) -> usize {
         let router = routes::router(&self.state);
-        connections::serve(self.listener, router, ConnectionLimits::system(), stop).await
+        serve(self.listener, router, ConnectionLimits::system(), stop).await
     }
 }
 
-/// First port and number of ports of the dynamic range (RFC 6335).
-const DYNAMIC_PORTS: [u16; 2] = [49_152, 16_384];
-
-/// Returns a port that is the same on every start for a project and reviewer. The browser keeps unsaved answers per
+/// Returns a name that is the same on every start for a project and reviewer. The browser keeps unsaved answers per
 /// origin, so a restarted server needs the same port to receive these answers.
-fn preferred_port(project: &Project, reviewer: &str) -> u16 {
+fn origin_name(project: &Project, reviewer: &str) -> String {
     let dir = project.dir();
     let dir = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
-    let name = format!("{}\0{reviewer}", dir.display());
-    let [first, second, ..] = *ContentHash::of(name.as_bytes()).as_bytes();
-    DYNAMIC_PORTS[0] + u16::from_be_bytes([first, second]) % DYNAMIC_PORTS[1]
-}
-
-/// Binds the address. Port 0 tries the preferred port first.
-async fn listen(address: SocketAddr, preferred: u16) -> std::io::Result<TcpListener> {
-    if address.port() == 0
-        && let Ok(listener) = TcpListener::bind(SocketAddr::new(address.ip(), preferred)).await
-    {
-        return Ok(listener);
-    }
-    TcpListener::bind(address).await
-}
-
-/// Returns the accepted values of the `Host` header.
-fn hosts(address: SocketAddr) -> Vec<String> {
-    let port = address.port();
-    let mut hosts = vec![address.to_string()];
-    if address.ip().is_loopback() {
-        hosts.extend([format!("localhost:{port}"), format!("127.0.0.1:{port}")]);
-    }
-    hosts
-}
-
-#[cfg(test)]
-mod tests {
-    use std::net::SocketAddr;
-
-    use super::listen;
-
-    #[tokio::test]
-    async fn port_zero_prefers_the_fixed_port_if_it_is_free() {
-        let any = SocketAddr::from(([127, 0, 0, 1], 0));
-        let port =
-            |listener: &tokio::net::TcpListener| listener.local_addr().expect("an address").port();
-        let probe = listen(any, 0).await.expect("a socket");
-        let preferred = port(&probe);
-        let other = listen(any, preferred).await.expect("a socket");
-        assert_ne!(port(&other), preferred, "it is taken");
-        drop(probe);
-        let rebound = listen(any, preferred).await.expect("a socket");
-        assert_eq!(port(&rebound), preferred);
-    }
+    format!("{}\0{reviewer}", dir.display())
 }

@@ -7,8 +7,8 @@ use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::review_queue::{QueueError, ReviewQueue};
-use super::session::Session;
 use crate::catalog::Catalog;
+use crate::local_server::AccessControl;
 use crate::store::Project;
 
 /// State of one reviewer's server.
@@ -17,9 +17,7 @@ pub(super) struct ServerState {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
     pub(super) options: ReviewOptions,
-    pub(super) session: Session,
-    /// Accepted values of the `Host` header, with port.
-    pub(super) hosts: Vec<String>,
+    pub(super) access: Arc<AccessControl>,
     pub(super) images: ImageCache,
     /// Every item served since the server started, by id. Answers to these items are accepted even if their results
     /// were replaced.

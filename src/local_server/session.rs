@@ -19,17 +19,17 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Draws new secrets from the operating system.
+    /// Draws new secrets from the operating system. Cookies are named after the page and its port.
     ///
     /// # Errors
     /// Returns an error if the operating system provides no randomness.
-    pub(super) fn new(port: u16) -> std::io::Result<Self> {
+    pub(super) fn new(page: &str, port: u16) -> std::io::Result<Self> {
         Ok(Self {
             token: secret()?,
             cookie: secret()?,
             csrf_token: secret()?,
             // Cookies are shared by all ports of a host, so the cookies of two servers need different names.
-            cookie_name: format!("mocban_review_{port}"),
+            cookie_name: format!("mocban_{page}_{port}"),
             is_opened: AtomicBool::new(false),
         })
     }
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn token_opens_once_and_only_itself() {
-        let session = Session::new(8000).expect("secrets");
+        let session = Session::new("review", 8000).expect("secrets");
         assert!(!session.open("") && !session.open("guess"));
         let token = session.token.clone();
         assert_eq!(token.len(), 64);
@@ -89,13 +89,17 @@ mod tests {
 
     #[test]
     fn cookie_is_found_among_others_and_by_its_port() {
-        let session = Session::new(8000).expect("secrets");
+        let session = Session::new("review", 8000).expect("secrets");
         let set = session.set_cookie();
         let ours = set.split(';').next().expect("name and value");
         assert!(set.contains("HttpOnly") && set.contains("SameSite=Strict"));
         assert!(session.has_cookie(&format!("a=b; {ours}; c=d")));
         assert!(!session.has_cookie("mocban_review_8000=; x"));
         assert!(!session.has_cookie(&ours.replace("8000", "8001")));
-        assert!(!Session::new(8000).expect("secrets").has_cookie(ours));
+        assert!(
+            !Session::new("review", 8000)
+                .expect("secrets")
+                .has_cookie(ours)
+        );
     }
 }

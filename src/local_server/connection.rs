@@ -1,4 +1,4 @@
-//! Serves one connection of the review page within time limits.
+//! Serves one connection within time limits.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -18,7 +18,7 @@ use tokio::time::Instant;
 
 /// Limits on the connections of a server.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ConnectionLimits {
+pub struct ConnectionLimits {
     /// Maximum number of open connections.
     pub(super) connections: usize,
     /// Maximum time to receive a complete request header. It also applies if the client sends nothing.
@@ -33,7 +33,7 @@ pub(super) struct ConnectionLimits {
 
 impl ConnectionLimits {
     /// Returns the limits for this process. At most a quarter of its file descriptors are used for connections.
-    pub(super) fn system() -> Self {
+    pub fn system() -> Self {
         let descriptors = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
         Self {
             connections: (descriptors / 4).clamp(4, 128) as usize,

@@ -11,16 +11,16 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header}
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
-use super::state::ServerState;
+use super::access_control::AccessControl;
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 const BODY_LIMIT: usize = 16 * 1024;
 /// Maximum time in which the body arrives.
 const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Request header that carries the CSRF token.
-pub(super) const CSRF_HEADER: &str = "x-csrf-token";
+const CSRF_HEADER: &str = "x-csrf-token";
 /// Path that accepts the one-time token.
-pub(super) const START: &str = "/start";
+pub const START: &str = "/start";
 
 /// Security headers of every response.
 const HEADERS: [(HeaderName, &str); 7] = [
@@ -57,7 +57,7 @@ const NO_COOKIE: Rejection = (
     "open the address that the command printed; it works once",
 );
 /// `Origin` is missing or of another site.
-const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the review page may write here");
+const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the page itself may write here");
 /// The body is not JSON. A form on another site could send such a body.
 const NO_JSON: Rejection = (
     StatusCode::UNSUPPORTED_MEDIA_TYPE,
@@ -81,12 +81,12 @@ const TOO_SLOW: Rejection = (
 );
 
 /// Rejects unauthorised requests and adds the security headers to every response.
-pub(super) async fn guard(
-    State(state): State<Arc<ServerState>>,
+pub async fn guard(
+    State(access): State<Arc<AccessControl>>,
     request: Request,
     next: Next,
 ) -> Response {
-    let checked = match check(&state, &request) {
+    let checked = match check(&access, &request) {
         Ok(()) => with_whole_body(request).await,
         Err(rejection) => Err(rejection),
     };
@@ -101,17 +101,17 @@ pub(super) async fn guard(
     response
 }
 
-fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
+fn check(access: &AccessControl, request: &Request) -> Result<(), Rejection> {
     let headers = request.headers();
     let host = text(headers, header::HOST).ok_or(WRONG_HOST)?;
-    if !state.hosts.iter().any(|allowed| allowed == host) {
+    if !access.hosts.iter().any(|allowed| allowed == host) {
         return Err(WRONG_HOST);
     }
     let is_read = matches!(*request.method(), Method::GET | Method::HEAD);
     if is_read && request.uri().path() == START {
         return Ok(());
     }
-    if !text(headers, header::COOKIE).is_some_and(|cookie| state.session.has_cookie(cookie)) {
+    if !text(headers, header::COOKIE).is_some_and(|cookie| access.session.has_cookie(cookie)) {
         return Err(NO_COOKIE);
     }
     if is_read {
@@ -126,7 +126,7 @@ fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
         return Err(NO_JSON);
     }
     let token = text(headers, CSRF_HEADER);
-    if !token.is_some_and(|token| state.session.is_csrf_token(token)) {
+    if !token.is_some_and(|token| access.session.is_csrf_token(token)) {
         return Err(WRONG_TOKEN);
     }
     Ok(())

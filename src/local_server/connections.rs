@@ -1,4 +1,4 @@
-//! Accepts connections of the review page. Their number and all waiting times are limited, so that no client can block
+//! Accepts connections. Their number and all waiting times are limited, so that no client can block
 //! the server or prevent its shutdown.
 //!
 //! `axum::serve` has no such limits. See <https://github.com/tokio-rs/axum/issues/2741>.
@@ -15,7 +15,7 @@ use super::connection::{Activity, ConnectionEnd, ConnectionLimits, serve_connect
 
 /// Serves connections until `stop` completes. Then finishes the requests in progress within the time limits and closes
 /// all connections. Returns the number of requests that were cut off without a response.
-pub(super) async fn serve(
+pub async fn serve(
     listener: TcpListener,
     router: Router,
     limits: ConnectionLimits,
@@ -125,7 +125,7 @@ mod tests {
     use tokio::task::JoinHandle;
 
     use super::serve;
-    use crate::review::connection::ConnectionLimits;
+    use crate::local_server::connection::ConnectionLimits;
 
     const NEVER: Duration = Duration::from_hours(1);
 

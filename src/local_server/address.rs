@@ -1,0 +1,62 @@
+//! Binds the port of a server.
+
+use std::net::SocketAddr;
+
+use tokio::net::TcpListener;
+
+use crate::domain::ContentHash;
+
+/// First port and number of ports of the dynamic range (RFC 6335).
+const DYNAMIC_PORTS: [u16; 2] = [49_152, 16_384];
+
+/// Binds the address. Port 0 tries a port that depends only on `name`, so that a restarted server has the same origin,
+/// and then any free port.
+///
+/// # Errors
+/// Returns an error if the address cannot be bound.
+pub async fn listen(address: SocketAddr, name: &str) -> std::io::Result<TcpListener> {
+    if address.port() == 0
+        && let Ok(listener) =
+            TcpListener::bind(SocketAddr::new(address.ip(), preferred_port(name))).await
+    {
+        return Ok(listener);
+    }
+    TcpListener::bind(address).await
+}
+
+/// Returns a port of the dynamic range that is the same for equal names.
+fn preferred_port(name: &str) -> u16 {
+    let [first, second, ..] = *ContentHash::of(name.as_bytes()).as_bytes();
+    DYNAMIC_PORTS[0] + u16::from_be_bytes([first, second]) % DYNAMIC_PORTS[1]
+}
+
+/// Returns the accepted values of the `Host` header.
+pub(super) fn hosts(address: SocketAddr) -> Vec<String> {
+    let port = address.port();
+    let mut hosts = vec![address.to_string()];
+    if address.ip().is_loopback() {
+        hosts.extend([format!("localhost:{port}"), format!("127.0.0.1:{port}")]);
+    }
+    hosts
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::SocketAddr;
+
+    use super::listen;
+
+    #[tokio::test]
+    async fn port_zero_prefers_the_fixed_port_if_it_is_free() {
+        let any = SocketAddr::from(([127, 0, 0, 1], 0));
+        let port =
+            |listener: &tokio::net::TcpListener| listener.local_addr().expect("an address").port();
+        let probe = listen(any, "a test of ports").await.expect("a socket");
+        let preferred = port(&probe);
+        let other = listen(any, "a test of ports").await.expect("a socket");
+        assert_ne!(port(&other), preferred, "it is taken");
+        drop(probe);
+        let rebound = listen(any, "a test of ports").await.expect("a socket");
+        assert_eq!(port(&rebound), preferred);
+    }
+}

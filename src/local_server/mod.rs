@@ -1,0 +1,17 @@
+//! A web server for one user's browser on this machine: checked requests, limited connections, and one session.
+//!
+//! A page binds its port with [`listen`], passes every request through [`guard`], opens the session at [`START`] with
+//! [`AccessControl::start`], and serves its routes with [`serve`].
+
+mod access_control;
+mod address;
+mod connection;
+mod connections;
+mod guard;
+mod session;
+
+pub use access_control::AccessControl;
+pub use address::listen;
+pub use connection::ConnectionLimits;
+pub use connections::serve;
+pub use guard::{START, guard};
