@@ -1,5 +1,6 @@
 //! Triangle meshes and point sets in their own frame and unit, and their readers and writers.
 
+mod clustering;
 mod error;
 mod format;
 mod obj;
