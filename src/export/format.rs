@@ -24,12 +24,14 @@ pub enum ExportFormat {
     Fiji,
     /// Strokes and characters as COCO and VIA annotations.
     Annotations,
+    /// Pages that show scans on their prints in 3D.
+    Viewer,
 }
 
 enum_names! {
     pub ExportFormat, "an export format":
     Jsonl = "jsonl", Csv = "csv", Parquet = "parquet", HuggingFace = "huggingface", WebDataset = "webdataset",
-    Mesh = "mesh", Fiji = "fiji", Annotations = "annotations",
+    Mesh = "mesh", Fiji = "fiji", Annotations = "annotations", Viewer = "viewer",
 }
 
 impl ExportFormat {
@@ -46,6 +48,7 @@ impl ExportFormat {
             }
             Self::Fiji => "Calibrated TIFF images for ImageJ and Fiji",
             Self::Annotations => "Strokes as COCO masks and boxes, characters as VIA 2 boxes",
+            Self::Viewer => "Pages that show the scan and its print in 3D, one file per pair",
         }
     }
 
@@ -53,7 +56,7 @@ impl ExportFormat {
     pub const fn writes_pictures(self) -> bool {
         match self {
             Self::Jsonl | Self::Parquet | Self::HuggingFace | Self::WebDataset | Self::Fiji => true,
-            Self::Csv | Self::Mesh | Self::Annotations => false,
+            Self::Csv | Self::Mesh | Self::Annotations | Self::Viewer => false,
         }
     }
 
@@ -67,7 +70,8 @@ impl ExportFormat {
             | Self::WebDataset
             | Self::Mesh
             | Self::Fiji
-            | Self::Annotations => true,
+            | Self::Annotations
+            | Self::Viewer => true,
         }
     }
 }

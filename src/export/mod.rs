@@ -24,6 +24,7 @@ mod readme;
 mod record;
 mod record_fields;
 mod sample;
+pub mod scan_view;
 mod source_print;
 mod split;
 mod stage_outcomes;

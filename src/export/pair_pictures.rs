@@ -133,7 +133,7 @@ impl<'a> PairPictures<'a> {
     }
 
     /// Returns the ink mask in the frame of the print.
-    fn source_mask(&self) -> Result<&Mask, PictureError> {
+    pub(super) fn source_mask(&self) -> Result<&Mask, PictureError> {
         get_or_read(&self.print_mask, || Ok(self.artifacts().print_mask()?))
     }
 

@@ -15,7 +15,7 @@ use crate::fault::{ENOSPC, Fault};
 use crate::uninterrupted::files;
 
 /// Files of each format, whose writes are interrupted.
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     ".out.*/new/jsonl/pairs/*",
     ".out.*/new/csv/pairs.csv",
     ".out.*/new/parquet/pairs.parquet",
@@ -24,6 +24,7 @@ const FILES: [&str; 9] = [
     ".out.*/new/mesh/pairs/*/scan.glb",
     ".out.*/new/fiji/pairs/*/stack.tif",
     ".out.*/new/annotations/coco.json",
+    ".out.*/new/viewer/pairs/*/viewer.html",
     ".out.*/new/export.json",
 ];
 

@@ -10,7 +10,8 @@ use parquet::record::Field;
 use serde_json::Value;
 
 /// Every format.
-pub(crate) const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations";
+pub(crate) const FORMATS: &str =
+    "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations,viewer";
 
 /// What a format says about one result. Missing texts are empty.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -223,6 +224,7 @@ pub(crate) fn agreeing_lines(export: &Path) -> Vec<Value> {
     for (folder, format, expected) in [
         ("mesh", "mesh", &every),
         ("fiji", "fiji", &every),
+        ("viewer", "viewer", &every),
         ("annotations", "annotations", &every),
         ("annotations", "coco", &done),
         ("webdataset", "webdataset", &done),

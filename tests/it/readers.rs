@@ -17,7 +17,7 @@ const PAIRS: usize = 12;
 /// Number of blocks of the project; splits have whole blocks.
 const BLOCKS: usize = 4;
 /// Every format.
-const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations";
+const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset,mesh,fiji,annotations,viewer";
 /// Exit code of a script whose module or program is not installed.
 const SKIPPED: i32 = 77;
 

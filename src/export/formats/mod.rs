@@ -8,6 +8,7 @@ mod jsonl;
 mod mesh;
 mod parquet;
 mod single_results;
+mod viewer;
 mod webdataset;
 
 #[cfg(test)]
@@ -33,6 +34,7 @@ pub(super) fn begin(
         ExportFormat::WebDataset => Box::new(webdataset::WebDatasetWriter::begin(folder)?),
         ExportFormat::Mesh => Box::new(mesh::MeshWriter::begin(&folder)?),
         ExportFormat::Fiji => Box::new(fiji::FijiWriter::begin(&folder)?),
+        ExportFormat::Viewer => Box::new(viewer::ViewerWriter::begin(&folder)?),
         ExportFormat::Annotations => Box::new(annotations::AnnotationWriter::begin(folder)?),
     })
 }

@@ -217,7 +217,7 @@ fn document(mesh: &PlacedMesh, content: &GlbContent<'_>, buffer: &GlbBuffer) -> 
 
 /// Returns the texture coordinates of a print pixel. The origin is the upper left corner of the image, not the centre
 /// of its first pixel.
-fn texture_coordinates(pixel: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+pub(in crate::export) fn texture_coordinates(pixel: [f32; 2], size: [usize; 2]) -> [f32; 2] {
     [0, 1].map(|k| ((f64::from(pixel[k]) + 0.5) / size[k] as f64) as f32)
 }
 

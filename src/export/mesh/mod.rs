@@ -8,5 +8,7 @@ mod placement;
 mod ply;
 mod scan_files;
 
+pub(super) use glb::texture_coordinates;
+pub(super) use placed_mesh::PlacedMesh;
 pub(super) use placement::MeshPlacement;
 pub(super) use scan_files::{ScanFiles, ScanTitle};

@@ -8,17 +8,17 @@ use crate::mesh::Mesh;
 #[derive(Debug)]
 pub(in crate::export) struct PlacedMesh {
     /// Positions in millimetres, or mesh units if the unit is unknown; see [`MeshPlacement`].
-    pub(super) positions: Vec<[f32; 3]>,
+    pub(in crate::export) positions: Vec<[f32; 3]>,
     /// Print pixels.
-    pub(super) pixels: Vec<[f32; 2]>,
+    pub(in crate::export) pixels: Vec<[f32; 2]>,
     /// Colours of the print; `None` outside of it.
     pub(super) colours: Vec<Option<[u8; 3]>>,
     /// Heights over the fitted surface, in the unit of the positions.
-    pub(super) heights: Vec<f32>,
+    pub(in crate::export) heights: Vec<f32>,
     /// Whether a vertex belongs to a stroke and lies over the print.
     pub(super) strokes: Vec<bool>,
     /// The scan in its own frame. Its faces have the winding of the file.
-    pub(super) source: Mesh,
+    pub(in crate::export) source: Mesh,
 }
 
 impl PlacedMesh {

@@ -19,6 +19,7 @@ pub(in crate::export) struct MeshPlacement {
     print_from_mesh: PrintFromMesh,
     height_from_mesh: HeightFromMesh,
     frame_from_plane: Rigid3,
+    writing_is_mirrored: bool,
 }
 
 /// A placed point of a scan.
@@ -61,14 +62,20 @@ impl MeshPlacement {
             height_from_mesh: HeightFromMesh::new(&fit.plane_from_mesh, scale.bow.as_ref()),
             threshold: outcome.threshold_depth,
             frame_from_plane: Rigid3::to_frame(axes, [origin[0], origin[1], 0.0]),
+            writing_is_mirrored: print_from_plane.determinant() >= 0.0,
             fit,
             scale,
         })
     }
 
     /// Returns the unit of the mesh, if it is known.
-    pub(super) const fn unit(&self) -> Option<LengthUnit> {
+    pub(in crate::export) const fn unit(&self) -> Option<LengthUnit> {
         self.scale.unit
+    }
+
+    /// Returns whether the block is carved in mirror writing, so that x runs against the columns of the print.
+    pub(in crate::export) const fn writing_is_mirrored(&self) -> bool {
+        self.writing_is_mirrored
     }
 
     /// Returns the map from mesh points to print pixels.
@@ -103,7 +110,7 @@ impl MeshPlacement {
     }
 
     /// Returns millimetres per mesh unit, or 1 if the unit is unknown.
-    pub(super) fn frame_unit_per_mesh_unit(&self) -> f64 {
+    pub(in crate::export) fn frame_unit_per_mesh_unit(&self) -> f64 {
         self.scale.unit.map_or(1.0, LengthUnit::mm)
     }
 }
@@ -219,7 +226,7 @@ pub(super) mod tests {
         for point in [[0.3, -0.2, 0.1], [5.0, 4.0, -0.7], [-2.0, 1.0, 0.0]] {
             let found = placed.place(mesh_point(point));
             let [u, v, z] = placed.print_from_mesh().apply(mesh_point(point));
-            assert!(close(&found.pixel, &[u, v]));
+            assert!(close(&found.pixel, &[u, v]) && placed.writing_is_mirrored());
             let expected = [(99.5 - u) * mm_per_px, (49.5 - v) * mm_per_px, 10.0 * z];
             assert!(close(&found.position, &expected), "{found:?} {expected:?}");
         }
@@ -260,6 +267,7 @@ pub(super) mod tests {
         let mirrored = Affine2::similarity(0.5, 0.7, [40.0, -20.0]).after(&Affine2::mirror(180));
         let placed = MeshPlacement::new(fit(), scale(None), &outcome(mirrored), SIZE);
         let placed = placed.expect("invertible");
+        assert!(!placed.writing_is_mirrored());
         let found = placed.place(mesh_point([1.0, 2.0, 0.5]));
         let expected = [
             (found.pixel[0] - 99.5) / 20.0,

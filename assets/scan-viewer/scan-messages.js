@@ -1,0 +1,45 @@
+// Texts of the 3D view in English and Vietnamese.
+
+const SCAN_MESSAGES = {
+  view: { en: "3D view of the scan", vi: "Bản quét 3D" },
+  controls: { en: "Controls of the 3D view", vi: "Điều khiển khung xem 3D" },
+  colour: { en: "Wood to ink", vi: "Từ gỗ đến mực" },
+  light_direction: { en: "Light from (degrees)", vi: "Hướng chiếu sáng (độ)" },
+  light_height: { en: "Light above the surface (degrees)", vi: "Góc chiếu so với mặt ván (độ)" },
+  shading: { en: "Shading", vi: "Độ tương phản sáng tối" },
+  exaggeration: { en: "Relief height", vi: "Phóng đại độ cao nét" },
+  threshold: { en: "Above the threshold", vi: "Phần cao hơn ngưỡng" },
+  threshold_height: { en: "Threshold", vi: "Ngưỡng" },
+  strokes: { en: "Strokes of the result", vi: "Nét của kết quả" },
+  ink_outline: { en: "Outline of the ink", vi: "Đường viền nét mực" },
+  plane: { en: "Fitted plane", vi: "Mặt phẳng khớp" },
+  as_printed: { en: "As printed (mirrored)", vi: "Như bản in (lật gương)" },
+  reset: { en: "Reset the view", vi: "Đặt lại góc nhìn" },
+  close: { en: "Close", vi: "Đóng" },
+  keys: { en: "Keys", vi: "Phím tắt" },
+  key_list: {
+    en: "arrow keys: turn · Shift + arrow keys: move · + −: closer, farther · 0: reset · W: wood or ink · S: strokes · O: outline · T: threshold · G: plane · [ ]: relief height · M: as printed · Escape: close",
+    vi: "phím mũi tên: xoay · Shift + mũi tên: di chuyển · + −: gần, xa · 0: đặt lại · W: gỗ hoặc mực · S: nét · O: đường viền · T: ngưỡng · G: mặt phẳng · [ ]: độ cao nét · M: như bản in · Escape: đóng",
+  },
+  triangles: { en: "{n} triangles", vi: "{n} tam giác" },
+  points: { en: "{n} points", vi: "{n} điểm" },
+  simplified: { en: "simplified from {n}", vi: "giản lược từ {n}" },
+  grid_step: { en: "grid {step}", vi: "ô lưới {step}" },
+  picked: { en: "height {height}, print pixel {x}, {y}", vi: "độ cao {height}, điểm ảnh {x}, {y}" },
+  picked_beside: { en: "height {height}, beside the print", vi: "độ cao {height}, ngoài bản in" },
+  no_webgl: {
+    en: "This browser cannot draw in 3D (WebGL 2 is not available).",
+    vi: "Trình duyệt này không vẽ được 3D (không có WebGL 2).",
+  },
+  no_data: { en: "The scan cannot be displayed: {why}", vi: "Không hiển thị được bản quét: {why}" },
+};
+
+/** Returns the language of the browser, or English if it is not supported. */
+export function preferredLanguage() {
+  return navigator.languages?.some((language) => language.startsWith("vi")) ? "vi" : "en";
+}
+
+/** Returns a text with `{name}` replaced by the values. */
+export function scanText(language, key, values = {}) {
+  return SCAN_MESSAGES[key][language].replace(/\{(\w+)\}/g, (placeholder, name) => values[name] ?? placeholder);
+}
