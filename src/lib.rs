@@ -129,6 +129,13 @@
 //! `pair_pictures.rs` reads inputs and artifacts when a format needs them, and `format_writer.rs` says what a format must
 //! implement; the formats are in `formats/`. `manifest.rs` recognizes earlier exports, which are replaced as a whole.
 //!
+//! ## The 3D view
+//!
+//! `src/export/scan_view/scan_data.rs` encodes a scan in the frame of its print with textures, which `view_inputs.rs` beside
+//! it reads; `src/mesh/clustering.rs` simplifies large scans. `assets/scan-viewer/scan-viewer.js` shows the data in three
+//! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
+//! (`standalone_page.rs`).
+//!
 //! ## Rooms
 //!
 //! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
@@ -153,6 +160,7 @@
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
+//! | `view` | the page that shows one scan on its print in 3D | `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
@@ -186,3 +194,4 @@ pub mod runner;
 mod simd;
 pub mod stages;
 pub mod store;
+pub mod view;

@@ -6,6 +6,7 @@ import { images } from "./image-cache.js";
 import { labelKeys, listen } from "./keyboard.js";
 import { ReviewQueue } from "./queue.js";
 import { RetryQueue } from "./retry-queue.js";
+import { isScanOpen, openScan } from "./scan-dialog.js";
 import * as ui from "./ui.js";
 import { Viewer } from "./viewer.js";
 
@@ -178,6 +179,13 @@ async function showDetails(item = queue.current) {
   ui.announce(parts.join(" · "));
 }
 
+/** Opens the 3D view of the current item. */
+async function showScan() {
+  const item = queue.current;
+  if (!item) return;
+  await openScan(item).catch((error) => ui.alert(translate("no_image", { why: error.message })));
+}
+
 /** Opens the alignment editor, or closes it if it is open. */
 async function toggleEditor() {
   const item = queue.current;
@@ -256,6 +264,7 @@ const actions = {
   details: () => showDetails(),
   help: () => ui.help(),
   align: toggleEditor,
+  scan_view: showScan,
   save: () => editor && saveAlignment(),
   cancel: () => closeEditor(),
   other_language: () => document.getElementById("language").click(),
@@ -270,6 +279,7 @@ const MAY_REPEAT = new Set(["rotate_left", "rotate_right", "less", "more", "next
 const LEAVES_ITEM = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
 
 function perform(action, event, at) {
+  if (isScanOpen()) return;
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
   if (editor && event && editor.handleKey(action, event)) return;

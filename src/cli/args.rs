@@ -10,7 +10,7 @@ use super::exit::ExitCode;
 use super::global::Global;
 use super::{
     backup, check, completions, config, contact_sheet, demo, export, import, man, report, restore,
-    retry, review, run, show, status, verdict,
+    retry, review, run, show, status, verdict, view,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -55,6 +55,8 @@ pub(super) enum Command {
     Verdict(verdict::VerdictCommand),
     /// Judge results in the browser with the keyboard, and align pairs manually
     Review(review::ReviewArgs),
+    /// Show a scan in 3D with its print on it, in the browser
+    View(view::ViewArgs),
     /// Measure how far reviewers agree with each other and with themselves, and which planted errors they catch
     Agreement,
     /// Print the table of all results

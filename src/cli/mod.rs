@@ -3,6 +3,7 @@
 mod agreement;
 mod args;
 mod backup;
+mod browser;
 mod check;
 mod compare;
 mod completions;
@@ -43,6 +44,7 @@ mod time_text;
 mod truth_file;
 mod verdict;
 mod verdict_file;
+mod view;
 
 use std::ffi::OsString;
 
@@ -117,6 +119,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Restore(args) => restore::restore(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,
+        Command::View(args) => view::view(args, context).await,
         Command::Agreement => agreement::agreement(context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,

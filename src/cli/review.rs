@@ -1,12 +1,11 @@
 //! `review`: serves the review page on this machine.
 
-use std::io::Write as _;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::process::{Command, Stdio};
 
 use clap::Args;
 use serde_json::json;
 
+use super::browser::open;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::output;
@@ -14,6 +13,7 @@ use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
+use crate::export::InputFileLimits;
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
@@ -100,7 +100,10 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         language,
         keys,
         min_view_ms: args.min_view_ms,
-        limits: settings.config.limits.image,
+        limits: InputFileLimits {
+            mesh: settings.config.limits.mesh,
+            image: settings.config.limits.image,
+        },
         now,
         queue: queue_options(&args),
     };
@@ -209,32 +212,6 @@ fn announce(
     Ok(if is_for_script { None } else { open(&url) })
 }
 
-/// Opens the address in the system's browser, through a private file that redirects to it. The token in the address
-/// therefore does not appear in the list of processes. A missing browser is not an error, because the address is
-/// printed.
-fn open(url: &str) -> Option<tempfile::NamedTempFile> {
-    let program = if cfg!(target_os = "macos") {
-        "open"
-    } else {
-        let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"].map(std::env::var_os);
-        has_screen.iter().flatten().next()?;
-        "xdg-open"
-    };
-    let mut file = tempfile::Builder::new().suffix(".html").tempfile().ok()?;
-    let page = format!("<meta http-equiv=\"refresh\" content=\"0;url={url}\">");
-    file.write_all(page.as_bytes()).ok()?;
-    let started = Command::new(program)
-        .arg(file.path())
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
-    if let Err(error) = started {
-        tracing::debug!(%error, "no browser was opened");
-    }
-    Some(file)
-}
-
 /// Returns Vietnamese if the locale is Vietnamese, otherwise English.
 fn language_of_system() -> Language {
     let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
@@ -258,7 +235,7 @@ mod tests {
         let settings = load(&Sources::default()).expect("the defaults");
         let keys = &settings.config.review.keys;
         let map = key_map(keys).expect("the default keys");
-        assert_eq!((map.len(), keys.len()), (40, 40));
+        assert_eq!((map.len(), keys.len()), (41, 41));
         assert_eq!(map["KeyP"], "pass");
     }
 

@@ -1,5 +1,7 @@
 //! Scripts and styles of the page, embedded in the program. The page loads nothing from other hosts.
 
+use crate::export::scan_view;
+
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 const ICON: &str = "image/svg+xml";
@@ -15,7 +17,7 @@ macro_rules! asset {
     };
 }
 
-const ASSETS: [(&str, &str, &str); 14] = [
+const ASSETS: [(&str, &str, &str); 15] = [
     asset!("review.css", STYLE),
     asset!("icon.svg", ICON),
     asset!("main.js", SCRIPT),
@@ -29,13 +31,15 @@ const ASSETS: [(&str, &str, &str); 14] = [
     asset!("viewport.js", SCRIPT),
     asset!("keyboard.js", SCRIPT),
     asset!("alignment-editor.js", SCRIPT),
+    asset!("scan-dialog.js", SCRIPT),
     asset!("ui.js", SCRIPT),
 ];
 
-/// Returns content type and text of an asset.
+/// Returns content type and text of an asset of the page or of the 3D view.
 pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
     let found = ASSETS.iter().find(|(asset, ..)| *asset == name);
-    found.map(|(_, kind, text)| (*kind, *text))
+    let found = found.map(|(_, kind, text)| (*kind, *text));
+    found.or_else(|| scan_view::assets::find(name))
 }
 
 /// Returns the text of every script.
@@ -63,7 +67,7 @@ mod tests {
     #[test]
     fn every_imported_module_exists() {
         for (name, _, text) in ASSETS {
-            let with_id = ["from \"./", "Worker(\"/assets/"].into_iter();
+            let with_id = ["from \"./", "import(\"./", "Worker(\"/assets/"].into_iter();
             for after in with_id.flat_map(|start| text.split(start).skip(1)) {
                 let module = after.split('"').next().unwrap_or_default();
                 assert!(super::find(module).is_some(), "{name} imports {module}");

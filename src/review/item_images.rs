@@ -13,7 +13,8 @@ use super::item::ReviewItem;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Affine2, Stage};
 use crate::export::pictures::{PrintView, shaded};
-use crate::export::{SourcePrint, SourcePrintError};
+use crate::export::scan_view::ScanView;
+use crate::export::{InputFileLimits, PictureError, SourcePrint, SourcePrintError};
 use crate::raster::{self, DepthMap, Mask, MaskOverlap, png_grey8, png_mask, png_rgb8, warp_mask};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::stages::normalize::PrintMasks;
@@ -59,6 +60,9 @@ pub(super) enum ImageError {
     /// The pair has a new result.
     #[error("this pair has a new result; reload the page")]
     Gone,
+    /// The scan cannot be shown in 3D.
+    #[error(transparent)]
+    Scan(#[from] PictureError),
     #[error("rendering stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
@@ -195,7 +199,7 @@ fn stroke_map(
 pub(super) struct ImageCache {
     catalog: Catalog,
     project: Project,
-    limits: raster::ImageLimits,
+    limits: InputFileLimits,
     slots: Mutex<CacheSlots<ItemImages>>,
     /// Permits one item at a time to read its print or its artifacts.
     reading: Arc<Semaphore>,
@@ -252,7 +256,7 @@ impl<T> CacheSlots<T> {
 }
 
 impl ImageCache {
-    pub(super) fn new(catalog: Catalog, project: Project, limits: raster::ImageLimits) -> Self {
+    pub(super) fn new(catalog: Catalog, project: Project, limits: InputFileLimits) -> Self {
         Self {
             catalog,
             project,
@@ -290,7 +294,7 @@ impl ImageCache {
     pub(super) async fn of(&self, item: &Arc<ReviewItem>) -> Result<Arc<ItemImages>, ImageError> {
         let slot = self.slots.lock().await.entry(&item.id);
         let render = async || {
-            let limits = self.limits;
+            let limits = self.limits.image;
             let render = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
                 ItemImages::render(project, pair, item, &limits)
             };
@@ -315,6 +319,22 @@ impl ImageCache {
     ) -> Result<AlignmentInputs, ImageError> {
         let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
             AlignmentInputs::read(&PairArtifacts::new(project, pair), item)
+        };
+        self.read(item, read).await
+    }
+
+    /// Returns the data of the 3D view of an item. It does not name the pair.
+    ///
+    /// # Errors
+    /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
+    pub(super) async fn scan_view(&self, item: &Arc<ReviewItem>) -> Result<Vec<u8>, ImageError> {
+        let limits = self.limits;
+        let read = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
+            AlignmentInputs::read(&PairArtifacts::new(project, pair), item)?;
+            let (metric, _) = item.results.first().ok_or(ImageError::Gone)?;
+            let (map, level) = (&item.view.print_from_depth, item.view.level);
+            let view = ScanView::of_alignment(project, pair, *metric, map, level, limits)?;
+            Ok(view.ok_or(ImageError::Gone)?.to_bytes())
         };
         self.read(item, read).await
     }

@@ -12,7 +12,7 @@ pub(super) const ACTIONS: [(&str, &str); 4] = [
     (
         "modes",
         "two_up overlay edges onion checker difference reveal flicker auto_flicker angle_guides stroke_map zoom \
-         rotate_left rotate_right less more reset",
+         scan_view rotate_left rotate_right less more reset",
     ),
     (
         "navigation",

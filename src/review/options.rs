@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use super::check_items::CheckRates;
 use super::i18n::Language;
 use crate::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
-use crate::raster::ImageLimits;
+use crate::export::InputFileLimits;
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,8 +49,8 @@ pub struct ReviewOptions {
     /// Address to listen on. Port 0 selects a fixed port for the project and reviewer. If the fixed port is taken, any
     /// free port is used.
     pub listen: SocketAddr,
-    /// Limits on the print images.
-    pub limits: ImageLimits,
+    /// Limits on the input files.
+    pub limits: InputFileLimits,
     /// Clock.
     pub now: fn() -> UnixMillis,
 }

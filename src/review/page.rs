@@ -10,7 +10,7 @@ use crate::domain::{Reason, ReviewOrder, one_line};
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
-const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
+const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align scan_view";
 
 /// Returns a whole document.
 fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -52,6 +52,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
     );
     let head = html! {
         link rel="stylesheet" href="/assets/review.css";
+        link rel="stylesheet" href="/assets/scan-viewer.css";
         link rel="icon" href="/assets/icon.svg";
         script type="module" src="/assets/main.js" {}
     };
@@ -75,6 +76,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         (verdict_bar(language))
         (help(language, options.has_attention_checks()))
         (jump(language))
+        dialog #scan .scan-dialog aria-label=(language.translate("scan_view")) {}
         p #live .live aria-live="polite" {}
     };
     document(language, &title, &head, &body)

@@ -33,6 +33,7 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/", get(index))
         .route("/assets/{name}", get(asset))
         .route("/image/{id}/{layer}", get(image))
+        .route("/scan/{id}", get(scan))
         .route("/api/config", get(config))
         .route("/api/queue", get(queue))
         .route("/api/details/{id}", get(details))
@@ -176,6 +177,16 @@ async fn image(
     let png = state.images.layer(&item, layer).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
     Ok((kind, png).into_response())
+}
+
+async fn scan(
+    State(state): State<Arc<ServerState>>,
+    Path(id): Path<String>,
+) -> ApiResult<Response> {
+    let item = served_item(&state, &id)?;
+    let data = state.images.scan_view(&item).await?;
+    let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
+    Ok((kind, data).into_response())
 }
 
 /// Returns the pair, metrics and scores of an answered item, without revealing whether the item is an attention check.

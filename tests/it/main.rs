@@ -74,6 +74,7 @@ mod review_load;
 mod review_page;
 mod same_output;
 mod sample_files;
+mod scan_viewer;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;

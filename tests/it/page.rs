@@ -88,9 +88,12 @@ impl std::ops::Deref for Page {
 impl Page {
     /// Starts the server of a reviewer without a session.
     pub(crate) fn start(project: &Project, reviewer: &str, args: &[&str]) -> Self {
-        let mut command = review(project, reviewer);
+        Self::of(review(project, reviewer).args(args))
+    }
+
+    /// Starts the server of a command that prints its address as JSON.
+    pub(crate) fn of(command: &mut Command) -> Self {
         let mut child = command
-            .args(args)
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

@@ -79,6 +79,7 @@ fn a_foreign_host_is_rejected_first() {
         "/api/queue",
         "/assets/main.js",
         "/image/a/print",
+        "/scan/a",
     ] {
         let reply = send(target.page.address(), "GET", path, &same, b"").expect("a reply");
         assert_eq!(reply.status, 421, "{path}");
@@ -130,6 +131,7 @@ fn nothing_is_served_without_the_cookie() {
         "/api/config",
         "/assets/main.js",
         &image,
+        "/scan/a",
         "/nowhere",
     ] {
         let reply = send(target.page.address(), "GET", path, &headers, b"").expect("a reply");

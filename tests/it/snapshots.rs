@@ -109,6 +109,7 @@ fn help_of_every_command() {
         &["verdict", "log"],
         &["verdict", "undo"],
         &["review"],
+        &["view"],
         &["agreement"],
         &["report"],
         &["export"],

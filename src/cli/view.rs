@@ -1,0 +1,92 @@
+//! `view PAIR`: shows a scan on its print in the browser.
+
+use std::net::{Ipv4Addr, SocketAddr};
+
+use clap::Args;
+use serde_json::json;
+
+use super::browser::open;
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::output;
+use super::select;
+use super::signals;
+use crate::domain::ThresholdMetric;
+use crate::export::InputFileLimits;
+use crate::export::scan_view::ScanView;
+use crate::runner::{Stop, StopLevel};
+use crate::view;
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub(super) struct ViewArgs {
+    /// The pair
+    pair: String,
+    /// The metric whose result is shown [default: ensemble, or else the first that the pair has]
+    #[arg(long)]
+    metric: Option<ThresholdMetric>,
+    /// Port on this machine; 0 chooses the same port each time for a pair, or any free port
+    #[arg(long, value_name = "N", default_value = "0")]
+    port: u16,
+    /// Print the address without opening a browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let limits = context.settings()?.config.limits;
+    let limits = InputFileLimits {
+        mesh: limits.mesh,
+        image: limits.image,
+    };
+    let (project, catalog) = context.open_read_only().await?;
+    let name = select::pair(&catalog, &args.pair).await?;
+    let detail = catalog.pair(&name).await?;
+    catalog.close().await;
+    let Some(pair) = detail.map(|detail| detail.results) else {
+        anyhow::bail!("pair {name} was removed while it was read");
+    };
+    let default = pair.metric(ThresholdMetric::DEFAULT);
+    let default = default.or_else(|| pair.metrics.first());
+    let metric = args.metric.or(default.map(|record| record.outcome.metric));
+    let read = move |metric| ScanView::read(&project, &pair, metric, limits);
+    let scan = match metric {
+        None => None,
+        Some(metric) => tokio::task::spawn_blocking(move || read(metric)).await??,
+    };
+    let Some(scan) = scan else {
+        let of = args
+            .metric
+            .map_or_else(String::new, |metric| format!(" of {metric}"));
+        let text = format!("pair {name} has no result{of} to show; see: mocban show {name}");
+        return Err(Refusal::NothingSelected(text).into());
+    };
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    let page = view::bind(address, name.as_str(), &scan).await?;
+    let _file = announce(&page.url(), &args, context)?;
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let drain = stop.clone();
+    tokio::select! {
+        () = page.serve(async move { drain.reached(StopLevel::Drain).await }) => {}
+        () = stop.reached(StopLevel::Now) => {}
+    }
+    signals.abort();
+    Ok(ExitCode::Done)
+}
+
+/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page.
+fn announce(
+    url: &str,
+    args: &ViewArgs,
+    context: &Context,
+) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+    if context.global.json {
+        output::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
+    } else {
+        output::print(url)?;
+    }
+    context.info("the address works once, in one browser; press Ctrl-C to end");
+    let is_for_script = args.no_open || context.global.json || context.global.quiet;
+    Ok(if is_for_script { None } else { open(url) })
+}

@@ -1,0 +1,115 @@
+//! The server: binds the port, and serves the page and its data until it is stopped.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use axum::body::Bytes;
+use axum::extract::{Path, RawQuery, State};
+use axum::http::{StatusCode, header};
+use axum::response::{Html, IntoResponse as _, Response};
+use axum::routing::get;
+use axum::{Router, middleware};
+use tokio::net::TcpListener;
+
+use super::page;
+use crate::export::scan_view::{ScanView, assets};
+use crate::local_server::{AccessControl, ConnectionLimits, START, guard, listen, serve};
+
+/// The script of the page.
+const SCRIPT: &str = include_str!("../../assets/scan-viewer/view.js");
+
+/// Why the server cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// The address cannot be bound.
+    #[error("cannot listen on {address}: {source}")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// The cause.
+        source: std::io::Error,
+    },
+    /// The operating system provides no randomness for the token.
+    #[error("cannot make a token: {0}")]
+    Token(std::io::Error),
+}
+
+/// What the page shows, and who may see it.
+#[derive(Debug)]
+struct ShownScan {
+    access: Arc<AccessControl>,
+    pair: String,
+    data: Bytes,
+}
+
+/// A server that is bound and ready to serve.
+#[derive(Debug)]
+pub struct ViewServer {
+    listener: TcpListener,
+    shown: Arc<ShownScan>,
+}
+
+/// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free.
+///
+/// # Errors
+/// Returns an error if the address cannot be bound or the system provides no randomness.
+pub async fn bind(
+    address: SocketAddr,
+    pair: &str,
+    view: &ScanView,
+) -> Result<ViewServer, ViewError> {
+    let failed = |source| ViewError::Listen { address, source };
+    let listener = listen(address, pair).await.map_err(failed)?;
+    let bound = listener.local_addr().map_err(failed)?;
+    let access = AccessControl::new("view", bound).map_err(ViewError::Token)?;
+    Ok(ViewServer {
+        listener,
+        shown: Arc::new(ShownScan {
+            access: Arc::new(access),
+            pair: pair.to_owned(),
+            data: view.to_bytes().into(),
+        }),
+    })
+}
+
+impl ViewServer {
+    /// Returns the start URL with the one-time token.
+    pub fn url(&self) -> String {
+        self.shown.access.url()
+    }
+
+    /// Serves requests until `stop` completes, and then at most two seconds longer.
+    pub async fn serve(self, stop: impl Future<Output = ()>) {
+        let access = Arc::clone(&self.shown.access);
+        let router = Router::new()
+            .route(START, get(start))
+            .route("/", get(index))
+            .route("/assets/{name}", get(asset))
+            .route("/scan", get(scan))
+            .layer(middleware::from_fn_with_state(access, guard))
+            .with_state(self.shown);
+        serve(self.listener, router, ConnectionLimits::system(), stop).await;
+    }
+}
+
+async fn start(State(shown): State<Arc<ShownScan>>, RawQuery(query): RawQuery) -> Response {
+    let query = query.as_deref();
+    shown.access.start(query, page::forward, page::token_used)
+}
+
+async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
+    Html(page::view(&shown.pair))
+}
+
+async fn asset(Path(name): Path<String>) -> Response {
+    let own = (name == "view.js").then_some(("text/javascript; charset=utf-8", SCRIPT));
+    match own.or_else(|| assets::find(&name)) {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+async fn scan(State(shown): State<Arc<ShownScan>>) -> Response {
+    let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
+    (kind, shown.data.clone()).into_response()
+}
