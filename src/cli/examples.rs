@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 22] = [
+const EXAMPLES: [(&str, &str); 23] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100",
@@ -52,6 +52,7 @@ const EXAMPLES: [(&str, &str); 22] = [
         "export",
         "mocban -C blocks export -o out\nmocban -C blocks export --to csv,webdataset --split 80/10/10 -o dataset",
     ),
+    ("view", "mocban -C blocks view b01-0117"),
     (
         "contact-sheet",
         "mocban -C blocks contact-sheet --order confidence -o worst.png",
