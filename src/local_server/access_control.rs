@@ -6,8 +6,10 @@ use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Redirect, Response};
 
 use super::address::hosts;
-use super::guard::START;
 use super::session::Session;
+
+/// Path that accepts the one-time token.
+pub const START: &str = "/start";
 
 /// The accepted host names and the session of a server.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header}
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
-use super::access_control::AccessControl;
+use super::access_control::{AccessControl, START};
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 const BODY_LIMIT: usize = 16 * 1024;
@@ -19,8 +19,6 @@ const BODY_LIMIT: usize = 16 * 1024;
 const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Request header that carries the CSRF token.
 const CSRF_HEADER: &str = "x-csrf-token";
-/// Path that accepts the one-time token.
-pub const START: &str = "/start";
 
 /// Security headers of every response.
 const HEADERS: [(HeaderName, &str); 7] = [

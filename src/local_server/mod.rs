@@ -10,8 +10,8 @@ mod connections;
 mod guard;
 mod session;
 
-pub use access_control::AccessControl;
+pub use access_control::{AccessControl, START};
 pub use address::listen;
 pub use connection::ConnectionLimits;
 pub use connections::serve;
-pub use guard::{START, guard};
+pub use guard::guard;

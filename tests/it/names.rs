@@ -1,6 +1,7 @@
 //! Ids and file names as people write them: with accents, spaces and punctuation, composed and decomposed, with the
 //! backslashes of Windows, misspelt, or missing.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -35,9 +36,9 @@ fn write_inputs(dir: &Path) {
             let slash = if k == 2 { "\\" } else { "/" };
             let cell = format!("data{slash}biản khắc{slash}{name} {k}.{extension}");
             if kind == "meshes" {
-                list += &format!("{id},{cell}");
+                let _ = write!(list, "{id},{cell}");
             } else {
-                list += &format!(",{cell},天\n");
+                let _ = writeln!(list, ",{cell},天");
             }
         }
     }
@@ -106,9 +107,10 @@ fn pairs_with_vietnamese_names_are_aligned_shown_and_exported() {
 #[test]
 fn missing_files_are_named_and_nothing_is_imported() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let rows: String = (0..30)
-        .map(|k| format!("{k},m/{k}.stl,p/{k}.png\n"))
-        .collect();
+    let mut rows = String::new();
+    for k in 0..30 {
+        let _ = writeln!(rows, "{k},m/{k}.stl,p/{k}.png");
+    }
     fs::write(
         dir.path().join("pairs.csv"),
         format!("id,mesh,print\n{rows}"),
