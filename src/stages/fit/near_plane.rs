@@ -17,8 +17,8 @@ const REACH: f64 = 0.2;
 const OUTSIDE: f64 = 0.01;
 /// The cut part is widened by this share of its sides.
 const WIDENED: f64 = 0.03;
-/// Of all faces with about the normal of the plane, the uppermost quarter ends above the middle of the plane. A block
-/// has as much area on its back.
+/// This share of the area of all faces with about the given normal lies below the middle of the uppermost plane: half of
+/// the area is on the back of a block, and half of the rest below the middle.
 const MIDDLE: f64 = 0.75;
 /// A smaller part is not a side.
 const LEAST_VERTICES: usize = 64;
