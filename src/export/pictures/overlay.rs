@@ -68,12 +68,17 @@ impl PrintView {
         picture
     }
 
-    /// Draws the edges of a mask on a picture of the view. `strokes` is in the print's frame.
+    /// Draws the edges of a mask on a picture of the view, which is the print or the print enlarged. `strokes` is in the
+    /// print's frame.
     pub fn overlay_on(&self, mut picture: Rgb, strokes: &Mask) -> Rgb {
-        if (strokes.width(), strokes.height()) == (self.width, self.height) {
+        let factor = (self.width / strokes.width()).max(1);
+        if factor == 1 {
             self.draw_edges(&mut picture, strokes, EDGE);
         } else {
-            self.draw_edges(&mut picture, &self.mask(strokes, &Affine2::IDENTITY), EDGE);
+            // The pixels of the print are repeated too.
+            let repeated = |x, y| strokes.at(x / factor, y / factor);
+            let repeated = Mask::from_fn(self.width, self.height, repeated);
+            self.draw_edges(&mut picture, &repeated, EDGE);
         }
         picture
     }
