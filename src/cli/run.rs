@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::context::Context;
+use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::ProgressReporter;
@@ -210,7 +210,7 @@ pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<Strin
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
-        steps.push(format!("show {}", first.name));
+        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
         steps.push("retry".to_owned());
     }
     if jobs(JobStatus::Done) > 0 && !summary.stopped {

@@ -3,7 +3,7 @@
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::context::Context;
+use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
 use super::select;
@@ -75,7 +75,7 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
 }
 
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
-    let name = &detail.results.attributes.name;
+    let name = shell_quoted(detail.results.attributes.name.as_str());
     match detail.results.status {
         JobStatus::Quarantined => vec![format!("retry {name}")],
         JobStatus::Leased => vec!["status --watch".to_owned()],

@@ -222,7 +222,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
         steps.push("run".to_owned());
     }
     if let Some(first) = status.failures.first() {
-        steps.push(format!("show {}", first.name));
+        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
     }
     if status.counts.low_confidence > 0 {
         steps.push("contact-sheet --order confidence".to_owned());

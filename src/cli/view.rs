@@ -6,7 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::browser::open;
-use super::context::Context;
+use super::context::{Context, shell_quoted};
 use super::exit::{ExitCode, Refusal};
 use super::output;
 use super::select;
@@ -58,7 +58,8 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
         let of = args
             .metric
             .map_or_else(String::new, |metric| format!(" of {metric}"));
-        let text = format!("pair {name} has no result{of} to show; see: mocban show {name}");
+        let command = context.command(&format!("show {}", shell_quoted(name.as_str())));
+        let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));

@@ -150,7 +150,7 @@ pub fn compact_grey8(grid: &Grid<u8>) -> Vec<u8> {
 /// # Ok::<(), mocban::raster::DecodeError>(())
 /// ```
 pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
-    // Enlarging repeats pixels and rows, which a filter would hide: an overlay of 600 px takes 5 ms and 69 kB, instead
+    // Enlarging repeats pixels and rows, which a filter would hide: an enlarged overlay of 600 px takes 5 ms and 69 kB, instead
     // of 0.7 ms and 100 kB. Another third of the time would save 3 %.
     let (width, height) = (grid.width() as u32, grid.height() as u32);
     let mut out = Vec::with_capacity(grid.data().len());

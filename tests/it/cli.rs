@@ -361,7 +361,7 @@ fn refused_verdict_file_records_nothing() {
 fn every_next_line_can_be_run_unchanged() {
     let dir = empty();
     std::fs::create_dir(dir.path().join("my scans")).expect("a folder");
-    let text = "id,mesh,print\na,a.stl,a.png\n";
+    let text = "id,mesh,print\nchữ số 1,a.stl,a.png\n";
     std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
     let import = [
         "-C",

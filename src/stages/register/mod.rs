@@ -178,12 +178,12 @@ fn require_tops(
         return Ok(());
     }
     // The last threshold is that of the metric `relief`.
-    let surround = thresholds.last().is_some_and(|chosen| {
+    let surround = |chosen: &ChosenThreshold| {
         let tops = depth.stroke_mask(chosen.choice.level);
         let known = depth.levels.map(|level| *level != 0);
         rim_share(&tops, &known) > TOPS_AT_RIM
-    });
-    if surround || !inks[0].light_on_dark {
+    };
+    if !inks[0].light_on_dark || thresholds.last().is_some_and(surround) {
         return Err(RegisterError::Inverted);
     }
     Ok(())
