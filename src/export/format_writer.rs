@@ -55,9 +55,11 @@ pub(super) struct EncodedFile {
 
 impl EncodedPair {
     /// Adds a file of the pair; see [`EncodedFile::pattern`].
-    pub(super) fn add_file(&mut self, pattern: impl Into<String>, bytes: Vec<u8>) {
-        let pattern = pattern.into();
-        self.files.push(EncodedFile { pattern, bytes });
+    pub(super) fn add_file(&mut self, pattern: impl Into<String>, bytes: impl Into<Vec<u8>>) {
+        self.files.push(EncodedFile {
+            pattern: pattern.into(),
+            bytes: bytes.into(),
+        });
     }
 }
 

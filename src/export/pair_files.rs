@@ -8,7 +8,7 @@ use super::pair_pictures::{PairPictures, PictureError};
 use crate::catalog::MetricRecord;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
 use crate::domain::{DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric};
-use crate::raster::{compact_grey16, compact_mask, compact_rgb8};
+use crate::raster::{compact_rgb8, png_grey16, png_mask};
 use crate::report::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
@@ -80,30 +80,26 @@ pub(super) fn write_files(
     let (print, extension) = pictures.print_file()?;
     let print_name = shared(&format!("print.{extension}"));
     encoded.add_file(&print_name, print);
-    encoded.add_file(
-        shared("print_mask.png"),
-        compact_mask(&pictures.print_mask()?),
-    );
-    let depth = compact_grey16(&pictures.depth()?.levels);
-    encoded.add_file(shared("depth.png"), depth);
+    encoded.add_file(shared("print_mask.png"), png_mask(&pictures.print_mask()?));
+    encoded.add_file(shared("depth.png"), pictures.depth_file()?);
     encoded.add_file(
         shared("depth.json"),
         sidecar(&pictures.outcomes.depth.scale).into_bytes(),
     );
-    let canvas = pictures.stored_picture(Stage::Register, CANVAS_PRINT_MASK)?;
+    let canvas = pictures.stored_file(Stage::Register, CANVAS_PRINT_MASK)?;
     encoded.add_file(shared("canvas_print_mask.png"), canvas);
 
     let mut each = EachMetric { pictures, encoded };
     let same_level = |a: &MetricOutcome, b: &MetricOutcome| a.threshold_level == b.threshold_level;
     let same_pose = |a: &MetricOutcome, b: &MetricOutcome| a.print_from_depth == b.print_from_depth;
     let depth_masks = each.add("depth_mask", same_level, |metric| {
-        Ok(compact_mask(&pictures.depth_mask(metric)?))
+        Ok(png_mask(&pictures.depth_mask(metric)?))
     })?;
     let aligned_depths = each.add("aligned_depth", same_pose, |metric| {
-        Ok(compact_grey16(&pictures.aligned_depth(metric)?))
+        Ok(png_grey16(&pictures.aligned_depth(metric)?))
     })?;
     let aligned_masks = each.add("aligned_mask", same_alignment, |metric| {
-        Ok(compact_mask(pictures.aligned_mask(metric)?.as_ref()))
+        Ok(png_mask(pictures.aligned_mask(metric)?.as_ref()))
     })?;
     let overlays = each.add("overlay", same_alignment, |metric| {
         Ok(compact_rgb8(&pictures.overlay(metric)?))
@@ -163,7 +159,7 @@ impl EachMetric<'_, '_> {
         let first = first_of_each(&artifacts, |a, b| a.hash == b.hash);
         self.add_groups(name, &first, |i| {
             let role = role(pictures.metrics[i].outcome.metric);
-            pictures.stored_picture(Stage::Register, &role)
+            pictures.stored_file(Stage::Register, &role)
         })
     }
 

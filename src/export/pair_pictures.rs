@@ -8,11 +8,10 @@ use super::pictures::{PrintView, Rgb, eight_bits};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{MetricRecord, PairResults};
+use crate::domain::artifact_role::DEPTH;
 use crate::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
 use crate::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
-use crate::raster::{
-    DepthMap, Grid, ImageLimits, Mask, compact_grey8, compact_rgb8, warp_depth, warp_mask, warp_rgb,
-};
+use crate::raster::{DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::{InputError, Project, open_input};
 
@@ -75,6 +74,7 @@ pub(super) struct PairPictures<'a> {
     pub(super) metrics: Vec<&'a MetricRecord>,
     print: OnceCell<SourcePrint>,
     print_mask: OnceCell<Mask>,
+    depth_file: OnceCell<Vec<u8>>,
     depth: OnceCell<DepthMap>,
     /// The print, as overlays show it.
     enlarged: OnceCell<Rgb>,
@@ -102,6 +102,7 @@ impl<'a> PairPictures<'a> {
             metrics,
             print: OnceCell::new(),
             print_mask: OnceCell::new(),
+            depth_file: OnceCell::new(),
             depth: OnceCell::new(),
             enlarged: OnceCell::new(),
         }
@@ -121,9 +122,9 @@ impl<'a> PairPictures<'a> {
         Ok(self.artifacts().artifact(stage, role)?)
     }
 
-    /// Returns a stored 8-bit grey picture as a compact PNG.
-    pub(super) fn stored_picture(&self, stage: Stage, role: &str) -> Result<Vec<u8>, PictureError> {
-        Ok(compact_grey8(&self.artifacts().grey(stage, role)?))
+    /// Returns the bytes of a stored picture, whose hash is checked.
+    pub(super) fn stored_file(&self, stage: Stage, role: &str) -> Result<Vec<u8>, PictureError> {
+        Ok(self.artifacts().bytes(stage, role)?)
     }
 
     /// Returns the print as given, decoded.
@@ -137,9 +138,17 @@ impl<'a> PairPictures<'a> {
         get_or_read(&self.print_mask, || Ok(self.artifacts().print_mask()?))
     }
 
+    /// Returns the depth map, in its own frame, as the stored PNG.
+    pub(super) fn depth_file(&self) -> Result<&[u8], PictureError> {
+        let file = get_or_read(&self.depth_file, || self.stored_file(Stage::Depth, DEPTH))?;
+        Ok(file)
+    }
+
     /// Returns the depth map, in its own frame.
     pub(super) fn depth(&self) -> Result<&DepthMap, PictureError> {
-        get_or_read(&self.depth, || Ok(self.artifacts().depth()?))
+        get_or_read(&self.depth, || {
+            Ok(self.artifacts().decode_depth(self.depth_file()?)?)
+        })
     }
 
     /// Returns the frame that the print, the ink mask and the aligned pictures share.
@@ -171,7 +180,7 @@ impl<'a> PairPictures<'a> {
     /// Returns the print as an image file with its extension: the original where possible, otherwise a PNG.
     pub(super) fn print_file(&self) -> Result<(Vec<u8>, &'static str), PictureError> {
         if self.canvas.is_some() {
-            return Ok((compact_rgb8(&self.print_rgb()?), "png"));
+            return Ok((png_rgb8(&self.print_rgb()?), "png"));
         }
         self.original_file()
     }

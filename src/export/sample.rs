@@ -9,7 +9,7 @@ use super::record::{MetricFields, PairFields, PairRecord};
 use super::record_fields::{RecordField, schema_of};
 use crate::catalog::MetricRecord;
 use crate::domain::{PairName, ThresholdMetric};
-use crate::raster::{compact_grey16, compact_mask, png_rgb8};
+use crate::raster::{png_grey16, png_mask, png_rgb8};
 
 /// The fields of a sample.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -137,10 +137,10 @@ pub(super) fn pictures(
     }
     let files = [
         print,
-        compact_mask(&result.print_mask()?),
-        compact_grey16(&result.depth()?.levels),
-        compact_grey16(&result.aligned_depth(outcome)?),
-        compact_mask(result.aligned_mask(outcome)?.as_ref()),
+        png_mask(&result.print_mask()?),
+        result.depth_file()?.to_vec(),
+        png_grey16(&result.aligned_depth(outcome)?),
+        png_mask(result.aligned_mask(outcome)?.as_ref()),
     ];
     let files = PICTURES.into_iter().zip(files).enumerate();
     let pictures = files.map(|(i, (name, bytes))| SamplePicture {

@@ -16,8 +16,8 @@ mod warp_rgb;
 pub use decode::{DecodeError, ImageLimits, PrintImage, decode, header_pixel_count};
 pub use depth_map::DepthMap;
 pub use encode::{
-    PngError, compact_grey8, compact_grey16, compact_mask, compact_rgb8, decode_grey8,
-    decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16, png_mask, png_rgb8,
+    PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
+    png_grey16, png_mask, png_rgb8,
 };
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};

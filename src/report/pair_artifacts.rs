@@ -110,8 +110,16 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// Returns an error if the result or the image of the depth stage cannot be read.
     pub fn depth(&self) -> Result<DepthMap, PairArtifactsError> {
+        self.decode_depth(&self.bytes(Stage::Depth, DEPTH)?)
+    }
+
+    /// Decodes the bytes of the depth map's artifact.
+    ///
+    /// # Errors
+    /// Returns an error if the result of the depth stage cannot be read, or the bytes are not an image.
+    pub fn decode_depth(&self, bytes: &[u8]) -> Result<DepthMap, PairArtifactsError> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
-        let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
+        let levels = decode_grey16(bytes);
         Ok(DepthMap {
             levels: levels.map_err(undecodable(DEPTH))?,
             scale: outcome.scale,
