@@ -37,7 +37,7 @@ impl PrintMasks {
     }
 
     /// Decodes an image from [`Self::to_grey`].
-    pub(crate) fn from_grey(grey: &Grid<u8>) -> Self {
+    pub fn from_grey(grey: &Grid<u8>) -> Self {
         Self {
             ink: grey.map(|grey| *grey == Self::INK),
             specks: grey.map(|grey| *grey == Self::SPECK),
