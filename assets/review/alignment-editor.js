@@ -39,6 +39,8 @@ export class AlignmentEditor {
     this.outline = edges(this.strokes, extra.mask.width, extra.mask.height, RELIEF);
     // Continue from the alignment that the reviewer saved before, if any.
     this.map = item.manual_alignment?.map ?? (start.previous ? toCanvas(start.previous) : this.start);
+    /** Scores of the computed alignment. */
+    this.startScores = this.scoresOf(this.start);
     this.addPointerListeners();
     this.update();
   }
@@ -146,11 +148,16 @@ export class AlignmentEditor {
     this.listeners.abort();
   }
 
-  /** Computes the scores as the server does, and redraws. */
-  update() {
+  /** Computes the scores of a map as the server does. */
+  scoresOf(viewFromDepth) {
     const { width, height } = this.extra.mask;
-    const map = fromCanvas(after(this.canvasFromView, this.map));
-    this.scores = overlap(this.ink, warpMask(this.strokes, width, height, map, this.extra.ink));
+    const map = fromCanvas(after(this.canvasFromView, viewFromDepth));
+    return overlap(this.ink, warpMask(this.strokes, width, height, map, this.extra.ink));
+  }
+
+  /** Updates the scores, and redraws. */
+  update() {
+    this.scores = this.scoresOf(this.map);
     this.viewer.draw();
     this.onChange(this);
   }

@@ -19,6 +19,9 @@ export const csrfToken = () => config.csrf_token;
 export const keys = () => config.keys;
 export const reviewOrder = config.review_order;
 export const minViewMs = config.min_view_ms;
+/** Examples of the guide with their right answers. */
+export const examples = config.examples;
+export const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mirrored", "wrong_pair"];
 
 /** Returns the message of a key, with `{name}` replaced by the values. */
 export function translate(key, values = {}) {

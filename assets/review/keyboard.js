@@ -5,7 +5,7 @@ import { keys } from "./config.js";
 /** Labels of keys without a letter. */
 const LABELS = {
   Backspace: "⌫", Space: "␣", ArrowRight: "→", ArrowLeft: "←", BracketLeft: "[", BracketRight: "]", Comma: ",",
-  Period: ".", Equal: "=", Minus: "−", Enter: "⏎", Escape: "Esc", Slash: "/", Semicolon: ";", Quote: "'",
+  Period: ".", Equal: "=", Minus: "−", Enter: "⏎", Escape: "Esc", Slash: "?", Semicolon: ";", Quote: "'",
 };
 
 function labelOf(code) {
@@ -24,12 +24,12 @@ export function labelKeys() {
   }
 }
 
-/** An element of a closed dialog may keep the focus for a moment; keys are no longer typed into it. */
-const isTyping = (target) =>
-  target.closest?.("input, textarea, select, dialog") && !target.closest("dialog:not([open])");
+/** An element of a closed dialog may keep the focus for a moment; keys are no longer meant for it. */
+const isGone = (target) => Boolean(target.closest?.("dialog:not([open])"));
+const isTyping = (target) => target.closest?.("input, textarea, select, dialog") && !isGone(target);
 /** Returns whether the focused control handles the key itself. */
-const isHandledByControl = (event) =>
-  ["Enter", "Space"].includes(event.code) && event.target.closest?.("button, a, summary");
+const isHandledByControl = ({ code, target }) =>
+  ["Enter", "Space"].includes(code) && target.closest?.("button, a, summary") && !isGone(target);
 
 /** Calls `press(action, event)` on key down and `release(action)` on key up. */
 export function listen(press, release) {

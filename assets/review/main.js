@@ -1,9 +1,13 @@
 // Connects the parts of the page: what each key and button does.
 
 import { AlignmentEditor } from "./alignment-editor.js";
-import { minViewMs, reviewOrder, translate } from "./config.js";
+import { minViewMs, REASONS, reviewOrder, translate } from "./config.js";
+import { showDetails } from "./details.js";
+import { hideEnd, showEnd } from "./end-page.js";
+import { closeGuide, openGuide } from "./guide.js";
 import { images } from "./image-cache.js";
 import { labelKeys, listen } from "./keyboard.js";
+import { Practice } from "./practice.js";
 import { ReviewQueue } from "./queue.js";
 import { RetryQueue } from "./retry-queue.js";
 import { isScanOpen, openScan } from "./scan-dialog.js";
@@ -13,7 +17,9 @@ import { Viewer } from "./viewer.js";
 const PREFETCH = 5;
 const HISTORY = 24;
 const MODES = ["two_up", "overlay", "edges", "onion", "checker", "difference", "reveal"];
-const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mirrored", "wrong_pair"];
+/** Answers are too fast if the median of the last `FAST_COUNT` display times is below `FAST_MS`. */
+const FAST_COUNT = 10;
+const FAST_MS = 800;
 
 const queue = new ReviewQueue();
 const viewer = new Viewer(document.getElementById("canvas"));
@@ -23,12 +29,16 @@ const times = [];
 let shownAt = null;
 let note = null;
 let editor = null;
+let practice = null;
 
 /** Shows how many requests are pending and why; updates the end text. */
 function onSaveState(pendingCount, problem) {
   // A further failed attempt must not hide the reason why no answer is accepted.
   ui.saveState(pendingCount, problem === "disconnected" && requests.isFull ? "blocked" : problem);
-  if (queue.items.length > 0 && !queue.current) ui.heading(null, queue, pendingCount);
+  warnIfTooFast();
+  if (queue.items.length === 0 || queue.current || practice) return;
+  ui.heading(null, queue, pendingCount);
+  if (pendingCount === 0) showEndPage();
 }
 
 /** Shows the current item, at once if its images are prefetched. */
@@ -37,22 +47,33 @@ async function show(pressedAt) {
   closeEditor();
   note = item?.answer?.note ?? null;
   shownAt = null;
+  if (item) hideEnd();
   const found = item && images(item.id);
   if (found?.ready) return display(item, found.ready, pressedAt);
   viewer.clear();
   updateSurroundings(item, null);
-  if (!item) return ui.announce(document.getElementById("pair").textContent);
+  ui.busy(Boolean(item));
+  if (!item) return showEndPage();
   try {
     const layers = await found.loading;
     if (queue.current === item) display(item, layers, pressedAt);
   } catch (error) {
-    if (queue.current === item) ui.alert(translate("no_image", { why: error.message }));
+    if (queue.current !== item) return;
+    ui.busy(false);
+    ui.alert(translate("no_image", { why: error.message }));
   }
+}
+
+function showEndPage() {
+  const heading = document.getElementById("pair").textContent;
+  ui.announce(heading);
+  showEnd(heading, queue.items.length > 0);
 }
 
 /** Draws the image first, and updates everything else after it is painted. */
 function display(item, layers, pressedAt) {
   viewer.show(layers);
+  ui.busy(false);
   afterPaint(() => {
     if (queue.current !== item) return;
     shownAt = performance.now();
@@ -75,11 +96,19 @@ function afterPaint(then) {
 
 function updateSurroundings(item, layers) {
   if (!requests.problem) ui.hideAlert();
+  warnIfTooFast();
   ui.heading(item, queue, requests.pendingCount);
   ui.history(queue, HISTORY, go);
   ui.sideImages(layers);
   ui.pace(times.slice(-200));
   refresh();
+}
+
+/** Warns while the last answers came faster than anybody can look at all strokes. */
+function warnIfTooFast() {
+  if (times.length < FAST_COUNT || requests.problem) return;
+  const median = ui.median(times.slice(-FAST_COUNT));
+  if (median < FAST_MS) ui.alert(translate("too_fast", { n: FAST_COUNT, s: ui.seconds(median) }));
 }
 
 /** Prefetches the images of the next items; the page is marked when all are there. */
@@ -95,7 +124,7 @@ function refresh() {
   if (viewer.flickerTimer) on.add("auto_flicker");
   if (viewer.viewport.zoom > 1) on.add("zoom");
   if (editor) on.add("align");
-  const answer = queue.current?.answer;
+  const answer = practice ? practice.answer : queue.current?.answer;
   if (answer) on.add(answer.verdict).add(answer.reason);
   if (note) on.add("note");
   ui.markActive(on);
@@ -132,7 +161,7 @@ function answerBody(item, verdict, reason) {
 function send(item, body) {
   ui.announce(`${queue.label(item)}: ${ui.answerText(body)}`);
   requests.push("/api/answer", body).then(() => {
-    if (reviewOrder === "adjudicate") showDetails(item);
+    if (reviewOrder === "adjudicate") details(item);
   });
 }
 
@@ -160,23 +189,20 @@ function go(item) {
   return true;
 }
 
-/** Announces pair, metrics and scores of an answered item. */
-async function showDetails(item = queue.current) {
-  if (!item?.answer) return ui.announce(translate("answer_first"));
+/** Announces the details of an item after its answer is stored. */
+async function details(item = queue.current) {
   await requests.sending;
-  const response = await fetch(`/api/details/${item.id}`);
-  if (!response.ok) return ui.announce(translate("answer_first"));
-  const { pair, metrics, iou, dice, others } = await response.json();
-  const number = (value) => value.toFixed(3);
-  const verdicts = others.map((other) => `${other.reviewer}: ${ui.answerText(other)}${other.note ? ` (${other.note})` : ""}`);
-  const parts = [
-    pair,
-    `${translate("metrics")}: ${metrics.join(", ")}`,
-    `${translate("iou")} ${number(iou)}`,
-    `${translate("dice")} ${number(dice)}`,
-    ...(verdicts.length > 0 ? [`${translate("other_reviewers")}: ${verdicts.join("; ")}`] : []),
-  ];
-  ui.announce(parts.join(" · "));
+  await showDetails(item);
+}
+
+function startPractice() {
+  closeEditor();
+  closeGuide();
+  hideEnd();
+  practice = new Practice(viewer, refresh, () => {
+    practice = null;
+    show();
+  });
 }
 
 /** Opens the 3D view of the current item. */
@@ -215,7 +241,9 @@ function closeEditor() {
 
 async function saveAlignment() {
   if (requests.isFull) return ui.alert(translate("blocked"));
-  const { item, map } = editor;
+  const { item, map, scores, startScores } = editor;
+  if (scores.iou < startScores.iou && !(await ui.confirmWorse(startScores.iou, scores.iou))) return;
+  if (!editor || editor.item !== item) return;
   const stored = await requests.push("/api/align", editor.body(crypto.randomUUID(), note));
   item.manual_alignment = { ...stored, map };
   ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${stored.iou.toFixed(3)}, ${translate("dice")} ${stored.dice.toFixed(3)}`);
@@ -261,7 +289,9 @@ const actions = {
     const item = await queue.find(name);
     return Boolean(item) && go(item);
   }),
-  details: () => showDetails(),
+  details: () => details(),
+  guide: openGuide,
+  practice: startPractice,
   help: () => ui.help(),
   align: toggleEditor,
   scan_view: showScan,
@@ -279,7 +309,7 @@ const MAY_REPEAT = new Set(["rotate_left", "rotate_right", "less", "more", "next
 const LEAVES_ITEM = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
 
 function perform(action, event, at) {
-  if (isScanOpen()) return;
+  if (isScanOpen() || practice?.handle(action)) return;
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
   if (editor && event && editor.handleKey(action, event)) return;
@@ -308,6 +338,7 @@ try {
   ui.saveState(requests.pendingCount, null);
   await show();
   document.body.dataset.ready = "true";
+  if (queue.opensGuide && queue.current) openGuide();
 } catch (error) {
   ui.alert(error.message);
 }

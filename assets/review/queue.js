@@ -8,6 +8,8 @@ export class ReviewQueue {
     /** Names of all pairs in the queue. */
     this.pairs = [];
     this.index = 0;
+    /** Whether the page opens the guide at the start. */
+    this.opensGuide = false;
     /** Item and event ids of the answers, oldest first. */
     this.events = [];
   }
@@ -16,7 +18,8 @@ export class ReviewQueue {
   async load(pending) {
     const response = await fetch("/api/queue");
     if (!response.ok) throw new Error((await response.json()).error);
-    const { items, pairs } = await response.json();
+    const { items, pairs, opens_guide: opensGuide } = await response.json();
+    this.opensGuide = opensGuide;
     this.items = items;
     this.pairs = pairs;
     const answered = this.items.filter((item) => item.answer);

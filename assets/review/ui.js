@@ -39,14 +39,33 @@ export function saveState(pendingCount, problem) {
   else if (pendingCount === 0) hideAlert();
 }
 
+export function median(values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  return sorted[Math.floor(sorted.length / 2)];
+}
+
+/** Formats milliseconds as seconds with one decimal. */
+export function seconds(ms) {
+  return (ms / 1000).toLocaleString(language, { maximumFractionDigits: 1, minimumFractionDigits: 1 });
+}
+
 /** Shows the median time per answer. */
 export function pace(times) {
-  if (times.length === 0) return;
-  const sorted = [...times].sort((a, b) => a - b);
-  const median = sorted[Math.floor(sorted.length / 2)] / 1000;
-  const s = median.toLocaleString(language, { maximumFractionDigits: 1, minimumFractionDigits: 1 });
-  byId("pace").textContent = translate("median", { s });
+  if (times.length > 0) byId("pace").textContent = translate("median", { s: seconds(median(times)) });
 }
+
+/** Marks the viewer while its image is loading. */
+export const busy = (isBusy) => byId("canvas").parentElement.setAttribute("aria-busy", String(isBusy));
+
+/** Shows the bar of the practice round with the question, or with the answer to the current example. */
+export function practice(index, count, text, isAnswered) {
+  byId("practice").hidden = false;
+  byId("pair").textContent = translate("practice_progress", { n: index + 1, all: count });
+  byId("practice-text").textContent = text;
+  byId("practice-next").disabled = !isAnswered;
+}
+
+export const endPractice = () => (byId("practice").hidden = true);
 
 /** Returns an answer as text. */
 export function answerText(answer) {
@@ -153,6 +172,18 @@ export function askPair(names, go) {
     else byId("jump-error").textContent = translate("no_such_pair");
   };
   dialog.showModal();
+}
+
+/** Asks whether an alignment that agrees less with the print is saved; resolves with the answer. */
+export function confirmWorse(before, after) {
+  const dialog = byId("confirm");
+  const values = { before: before.toFixed(3), after: after.toFixed(3) };
+  byId("confirm-text").textContent = translate("worse_alignment", values);
+  dialog.returnValue = "";
+  dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.onclose = () => resolve(dialog.returnValue === "yes");
+  });
 }
 
 export const help = () => byId("help").showModal();

@@ -286,6 +286,7 @@ export class Viewer {
     const entry = (colour, key) => [css(colour), translate(key)];
     if (this.overlays.stroke_map) return [entry(INK, "lost_strokes"), entry(RELIEF, "extra_strokes")];
     if (this.overlays.angle_guides) return [[css(INK), "−5°"], [css(RELIEF), "0°"], ["rgb(130 60 150)", "+5°"]];
+    if (this.mode === "edges") return [entry(RELIEF, "outline")];
     if (this.mode === "overlay") return [entry(INK, "print_only"), entry(RELIEF, "depth_only"), entry([38, 38, 38], "both")];
     return [];
   }

@@ -49,6 +49,9 @@ pub(super) struct ReviewArgs {
     /// Shortest time in milliseconds that an image is shown before a verdict is accepted
     #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
     min_view_ms: u64,
+    /// Do not open the guide, with examples and a practice round, when a reviewer starts for the first time
+    #[arg(long)]
+    no_guide: bool,
     /// Port on this machine; 0 chooses the same port each time for a project and reviewer, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
@@ -100,6 +103,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         language,
         keys,
         min_view_ms: args.min_view_ms,
+        opens_guide: !args.no_guide,
         limits: InputFileLimits {
             mesh: settings.config.limits.mesh,
             image: settings.config.limits.image,
@@ -235,7 +239,7 @@ mod tests {
         let settings = load(&Sources::default()).expect("the defaults");
         let keys = &settings.config.review.keys;
         let map = key_map(keys).expect("the default keys");
-        assert_eq!((map.len(), keys.len()), (41, 41));
+        assert_eq!((map.len(), keys.len()), (42, 42));
         assert_eq!(map["KeyP"], "pass");
     }
 

@@ -17,11 +17,15 @@ macro_rules! asset {
     };
 }
 
-const ASSETS: [(&str, &str, &str); 15] = [
+const ASSETS: [(&str, &str, &str); 19] = [
     asset!("review.css", STYLE),
     asset!("icon.svg", ICON),
     asset!("main.js", SCRIPT),
     asset!("config.js", SCRIPT),
+    asset!("details.js", SCRIPT),
+    asset!("end-page.js", SCRIPT),
+    asset!("guide.js", SCRIPT),
+    asset!("practice.js", SCRIPT),
     asset!("queue.js", SCRIPT),
     asset!("retry-queue.js", SCRIPT),
     asset!("image-cache.js", SCRIPT),

@@ -13,6 +13,8 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
+/// Minimum number of faults in a queue that has any. The catch rate of a small sample would otherwise say nothing.
+const MIN_FAULTS: usize = 5;
 /// Range of planted rotations in degrees: more than the 5 degrees allowed in a pass, but not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
 /// A relief is mirrored as a fault only if the `IoU` of its strokes with their mirror image is at most this value.
@@ -26,16 +28,32 @@ const DUPLICATE_GAP: f64 = 10.0;
 /// Largest random distance that is added to `DUPLICATE_GAP`.
 const DUPLICATE_SPREAD: f64 = 30.0;
 
-/// Selects the items from which a fault is made.
+/// Selects the items from which a fault is made: `rates.faults` of the reviewed items, and at least [`MIN_FAULTS`]. If
+/// there are too few reviewed items, `others` are used, which are not reviewed themselves.
 pub(super) fn select_for_faults<'a>(
     items: &'a [ReviewItem],
+    others: &'a [ReviewItem],
     rates: &CheckRates,
     random: &SeededRandom,
 ) -> Vec<&'a ReviewItem> {
-    let reliable = items.iter().filter(|item| item.is_reliable);
-    reliable
-        .filter(|item| random.draw(&item.view.hash(), "control") < rates.faults)
-        .collect()
+    if rates.faults <= 0.0 {
+        return Vec::new();
+    }
+    let draw = |item: &ReviewItem| random.draw(&item.view.hash(), "control");
+    let by_draw = |items: &'a [ReviewItem]| {
+        let reliable = items.iter().filter(|item| item.is_reliable);
+        let mut drawn: Vec<(f64, &ReviewItem)> = reliable.map(|item| (draw(item), item)).collect();
+        drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
+        drawn
+    };
+    let mut selected = by_draw(items);
+    let count = selected.partition_point(|(number, _)| *number < rates.faults);
+    selected.truncate(count.max(MIN_FAULTS));
+    if selected.len() < MIN_FAULTS {
+        selected.extend(by_draw(others));
+        selected.truncate(MIN_FAULTS);
+    }
+    selected.into_iter().map(|(_, item)| item).collect()
 }
 
 /// Makes a fault from a good result: mirrors the relief, changes the threshold, or rotates the relief. If mirroring or
@@ -213,7 +231,7 @@ mod tests {
     fn duplicates_keep_a_distance_and_faults_are_spread_evenly() {
         let random = SeededRandom::new(5, "ana");
         let results: Vec<ReviewItem> = (0..400).map(item).collect();
-        let faults: Vec<ReviewItem> = select_for_faults(&results, &RATES, &random)
+        let faults: Vec<ReviewItem> = select_for_faults(&results, &[], &RATES, &random)
             .into_iter()
             .map(|item| plant_fault(item, &wedge(), &random))
             .collect();
@@ -245,6 +263,26 @@ mod tests {
         for item in &mut unreliable {
             item.is_reliable = false;
         }
-        assert!(select_for_faults(&unreliable, &RATES, &SeededRandom::new(5, "ana")).is_empty());
+        let random = SeededRandom::new(5, "ana");
+        assert!(select_for_faults(&unreliable, &unreliable, &RATES, &random).is_empty());
+    }
+
+    #[test]
+    fn a_small_sample_has_five_faults() {
+        let random = SeededRandom::new(5, "ana");
+        let all: Vec<ReviewItem> = (0..60).map(item).collect();
+        for sampled in [1, 3, 5, 8, 20] {
+            let (items, others) = all.split_at(sampled);
+            let selected = select_for_faults(items, others, &RATES, &random);
+            assert!(selected.len() >= 5, "{sampled}: {}", selected.len());
+            let of_sample = selected.iter().filter(|item| items.contains(item)).count();
+            assert!(of_sample >= sampled.min(5), "{sampled}: {of_sample}");
+        }
+        assert_eq!(select_for_faults(&all[..3], &[], &RATES, &random).len(), 3);
+        let none = CheckRates {
+            faults: 0.0,
+            duplicates: 0.1,
+        };
+        assert!(select_for_faults(&all, &[], &none, &random).is_empty());
     }
 }

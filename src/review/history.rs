@@ -43,6 +43,11 @@ impl ReviewerHistory {
         })
     }
 
+    /// Returns whether the reviewer has not answered anything yet, in any review of the project.
+    pub(super) fn is_empty(&self) -> bool {
+        self.answers.is_empty()
+    }
+
     /// Returns the answer to an item.
     pub(super) fn answer(&self, item: &ReviewItem) -> Option<&Answer> {
         if item.check.is_some() {

@@ -35,6 +35,12 @@ impl Language {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }
 
+    /// Returns why an example of the guide passes or fails.
+    pub(super) fn explanation(self, example: &str) -> &'static str {
+        let texts = MESSAGES.get(format!("why_{example}").as_str());
+        texts.map_or("", |texts| texts[self.name()])
+    }
+
     /// Returns all messages by key, for the script.
     pub(super) fn messages(self) -> BTreeMap<&'static str, &'static str> {
         let messages = MESSAGES.iter();
@@ -83,6 +89,7 @@ mod tests {
     #[test]
     fn every_key_that_is_used_has_a_message() {
         let mut wanted: Vec<&str> = used(include_str!("page.rs")).collect();
+        wanted.extend(used(include_str!("page_dialogs.rs")));
         wanted.extend(assets::scripts().flat_map(used));
         assert!(wanted.len() > 60, "{}", wanted.len());
         wanted.extend(keys::actions());

@@ -16,7 +16,7 @@ pub(super) const ACTIONS: [(&str, &str); 4] = [
     ),
     (
         "navigation",
-        "next previous jump details help other_language",
+        "next previous jump details guide help other_language",
     ),
     (
         "manual_alignment",

@@ -46,6 +46,8 @@ pub struct ReviewOptions {
     pub keys: BTreeMap<String, String>,
     /// Minimum time in milliseconds that an image must be shown before the page accepts a verdict.
     pub min_view_ms: u64,
+    /// Whether the page opens the guide when a reviewer starts for the first time.
+    pub opens_guide: bool,
     /// Address to listen on. Port 0 selects a fixed port for the project and reviewer. If the fixed port is taken, any
     /// free port is used.
     pub listen: SocketAddr,

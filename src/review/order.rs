@@ -19,9 +19,15 @@ pub(super) fn sort(items: &mut [ReviewItem], order: ReviewOrder, random: &Seeded
 }
 
 /// Keeps the first `count` items of an order that is the same for all reviewers, so that all judge the same items.
-pub(super) fn sample(items: &mut Vec<ReviewItem>, order: ReviewOrder, seed: u64, count: usize) {
+/// Returns the other items.
+pub(super) fn sample(
+    items: &mut Vec<ReviewItem>,
+    order: ReviewOrder,
+    seed: u64,
+    count: usize,
+) -> Vec<ReviewItem> {
     sort(items, order, &SeededRandom::new(seed, "sample"));
-    items.truncate(count);
+    items.split_off(count.min(items.len()))
 }
 
 #[cfg(test)]
@@ -43,7 +49,8 @@ mod tests {
     fn two_reviewers_get_the_same_sample_in_different_orders() {
         let sampled = |reviewer: &str| {
             let mut items: Vec<_> = (0..50).map(item).collect();
-            sample(&mut items, ReviewOrder::Random, 1, 10);
+            let others = sample(&mut items, ReviewOrder::Random, 1, 10);
+            assert_eq!(others.len(), 40);
             sort(
                 &mut items,
                 ReviewOrder::Random,

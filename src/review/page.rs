@@ -3,8 +3,8 @@
 use maud::{DOCTYPE, Markup, html};
 
 use super::i18n::Language;
-use super::keys::ACTIONS;
 use super::options::QueueOptions;
+use super::page_dialogs::{confirm, guide, help, jump};
 use crate::domain::{Reason, ReviewOrder, one_line};
 
 /// Display modes with a button, in the order of their keys.
@@ -62,6 +62,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         noscript { p.alert { (language.translate("no_script")) } }
         p #alert .alert role="alert" hidden {}
         (modes(language))
+        (practice(language))
         main {
             div.side {
                 (figure("print", language))
@@ -74,8 +75,10 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
             }
         }
         (verdict_bar(language))
+        (guide(language))
         (help(language, options.has_attention_checks()))
         (jump(language))
+        (confirm(language))
         dialog #scan .scan-dialog aria-label=(language.translate("scan_view")) {}
         p #live .live aria-live="polite" {}
     };
@@ -102,6 +105,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             a #language href={ "/?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
                 (language.translate("other_language"))
             }
+            (button("guide", language))
             (button("help", language))
         }
     }
@@ -130,8 +134,20 @@ fn viewer(language: Language) -> Markup {
         section #viewer tabindex="-1" aria-label=(language.translate("viewer")) {
             div.picture {
                 canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
+                div #end .end tabindex="-1" hidden {}
             }
             p.caption { span #legend {} span.spacer {} span #paint-time {} }
+        }
+    }
+}
+
+/// Returns the bar of the practice round: the answer to each example, and why.
+fn practice(language: Language) -> Markup {
+    html! {
+        section #practice .practice aria-label=(language.translate("practice_round")) hidden {
+            p #practice-text role="status" {}
+            button #practice-next type="button" { (language.translate("next_example")) " " kbd { "⏎" } }
+            button #practice-skip type="button" { (language.translate("skip_practice")) " " kbd { "Esc" } }
         }
     }
 }
@@ -190,47 +206,6 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
     html! {
         button.verdict type="button" data-action=(action) {
             span aria-hidden="true" { (sign) } " " (language.translate(action)) " " kbd data-key=(action) {}
-        }
-    }
-}
-
-fn help(language: Language, has_attention_checks: bool) -> Markup {
-    html! {
-        dialog #help aria-labelledby="help-title" {
-            form.title method="dialog" {
-                h2 #help-title { (language.translate("help")) }
-                button { (language.translate("close")) }
-            }
-            div.groups {
-                @for (name, actions) in ACTIONS {
-                    section {
-                        h3 { (language.translate(name)) }
-                        dl {
-                            @for action in actions.split_whitespace() {
-                                div { dt { kbd data-key=(action) {} } dd { (language.translate(action)) } }
-                            }
-                        }
-                    }
-                }
-            }
-            p { (language.translate("manual_alignment")) ": " (language.translate("alignment_hint")) }
-            @if has_attention_checks { p { (language.translate("attention_checks")) } }
-        }
-    }
-}
-
-fn jump(language: Language) -> Markup {
-    html! {
-        dialog #jump aria-labelledby="jump-title" {
-            h2 #jump-title { (language.translate("jump")) }
-            form method="dialog" {
-                label for="jump-to" { (language.translate("jump_hint")) }
-                input #jump-to type="text" list="pairs" autocomplete="off";
-                datalist #pairs {}
-                p #jump-error role="alert" {}
-                button value="go" { (language.translate("go")) }
-                button value="" formnovalidate { (language.translate("close")) }
-            }
         }
     }
 }

@@ -38,12 +38,13 @@ impl ReviewQueue {
         let key = catalog.review_key().await?;
         let random = SeededRandom::new(options.seed, &options.reviewer);
         let mut items = all_items(catalog, options).await?;
-        if let Some(count) = options.sample {
-            order::sample(&mut items, options.order, options.seed, count);
-        }
+        let others = match options.sample {
+            Some(count) => order::sample(&mut items, options.order, options.seed, count),
+            None => Vec::new(),
+        };
         order::sort(&mut items, options.order, &random);
         if options.has_attention_checks() {
-            let selected = check_items::select_for_faults(&items, &options.rates, &random);
+            let selected = check_items::select_for_faults(&items, &others, &options.rates, &random);
             let faults = faults(catalog, project, selected, &random).await?;
             items = check_items::interleave(items, faults, &options.rates, &random);
         }
@@ -114,7 +115,9 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
                 print_from_depth: first.print_from_depth,
             },
             uncertainty: uncertainty(group[0]),
-            is_reliable: group.iter().all(|record| is_reliable(record)),
+            is_reliable: group
+                .iter()
+                .all(|record| is_reliable(record, &options.reviewer)),
         }
     };
     groups.into_iter().map(item).collect()
@@ -130,15 +133,16 @@ fn uncertainty(record: &MetricRecord) -> f64 {
 }
 
 /// Returns whether a fault may be planted in a result. The confidence must be high or unknown, the search must not have
-/// ended at a bound, and all verdicts must be passes.
-fn is_reliable(record: &MetricRecord) -> bool {
+/// ended at a bound, and all verdicts of others must be passes. The reviewer's own verdicts are ignored, so that the
+/// queue does not change while it is reviewed.
+fn is_reliable(record: &MetricRecord, reviewer: &str) -> bool {
     let outcome = &record.outcome;
-    let mut verdicts = record.verdicts.iter().map(|read| read.verdict);
+    let mut verdicts = record.verdicts.iter();
     outcome
         .confidence
         .is_none_or(|confidence| confidence >= RELIABLE_CONFIDENCE)
         && !outcome.at_bound
-        && verdicts.all(|verdict| verdict == Verdict::Pass)
+        && verdicts.all(|read| read.reviewer == reviewer || read.verdict == Verdict::Pass)
 }
 
 /// Returns whether a result is disputed and this reviewer may adjudicate it. The reviewer must not be a party to the
@@ -226,8 +230,11 @@ mod tests {
     fn no_fault_is_planted_in_a_failed_result() {
         let record =
             |verdicts: &[Verdict]| test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
-        assert!(is_reliable(&record(&[])) && is_reliable(&record(&[Verdict::Pass])));
-        assert!(!is_reliable(&record(&[Verdict::Pass, Verdict::Fail])));
+        let reliable = |verdicts: &[Verdict]| is_reliable(&record(verdicts), "ana");
+        assert!(reliable(&[]) && reliable(&[Verdict::Pass]));
+        assert!(!reliable(&[Verdict::Pass, Verdict::Fail]));
+        let own = &record(&[Verdict::Fail]).verdicts[0].reviewer.clone();
+        assert!(is_reliable(&record(&[Verdict::Fail]), own));
     }
 
     #[test]

@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
 use super::answer::{AnswerBody, InvalidInput, UndoBody};
-use super::assets;
 use super::history::ReviewerHistory;
 use super::i18n::Language;
 use super::item::ReviewItem;
@@ -21,6 +20,8 @@ use super::item_images::{ImageError, ImageLayer};
 use super::page;
 use super::review_queue::QueueError;
 use super::state::ServerState;
+use super::summary::ReviewSummary;
+use super::{assets, examples};
 use crate::catalog::{CatalogError, ManualAlignment};
 use crate::domain::{PairName, ReviewOrder, Stage, one_line};
 use crate::local_server::{START, guard};
@@ -36,6 +37,7 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/scan/{id}", get(scan))
         .route("/api/config", get(config))
         .route("/api/queue", get(queue))
+        .route("/api/summary", get(summary))
         .route("/api/details/{id}", get(details))
         .route("/api/find/{pair}", get(find))
         .route("/api/alignment/{id}", get(alignment))
@@ -56,6 +58,8 @@ enum ApiError {
     NoItem,
     #[error("answer it first")]
     NotAnswered,
+    #[error("answer every image first")]
+    NotFinished,
     #[error("{0}")]
     Body(#[from] JsonRejection),
     #[error(transparent)]
@@ -74,7 +78,7 @@ impl ApiError {
     fn status(&self) -> StatusCode {
         match self {
             Self::NoItem | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
-            Self::NotAnswered => StatusCode::FORBIDDEN,
+            Self::NotAnswered | Self::NotFinished => StatusCode::FORBIDDEN,
             Self::Body(rejection) => rejection.status(),
             Self::Input(_) => StatusCode::UNPROCESSABLE_ENTITY,
             Self::Image(ImageError::Gone) => StatusCode::GONE,
@@ -131,6 +135,7 @@ async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
         "keys": state.options.keys,
         "review_order": state.options.queue.order,
         "min_view_ms": state.options.min_view_ms,
+        "examples": examples::EXAMPLES,
         "messages": BTreeMap::from(messages),
     }))
 }
@@ -154,9 +159,18 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
         })
     });
     let pairs: BTreeSet<&PairName> = queue.items.iter().map(|item| &item.pair).collect();
-    Ok(Json(
-        json!({ "items": items.collect::<Vec<_>>(), "pairs": pairs }),
-    ))
+    Ok(Json(json!({
+        "items": items.collect::<Vec<_>>(),
+        "pairs": pairs,
+        "opens_guide": state.options.opens_guide && queue.history.is_empty(),
+    })))
+}
+
+/// Returns the summary of a review in which every item is answered.
+async fn summary(State(state): State<Arc<ServerState>>) -> ApiResult {
+    let queue = state.load_queue().await?;
+    let summary = ReviewSummary::read(&state, &queue).await?;
+    Ok(Json(json!(summary.ok_or(ApiError::NotFinished)?)))
 }
 
 /// Returns the first item of a pair. A later item would reveal that the first has a duplicate.
@@ -171,9 +185,12 @@ async fn image(
     State(state): State<Arc<ServerState>>,
     Path((id, layer)): Path<(String, String)>,
 ) -> ApiResult<Response> {
-    let item = served_item(&state, &id)?;
     let layer: Option<ImageLayer> = serde_json::from_value(layer.into()).ok();
     let layer = layer.ok_or(ApiError::NoItem)?;
+    if let Some((kind, bytes)) = examples::layer(&id, layer) {
+        return Ok(([(header::CONTENT_TYPE, kind)], bytes).into_response());
+    }
+    let item = served_item(&state, &id)?;
     let png = state.images.layer(&item, layer).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
     Ok((kind, png).into_response())

@@ -53,7 +53,7 @@ fn axe_finds_nothing_serious_in_the_review_page() {
         judge(&tab, "KeyP");
         tab.eval(&format!("{axe}; null"));
         nothing_serious(&tab, &format!("{language}, an item"));
-        for key in ["KeyH", "KeyJ"] {
+        for key in ["KeyH", "KeyJ", "Slash"] {
             tab.key(key);
             tab.wait("document.querySelector('dialog[open]')");
             nothing_serious(&tab, &format!("{language} after {key}"));
@@ -67,6 +67,7 @@ fn axe_finds_nothing_serious_in_the_review_page() {
         tab.wait("!document.querySelector('[data-action=align]').classList.contains('on')");
         tab.key("KeyP");
         tab.wait("document.getElementById('bar').value === 3");
+        tab.wait("document.getElementById('end').dataset.ready");
         nothing_serious(&tab, &format!("{language}, the end"));
     }
 }

@@ -68,6 +68,7 @@ mod review_alignment;
 mod review_browser;
 mod review_data;
 mod review_guard;
+mod review_guide;
 mod review_kill;
 #[cfg(target_os = "linux")]
 mod review_load;

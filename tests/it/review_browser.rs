@@ -11,7 +11,8 @@ use crate::page::{NO_CHECKS, Page, read_project};
 use crate::resume::{project, run};
 
 /// Options for simple tests: the log holds only pressed verdicts, and no test waits for a minimum view time.
-pub(crate) const PLAIN: [&str; 6] = [
+pub(crate) const PLAIN: [&str; 7] = [
+    "--no-guide",
     "--attention-checks",
     "0",
     "--duplicates",
@@ -365,6 +366,9 @@ fn a_relief_is_aligned_by_keys_and_mouse() {
         tab.key("KeyP");
         tab.wait("document.getElementById('live').textContent.startsWith('Save the alignment')");
         tab.key("Enter");
+        // It is worse than the computed alignment.
+        tab.wait("document.querySelector('#confirm[open]')");
+        tab.eval("document.querySelector('#confirm button[value=yes]').click()");
         tab.wait(
             "document.getElementById('live').textContent.startsWith('Manual alignment saved')",
         );
@@ -438,7 +442,7 @@ fn typing_a_note_with_verdict_keys_stores_no_verdict() {
         output.out
     );
     // A verdict before the minimum view time is not accepted.
-    let slow = [&NO_CHECKS[..], &["--min-view-ms", "60000"]].concat();
+    let slow = [&NO_CHECKS[..], &["--no-guide", "--min-view-ms", "60000"]].concat();
     let page = Page::start(&project, "minh", &slow);
     let tab = enter(&browser, &page, [1024, 768]);
     tab.key("KeyP");

@@ -1,0 +1,53 @@
+// The page after the last image: what the reviewer has done, and what to do next.
+
+import { translate } from "./config.js";
+
+const element = document.getElementById("end");
+
+function create(tag, text, ...children) {
+  const created = document.createElement(tag);
+  if (text) created.textContent = text;
+  created.append(...children);
+  return created;
+}
+
+/** Quotes a path for a shell if it has characters other than the common ones. */
+const quoted = (path) => (/^[\w./-]+$/.test(path) ? path : `'${path.replaceAll("'", "'\\''")}'`);
+
+function lines({ results, reviewer, others }) {
+  const { pass, fail, unsure } = results;
+  const texts = [translate("summary_results", { n: pass + fail + unsure, pass, fail, unsure })];
+  const { attention_checks: checks, duplicates } = reviewer;
+  if (checks.n > 0) texts.push(translate("summary_checks", checks));
+  if (duplicates.n > 0) texts.push(translate("summary_shown_twice", duplicates));
+  for (const { a, b, n, agreed } of others) {
+    const other = a === reviewer.reviewer ? b : a;
+    if (n > 0) texts.push(translate("summary_agreement", { reviewer: other, n, agreed }));
+  }
+  return texts;
+}
+
+/** Shows a heading, and the summary once the server has it. */
+export async function showEnd(heading, hasItems) {
+  element.hidden = false;
+  element.replaceChildren(create("h2", heading));
+  if (!hasItems) return;
+  // Without a connection, or before the last answer is stored, there is no summary yet.
+  const response = await fetch("/api/summary").catch(() => null);
+  if (!response?.ok || element.hidden) return;
+  const summary = await response.json();
+  const command = (text) => create("code", `mocban -C ${quoted(summary.project)} ${text}`);
+  element.replaceChildren(
+    create("h2", heading),
+    create("ul", "", ...lines(summary).map((text) => create("li", text))),
+    create("h3", translate("next_steps")),
+    create("p", `${translate("next_report")} `, command("report -f html -o report.html")),
+    create("p", `${translate("next_reviewer")} `, command("review --reviewer NAME")),
+  );
+  element.dataset.ready = "true";
+}
+
+export function hideEnd() {
+  element.hidden = true;
+  delete element.dataset.ready;
+}

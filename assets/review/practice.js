@@ -1,0 +1,77 @@
+// The practice round: examples with known answers in the viewer. Nothing is stored.
+
+import { examples, REASONS, translate } from "./config.js";
+import { images } from "./image-cache.js";
+import * as ui from "./ui.js";
+
+/** Actions without meaning for an example. */
+const UNUSED = new Set(["undo", "note", "previous", "jump", "details", "align", "scan_view"]);
+
+export class Practice {
+  /** Shows the first example. `refresh` updates the buttons; `onEnd` is called after the last example or a skip. */
+  constructor(viewer, refresh, onEnd) {
+    Object.assign(this, { viewer, refresh, onEnd });
+    const used = examples.filter(({ practice }) => practice !== null);
+    this.examples = used.sort((a, b) => a.practice - b.practice);
+    this.index = 0;
+    this.rightCount = 0;
+    document.getElementById("practice-next").onclick = () => this.next();
+    document.getElementById("practice-skip").onclick = () => this.end();
+    this.show();
+  }
+
+  get current() {
+    return this.examples[this.index];
+  }
+
+  async show() {
+    const example = this.current;
+    this.answer = null;
+    this.viewer.clear();
+    ui.practice(this.index, this.examples.length, translate("practice_ask"), false);
+    this.refresh();
+    const layers = await images(`example-${example.name}`).loading;
+    if (this.current !== example) return;
+    this.viewer.show(layers);
+    ui.sideImages(layers);
+    ui.busy(false);
+    document.body.dataset.shown = `example-${example.name}`;
+  }
+
+  /** Handles an action; returns false for actions that only change the display. */
+  handle(action) {
+    if (["pass", "fail", "unsure", ...REASONS].includes(action)) this.judge(action);
+    else if (action === "save" || action === "next") this.next();
+    else if (action === "cancel") this.end();
+    else return UNUSED.has(action);
+    return true;
+  }
+
+  judge(action) {
+    if (this.answer) return;
+    const reason = REASONS.includes(action) ? action : null;
+    this.answer = { verdict: reason ? "fail" : action, reason };
+    const { name, ...expected } = this.current;
+    const isRight = this.answer.verdict === expected.verdict;
+    if (isRight) this.rightCount += 1;
+    const values = { answer: ui.answerText(expected), why: translate(`why_${name}`) };
+    const text = isRight ? translate("practice_right", values) : translate("practice_wrong", values);
+    ui.practice(this.index, this.examples.length, text, true);
+    this.refresh();
+  }
+
+  next() {
+    if (!this.answer) return;
+    if (this.index + 1 === this.examples.length) return this.end();
+    this.index += 1;
+    this.show();
+  }
+
+  end() {
+    const [right, all] = [this.rightCount, this.examples.length];
+    this.index = all;
+    ui.endPractice();
+    this.onEnd();
+    ui.announce(translate("practice_done", { right, all }));
+  }
+}

@@ -1,0 +1,251 @@
+//! The guide of the review page in a browser: examples, practice round, warnings, and the page after the last image.
+
+use serde_json::{Value, json};
+
+use crate::browser::{Browser, Tab};
+use crate::page::{Page, open_review, read_project};
+use crate::review_browser::{PLAIN, enter, judge};
+
+/// Position and size of the large image.
+fn picture(tab: &Tab<'_>) -> Value {
+    tab.eval(
+        "(({ x, y, width, height }) => [x, y, width, height])(
+            document.querySelector('.picture').getBoundingClientRect())",
+    )
+}
+
+/// Returns whether an element is within the window without scrolling sideways, and has a usable size.
+fn is_reachable(tab: &Tab<'_>, selector: &str) -> bool {
+    let script = format!(
+        "(() => {{
+            const element = document.querySelector({selector:?});
+            element.scrollIntoView({{ block: 'nearest' }});
+            const box = element.getBoundingClientRect();
+            const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+            return box.x >= 0 && box.right <= innerWidth && box.height >= 20 && element.contains(at);
+        }})()"
+    );
+    tab.eval(&script) == json!(true)
+}
+
+/// Answers an example of the practice round and returns the text that explains the answer.
+fn practise(tab: &Tab<'_>, key: &str) -> String {
+    tab.wait("document.body.dataset.shown?.startsWith('example-')");
+    tab.wait("document.getElementById('practice-next').disabled");
+    tab.key(key);
+    tab.wait("!document.getElementById('practice-next').disabled");
+    let text = tab.eval("document.getElementById('practice-text').textContent");
+    text.as_str().expect("a text").to_owned()
+}
+
+#[test]
+fn a_new_reviewer_sees_the_guide_and_practises() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let options = ["--metric", "density", "--sample", "2"];
+    let options = [&PLAIN[1..], &options].concat();
+    let page = Page::start(&project, "lan", &options);
+    let tab = enter(&browser, &page, [1440, 900]);
+    tab.wait("document.querySelector('#guide[open]')");
+    tab.wait("document.querySelectorAll('#guide figure[data-drawn]').length === 9");
+    tab.screenshot("guide");
+    let drawn = tab.eval(
+        "[...document.querySelectorAll('#guide canvas')].every((canvas) => {
+            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+            let orange = 0;
+            for (let i = 0; i < data.length; i += 4) {
+                if (data[i] === 196 && data[i + 1] === 78 && data[i + 2] === 0) orange += 1;
+            }
+            return orange > 100;
+        })",
+    );
+    assert_eq!(drawn, json!(true), "each example has an outline");
+    tab.eval("document.querySelector('[data-action=practice]').click()");
+    tab.wait("!document.querySelector('#guide[open]')");
+    // The fourth answer is wrong.
+    let keys = ["KeyP", "Digit1", "KeyF", "KeyF", "Digit3", "KeyP"];
+    for (i, key) in keys.into_iter().enumerate() {
+        let text = practise(&tab, key);
+        let starts = if i == 3 {
+            "Not correct. Pass"
+        } else {
+            "Correct."
+        };
+        assert!(text.starts_with(starts), "{i}: {text}");
+        if i == 1 {
+            assert!(text.contains("Wrong angle. Rotated by 9°"), "{text}");
+            tab.screenshot("practice");
+        }
+        tab.key("Enter");
+    }
+    tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
+    tab.wait("document.getElementById('practice').hidden");
+    assert_eq!(
+        tab.eval("document.getElementById('bar').value"),
+        0,
+        "nothing is stored"
+    );
+    // The question mark opens the guide again; Escape leaves the practice round at any time.
+    tab.wait("!document.body.dataset.shown.startsWith('example-')");
+    tab.key("Slash");
+    tab.wait("document.querySelector('#guide[open]')");
+    tab.eval("document.querySelector('[data-action=practice]').click()");
+    tab.wait("!document.getElementById('practice').hidden");
+    tab.key("Escape");
+    tab.wait("document.getElementById('practice').hidden");
+    tab.wait("!document.body.dataset.shown.startsWith('example-')");
+    judge(&tab, "KeyP");
+    tab.wait("document.getElementById('saved').textContent.includes('✓')");
+    tab.reload();
+    tab.wait("document.body?.dataset.ready");
+    let opened = tab.eval("Boolean(document.querySelector('#guide[open]'))");
+    assert_eq!(opened, json!(false), "only before the first answer");
+}
+
+#[test]
+fn the_end_page_sums_up_and_names_the_next_commands() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let options = [
+        "--no-guide",
+        "--metric",
+        "density",
+        "--sample",
+        "3",
+        "--min-view-ms",
+        "0",
+    ];
+    for reviewer in ["bo", "lan"] {
+        let page = Page::start(&project, reviewer, &options);
+        let tab = enter(&browser, &page, [1366, 660]);
+        let all = tab
+            .eval("document.getElementById('bar').max")
+            .as_f64()
+            .expect("a count");
+        assert!(all >= 8.0, "three results and five attention checks: {all}");
+        for _ in 1..all as usize {
+            judge(&tab, "KeyF");
+        }
+        tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+        tab.key("KeyF");
+        tab.wait("document.getElementById('end').dataset.ready");
+        tab.screenshot(&format!("end-{reviewer}"));
+        let text = tab.eval("document.getElementById('end').innerText");
+        let text = text.as_str().expect("a text");
+        assert!(
+            text.contains("3 results judged: 0 passed, 3 failed, 0 unsure"),
+            "{text}"
+        );
+        assert!(text.contains("5 of 5 attention checks noticed"), "{text}");
+        assert!(text.contains("report -f html -o report.html"), "{text}");
+        let agrees = text.contains("3 of 3 answers are the same as those of bo");
+        assert_eq!(agrees, reviewer == "lan", "{text}");
+        tab.key("Backspace");
+        tab.wait("document.getElementById('end').hidden");
+    }
+}
+
+#[test]
+fn hints_do_not_move_the_picture_and_fast_answers_are_named() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1366, 660]);
+    judge(&tab, "KeyP");
+    let before = picture(&tab);
+    for (key, shown) in [
+        ("KeyN", "!document.getElementById('note-row').hidden"),
+        (
+            "KeyW",
+            "document.querySelector('[data-action=overlay]').classList.contains('on')",
+        ),
+        (
+            "KeyC",
+            "document.getElementById('legend').textContent.includes('IoU')",
+        ),
+    ] {
+        tab.key(key);
+        tab.wait(shown);
+        assert_eq!(picture(&tab), before, "{key}");
+        tab.key("Escape");
+        tab.wait("document.getElementById('note-row').hidden");
+    }
+    tab.wait("!document.querySelector('[data-action=align]').classList.contains('on')");
+    for _ in 0..10 {
+        judge(&tab, "KeyP");
+    }
+    tab.wait("document.getElementById('saved').textContent.includes('✓')");
+    tab.wait("document.getElementById('alert').innerText.includes('last 10 answers')");
+    assert_eq!(
+        tab.eval("document.getElementById('alert').hidden"),
+        json!(false)
+    );
+    tab.screenshot("too-fast");
+    assert_eq!(picture(&tab), before, "the warning");
+}
+
+#[test]
+fn a_worse_alignment_is_saved_only_after_a_question() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    let is_open = "document.querySelector('[data-action=align]').classList.contains('on')";
+    tab.key("KeyC");
+    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+    for _ in 0..12 {
+        tab.key("ArrowRight");
+    }
+    tab.key("Enter");
+    tab.wait("document.querySelector('#confirm[open]')");
+    tab.screenshot("confirm");
+    tab.key("Escape");
+    tab.wait("!document.querySelector('#confirm[open]')");
+    assert_eq!(tab.eval(is_open), json!(true), "the editor stays open");
+    tab.key("Enter");
+    tab.wait("document.querySelector('#confirm[open]')");
+    tab.eval("document.querySelector('#confirm button[value=yes]').click()");
+    tab.wait("document.getElementById('live').textContent.includes('alignment saved')");
+    tab.wait(&format!("!{is_open}"));
+}
+
+#[test]
+fn every_answer_is_reachable_on_a_narrow_screen() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    for language in ["en", "vi"] {
+        let options = [&PLAIN[..], &["--lang", language]].concat();
+        let page = Page::start(&project, language, &options);
+        let tab = enter(&browser, &page, [400, 800]);
+        tab.screenshot(&format!("narrow-{language}"));
+        let actions = "pass fail unsure angle strokes_lost background_in shift_or_scale mirrored wrong_pair note undo";
+        for action in actions.split_whitespace() {
+            let selector = format!("footer [data-action={action}]");
+            assert!(is_reachable(&tab, &selector), "{language}: {action}");
+        }
+        tab.screenshot(&format!("narrow-{language}-reasons"));
+    }
+}
+
+#[test]
+fn the_summary_is_a_secret_until_every_item_is_answered() {
+    let (_dir, _, page) = open_review(&["--metric", "density", "--sample", "2"]);
+    let reply = page.get("/api/summary");
+    assert_eq!(reply.status, 403, "{:?}", reply.json());
+    assert_eq!(reply.json()["error"], "answer every image first");
+}
