@@ -129,11 +129,12 @@ function refresh() {
   if (note) on.add("note");
   ui.markActive(on);
   ui.legend(editor ? [] : viewer.legend(), caption());
+  ui.hint(editor ? translate("alignment_hint") : "");
 }
 
 /** Returns the text below the image, apart from the legend. */
 function caption() {
-  if (editor) return `${editor.summary()} — ${translate("alignment_hint")}`;
+  if (editor) return editor.summary();
   if (viewer.rotation) return translate("rotated_by", { deg: viewer.rotation.toFixed(2) });
   const alignment = viewer.layers && queue.current?.manual_alignment;
   return alignment ? ui.alignmentText(alignment) : "";

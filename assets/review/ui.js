@@ -123,6 +123,12 @@ export function legend(entries, extra) {
   byId("legend").replaceChildren(...marks, extra);
 }
 
+/** Shows a hint over the lower edge of the image. */
+export function hint(text) {
+  byId("hint").textContent = text;
+  byId("hint").hidden = text === "";
+}
+
 export const paintTime = (text) => (byId("paint-time").textContent = text);
 
 /** Announces a text in the live region, for screen readers too. */

@@ -134,6 +134,7 @@ fn viewer(language: Language) -> Markup {
         section #viewer tabindex="-1" aria-label=(language.translate("viewer")) {
             div.picture {
                 canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
+                p #hint .hint hidden {}
                 div #end .end tabindex="-1" hidden {}
             }
             p.caption { span #legend {} span.spacer {} span #paint-time {} }
