@@ -128,7 +128,7 @@ function refresh() {
   if (answer) on.add(answer.verdict).add(answer.reason);
   if (note) on.add("note");
   ui.markActive(on);
-  ui.legend(editor ? [] : viewer.legend(), caption());
+  ui.legend(editor || !viewer.layers ? [] : viewer.legend(), caption());
   ui.hint(editor ? translate("alignment_hint") : "");
 }
 

@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::busy::Busy;
 use super::context::Context;
 use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
@@ -36,10 +37,12 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     let settings = files::small(&project.settings_path())?;
     let staging = StagingFolder::beside(file).with_context(failed)?;
     let copy = staging.path().join(CATALOG_FILE);
+    let busy = Busy::start(context, "copying the catalog");
     let copied = catalog.back_up(&copy, settings.as_deref()).await;
     copied.with_context(failed)?;
     catalog.close().await;
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
+    drop(busy);
     // Somebody may have created the file in the meantime.
     check_target(file, &project)?;
     rename_into_place(&copy, file).with_context(failed)?;

@@ -7,6 +7,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use clap::Args;
 
+use super::busy::Busy;
 use super::context::Context;
 use super::error_text;
 use super::exit::ExitCode;
@@ -35,11 +36,13 @@ pub(super) struct CheckArgs {
 const MAX_LISTED: usize = 5;
 
 pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let busy = Busy::start(context, "checking the catalog and the files");
     let mut checked = once(&args, context).await;
     if is_database_damage(&checked) {
         // SQLite reports some disk read errors as damage. Check again, and then test whether the file can be read.
         checked = once(&args, context).await;
     }
+    drop(busy);
     let path = context.dir().join(CATALOG_FILE);
     if is_database_damage(&checked) && !is_readable(&path) {
         return Err(CatalogError::Unread(path).into());

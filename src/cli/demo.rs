@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 
+use super::busy::Busy;
 use super::config::{ConfigShowArgs, as_toml};
 use super::contact_sheet::{self, ContactSheetArgs};
 use super::context::{Context, shell_quoted};
@@ -135,7 +136,7 @@ async fn replace_dataset(
     let folder = ReplacementFolder::begin(data)?;
     let note = folder.path().join(NOTE);
     std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
-    let Some(mut files) = write_or_stop(folder.path().to_owned(), options).await? else {
+    let Some(mut files) = write_or_stop(folder.path().to_owned(), options, context).await? else {
         return Ok(None);
     };
     if let Some((path, error)) = folder.finish()? {
@@ -154,10 +155,15 @@ async fn replace_dataset(
 async fn write_or_stop(
     data: PathBuf,
     options: DemoOptions,
+    context: &Context,
 ) -> anyhow::Result<Option<DatasetFiles>> {
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
-    let is_stopped = move || stop.level() != StopLevel::Go;
+    let busy = Busy::of_pairs(context, "creating demo data", options.pairs);
+    let is_stopped = move || {
+        busy.begin_pair();
+        stop.level() != StopLevel::Go
+    };
     let writing = tokio::task::spawn_blocking(move || write_dataset(&data, &options, &is_stopped));
     let written = writing.await?;
     signals.abort();

@@ -7,6 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 
+use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::table::count;
@@ -160,8 +161,10 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         return Err(Refusal::Usage(unused.to_string()).into());
     }
     context.warn_about_stale(&catalog).await?;
-    let summary =
-        crate::export::export(&catalog, &project, &args.output, &formats, options).await?;
+    let busy = Busy::start(context, "exporting");
+    let summary = crate::export::export(&catalog, &project, &args.output, &formats, options).await;
+    drop(busy);
+    let summary = summary?;
     catalog.close().await;
     if summary.is_nothing_selected {
         let text = format!(

@@ -8,6 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use super::busy::Busy;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::files;
@@ -54,7 +55,10 @@ pub(super) struct ImportArgs {
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let outcome = import_pairs(&args, context).await?;
+    let busy = Busy::start(context, "importing");
+    let outcome = import_pairs(&args, context).await;
+    drop(busy);
+    let outcome = outcome?;
     context.print_json(&as_json(&outcome))?;
     print_outcome(&outcome, context);
     context.next("run");

@@ -4,6 +4,7 @@ mod agreement;
 mod args;
 mod backup;
 mod browser;
+mod busy;
 mod check;
 mod compare;
 mod completions;

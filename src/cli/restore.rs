@@ -7,6 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::backup::count_rows;
+use super::busy::Busy;
 use super::context::Context;
 use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
@@ -42,7 +43,9 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
     }
     check_directory(&Project::at(&dir))?;
     let existed = dir.exists();
+    let busy = Busy::start(context, "restoring the project");
     let restored = restore_into(&backup, &dir, inputs.as_deref()).await;
+    drop(busy);
     if restored.is_err() && !existed {
         // Fails unless the directory is empty.
         let _ = std::fs::remove_dir(&dir);
