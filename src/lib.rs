@@ -136,13 +136,13 @@
 //! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
-//! ## Rooms
+//! ## Modules
 //!
-//! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
+//! `tests/it/layers.rs` checks that a top-level module imports only the modules in its line, that
 //! source files do not import each other in cycles, that the files in the two lists above exist, that the first list
 //! stays short, and that every file that names a metric is listed.
 //!
-//! | room | purpose | may import |
+//! | module | purpose | may import |
 //! |---|---|---|
 //! | `domain` | ids, stages, job states, transforms, outcomes, verdicts | |
 //! | `simd` | runtime dispatch to the widest vector instructions of the processor | |

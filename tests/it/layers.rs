@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::source_text::{SourceFile, identifier, package_dir, paths_after, source_files};
 
-/// Crates that only these rooms may name.
+/// Crates that only these modules may name.
 const ONLY_IN: &[(&str, &[&str])] = &[
     ("sqlx", &["catalog"]),
     ("clap", &["cli"]),
@@ -18,7 +18,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
 ];
 
 /// Rooms without files, processes, clocks and async code.
-const PURE_ROOMS: &[&str] = &["domain", "raster", "mesh", "stages"];
+const PURE_MODULES: &[&str] = &["domain", "raster", "mesh", "stages"];
 const IMPURE: &[&str] = &[
     "tokio::",
     "std::fs",
@@ -28,23 +28,23 @@ const IMPURE: &[&str] = &[
     "Instant::now",
 ];
 
-/// Imports that only the unit tests of a room may use, beyond the table.
+/// Imports that only the unit tests of a module may use, beyond the table.
 const TEST_IMPORTS: &[(&str, &[&str])] = &[];
 
 /// Files that may take part in import cycles. Remove a file when its cycle is broken; add none.
 const CYCLIC_FILES: &[&str] = &[];
 
-/// Returns the files that belong to rooms.
-fn room_files() -> Vec<SourceFile> {
+/// Returns the files that belong to modules.
+fn module_files() -> Vec<SourceFile> {
     let mut files = source_files();
-    files.retain(|file| file.room != "main" && file.room != "lib");
+    files.retain(|file| file.module != "main" && file.module != "lib");
     files
 }
 
-/// Returns the table of rooms (top-level modules) in `src/lib.rs`: each room with the rooms that it may import.
+/// Returns the table of top-level modules in `src/lib.rs`: each module with the modules that it may import.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
     let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
-    let rooms: Vec<(String, String)> = lib
+    let modules: Vec<(String, String)> = lib
         .lines()
         .filter_map(|line| line.strip_prefix("//! | `"))
         .map(|line| {
@@ -52,16 +52,16 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
             (identifier(line), cells[2].trim().to_owned())
         })
         .collect();
-    let all: BTreeSet<String> = rooms.iter().map(|(room, _)| room.clone()).collect();
-    rooms
+    let all: BTreeSet<String> = modules.iter().map(|(module, _)| module.clone()).collect();
+    modules
         .into_iter()
-        .map(|(room, cell)| {
+        .map(|(module, cell)| {
             let named = cell.split(',').map(|name| name.trim().replace('`', ""));
             let allowed = match cell.as_str() {
                 "all" => all.clone(),
                 _ => named.filter(|name| !name.is_empty()).collect(),
             };
-            (room, allowed)
+            (module, allowed)
         })
         .collect()
 }
@@ -72,8 +72,8 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     paths.filter_map(|path| path.into_iter().next()).collect()
 }
 
-/// Returns the rooms that a part of the code of a file names.
-fn imported_rooms(file: &SourceFile, code: &str) -> BTreeSet<String> {
+/// Returns the modules that a part of the code of a file names.
+fn imported_modules(file: &SourceFile, code: &str) -> BTreeSet<String> {
     let mut used = names_after(code, "crate::");
     if file.module().len() == 1 {
         used.extend(names_after(code, "super::"));
@@ -82,23 +82,23 @@ fn imported_rooms(file: &SourceFile, code: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn every_room_is_in_the_code_map() {
-    let rooms: BTreeSet<String> = room_files().into_iter().map(|file| file.room).collect();
+fn every_module_is_in_the_code_map() {
+    let modules: BTreeSet<String> = module_files().into_iter().map(|file| file.module).collect();
     let mapped: BTreeSet<String> = table().into_keys().collect();
-    assert_eq!(rooms, mapped);
+    assert_eq!(modules, mapped);
 }
 
 #[test]
-fn rooms_import_only_what_the_table_allows() {
+fn modules_import_only_what_the_table_allows() {
     let table = table();
     let mut wrong = Vec::new();
-    for file in room_files() {
-        for name in imported_rooms(&file, &file.production_code()) {
-            let is_foreign = table.contains_key(&name) && name != file.room;
-            if is_foreign && !table[&file.room].contains(&name) {
+    for file in module_files() {
+        for name in imported_modules(&file, &file.production_code()) {
+            let is_foreign = table.contains_key(&name) && name != file.module;
+            if is_foreign && !table[&file.module].contains(&name) {
                 wrong.push(format!(
                     "{}: {} may not import {name}",
-                    file.name, file.room
+                    file.name, file.module
                 ));
             }
         }
@@ -113,27 +113,27 @@ fn unit_tests_import_only_what_the_table_and_its_exceptions_allow() {
     let mut wrong = BTreeSet::new();
     let mut unused: BTreeSet<(String, String)> = TEST_IMPORTS
         .iter()
-        .flat_map(|(room, names)| {
+        .flat_map(|(module, names)| {
             names
                 .iter()
-                .map(|name| ((*room).to_owned(), (*name).to_owned()))
+                .map(|name| ((*module).to_owned(), (*name).to_owned()))
         })
         .collect();
-    for file in room_files() {
+    for file in module_files() {
         let extra = exceptions
-            .get(file.room.as_str())
+            .get(file.module.as_str())
             .copied()
             .unwrap_or_default();
-        for name in imported_rooms(&file, &file.test_code()) {
-            let is_foreign = table.contains_key(&name) && name != file.room;
-            if !is_foreign || table[&file.room].contains(&name) {
+        for name in imported_modules(&file, &file.test_code()) {
+            let is_foreign = table.contains_key(&name) && name != file.module;
+            if !is_foreign || table[&file.module].contains(&name) {
                 continue;
             }
-            unused.remove(&(file.room.clone(), name.clone()));
+            unused.remove(&(file.module.clone(), name.clone()));
             if !extra.contains(&name.as_str()) {
                 wrong.insert(format!(
                     "{}: tests of {} may not import {name}",
-                    file.name, file.room
+                    file.name, file.module
                 ));
             }
         }
@@ -143,19 +143,19 @@ fn unit_tests_import_only_what_the_table_and_its_exceptions_allow() {
 }
 
 #[test]
-fn crates_stay_in_their_rooms() {
+fn crates_stay_in_their_modules() {
     let mut wrong = Vec::new();
-    for file in room_files() {
+    for file in module_files() {
         let code = file.production_code();
-        for (name, rooms) in ONLY_IN {
+        for (name, modules) in ONLY_IN {
             let is_named = !names_after(&code, &format!("{name}::")).is_empty();
-            if is_named && !rooms.contains(&file.room.as_str()) {
-                wrong.push(format!("{}: {} may not use {name}", file.name, file.room));
+            if is_named && !modules.contains(&file.module.as_str()) {
+                wrong.push(format!("{}: {} may not use {name}", file.name, file.module));
             }
         }
         for name in IMPURE {
-            if PURE_ROOMS.contains(&file.room.as_str()) && code.contains(name) {
-                wrong.push(format!("{}: {} may not use {name}", file.name, file.room));
+            if PURE_MODULES.contains(&file.module.as_str()) && code.contains(name) {
+                wrong.push(format!("{}: {} may not use {name}", file.name, file.module));
             }
         }
     }
@@ -164,7 +164,7 @@ fn crates_stay_in_their_rooms() {
 
 #[test]
 fn only_progress_and_screen_draw() {
-    for file in room_files() {
+    for file in module_files() {
         let draws = !names_after(&file.production_code(), "indicatif::").is_empty();
         assert!(
             !draws || ["cli/progress.rs", "cli/screen.rs"].contains(&file.name.as_str()),

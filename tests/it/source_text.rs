@@ -8,7 +8,7 @@ pub(crate) struct SourceFile {
     /// Path relative to `src`, with forward slashes.
     pub(crate) name: String,
     /// The top-level module.
-    pub(crate) room: String,
+    pub(crate) module: String,
     /// The whole text.
     pub(crate) text: String,
     /// Whether the file is compiled for tests only.
@@ -103,10 +103,10 @@ pub(crate) fn source_files() -> Vec<SourceFile> {
                         .strip_prefix(module.as_str())
                         .is_some_and(|rest| rest.starts_with('/'))
             });
-            let room = stem.split('/').next().unwrap_or_default().to_owned();
+            let module = stem.split('/').next().unwrap_or_default().to_owned();
             SourceFile {
                 name,
-                room,
+                module,
                 text,
                 is_test,
             }

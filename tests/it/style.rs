@@ -22,7 +22,7 @@ const ASSOCIATED_TYPES: &[&str] = &[
 ];
 
 /// Rooms whose public functions say in their first words what they do.
-const NUMERIC_ROOMS: &[&str] = &["stages/", "mesh/", "raster/", "report/stats"];
+const NUMERIC_MODULES: &[&str] = &["stages/", "mesh/", "raster/", "report/stats"];
 
 /// Phrases that no documentation uses.
 const BANNED_PHRASES: &[&str] = &[
@@ -136,7 +136,11 @@ fn documented_functions(text: &str) -> Vec<(String, String)> {
 fn docs_of_numeric_functions_start_with_a_verb() {
     let mut missing = Vec::new();
     for file in source_files() {
-        if file.is_test || !NUMERIC_ROOMS.iter().any(|room| file.name.starts_with(room)) {
+        if file.is_test
+            || !NUMERIC_MODULES
+                .iter()
+                .any(|module| file.name.starts_with(module))
+        {
             continue;
         }
         for (name, doc) in documented_functions(&file.text) {
