@@ -10,7 +10,7 @@ use crate::domain::{Reason, ReviewOrder, one_line};
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
-const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align scan_view";
+const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
 
 /// Returns a whole document.
 fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -159,6 +159,7 @@ fn modes(language: Language) -> Markup {
             @for mode in MODES.split_whitespace() { (toggle(mode, language)) }
             span.divider {}
             @for switch in SWITCHES.split_whitespace() { (toggle(switch, language)) }
+            (button("scan_view", language))
         }
     }
 }

@@ -28,6 +28,7 @@ fn document(title: &str, head: &Markup, body: &Markup) -> String {
 pub(super) fn view(pair: &str) -> String {
     let head = html! {
         link rel="stylesheet" href="/assets/scan-viewer.css";
+        link rel="icon" href="data:,";
         script type="module" src="/assets/view.js" {}
     };
     let body = html! {

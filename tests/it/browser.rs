@@ -298,6 +298,19 @@ impl Tab<'_> {
         }
     }
 
+    /// Puts fingers on the screen at the first points, moves them to the second, and lifts them.
+    pub(crate) fn touch(&self, from: &[[f64; 2]], to: &[[f64; 2]]) {
+        let points = |places: &[[f64; 2]]| {
+            let places = places.iter().enumerate();
+            let points = places.map(|(id, [x, y])| json!({ "x": x, "y": y, "id": id }));
+            points.collect::<Vec<_>>()
+        };
+        for (kind, places) in [("touchStart", from), ("touchMove", to), ("touchEnd", &[])] {
+            let params = json!({ "type": kind, "touchPoints": points(places) });
+            self.call("Input.dispatchTouchEvent", &params);
+        }
+    }
+
     /// Saves a screenshot to the folder `MOCBAN_SCREENSHOTS`, if set.
     pub(crate) fn screenshot(&self, name: &str) {
         let Some(folder) = std::env::var_os("MOCBAN_SCREENSHOTS") else {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use mocban::mesh::MeshLimits;
 use mocban::raster::{Grid, ImageLimits, decode};
 use serde_json::Value;
 
@@ -210,6 +211,76 @@ fn every_control_changes_the_picture() {
     tab.screenshot("scan-dark");
     let labels = "[...document.querySelectorAll('.scan-viewer input')].every((input) => input.labels.length === 1)";
     assert_eq!(tab.eval(labels), true);
+}
+
+#[test]
+fn fingers_turn_zoom_and_move_the_scan() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let pair = one_pair(dir.path());
+    let page = view(dir.path(), pair);
+    let tab = mounted(&browser, &page.url, [400, 800]);
+    let orbit = |tab: &Tab<'_>| {
+        let orbit = tab
+            .eval("[mocbanViewer.orbit.azimuth, mocbanViewer.orbit.tilt, mocbanViewer.orbit.zoom]");
+        numbers(&orbit)
+    };
+    tab.touch(&[[150.0, 200.0]], &[[190.0, 220.0]]);
+    let turned = orbit(&tab);
+    assert!(turned[0] < -5.0 && turned[1] > 2.0, "{turned:?}");
+    assert_eq!(turned[2], 1.0);
+    tab.touch(
+        &[[150.0, 200.0], [200.0, 200.0]],
+        &[[120.0, 200.0], [220.0, 200.0]],
+    );
+    let zoomed = orbit(&tab);
+    assert!((1.8..2.2).contains(&zoomed[2]), "{zoomed:?}");
+    assert_eq!(zoomed[..2], turned[..2], "two fingers do not turn");
+}
+
+#[test]
+fn a_point_set_is_shown() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let pair = one_pair(dir.path());
+    let meshes = std::fs::read_dir(dir.path().join("p/data/meshes")).expect("a folder");
+    let mesh = meshes
+        .map(|entry| entry.expect("an entry").path())
+        .next()
+        .expect("a mesh");
+    let bytes = std::fs::read(&mesh).expect("readable");
+    let name = mesh.to_string_lossy();
+    let scan = mocban::mesh::read(&bytes, &name, &MeshLimits::SUGGESTED).expect("a mesh");
+    let lines = scan
+        .vertices
+        .iter()
+        .map(|[x, y, z]| format!("{x} {y} {z}\n"));
+    std::fs::write(dir.path().join("scan.xyz"), lines.collect::<String>()).expect("written");
+    let print = print_file(dir.path(), pair);
+    let list = format!("id,mesh,print\npoints,scan.xyz,{}\n", print.display());
+    std::fs::write(dir.path().join("points.csv"), list).expect("written");
+    mocban(dir.path(), &["-C", "q", "import", "points.csv"]).expect(0);
+    mocban(dir.path(), &["-C", "q", "run"]).expect(0);
+    let args = ["-C", "q", "--json", "view", "--no-open", "points"];
+    let page = Page::of(binary().current_dir(dir.path()).args(args));
+    let tab = mounted(&browser, &page.url, [600, 500]);
+    tab.screenshot("scan-points");
+    let wood = canvas(&tab);
+    tab.eval("mocbanViewer.set({ ink: 1 }), null");
+    assert_ne!(canvas(&tab), wood, "the print colours the points");
+    let colours = tab.eval(
+        "(() => {
+            mocbanViewer.draw();
+            const seen = new Set();
+            for (let x = 200; x < 400; x += 3) seen.add(mocbanViewer.pixel(x, 250).join());
+            return seen.size;
+        })()",
+    );
+    assert!(colours.as_u64() > Some(10), "{colours} colours");
 }
 
 #[test]

@@ -22,7 +22,7 @@ const USAGE: &str = "\
 
 Open `pairs/ID/viewer.html` in a browser. The page holds its data and scripts, so that it can be sent or archived as one
 file. Drag to turn the block, use the wheel or two fingers to come closer, and press `?` for the list of keys. Scans of
-more than 300,000 triangles are simplified.
+more than 500,000 triangles are simplified.
 
 The view is mirrored at first, so that the writing reads as in the print. The switch *As printed* shows the block itself,
 whose writing is mirrored. Lengths are millimetres, or mesh units if the unit of the mesh is unknown.

@@ -7,7 +7,7 @@ use crate::export::pictures::{PrintView, eight_bits};
 use crate::raster::{Grid, Mask, PrintImage, png_rgb8};
 
 /// Maximum number of triangles, or of points of a point set. Larger scans are simplified.
-pub(super) const MAX_ELEMENTS: usize = 300_000;
+pub(super) const MAX_ELEMENTS: usize = 500_000;
 /// Maximum length in pixels of the longer side of a texture. All browsers support textures of this size.
 const TEXTURE_SIDE: usize = 2048;
 
