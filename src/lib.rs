@@ -49,7 +49,8 @@
 //! the write connection), `db/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
 //! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
 //! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
-//! rows that no run can compute again), `cli/report.rs`, `report/render/table.rs` and `report/number_format.rs` (the
+//! rows that no run can compute again), `cli/report.rs`, `report/headline.rs` (the answer in three
+//! sentences), `report/provenance.rs` (settings and hashes), `report/render/table.rs` and `report/number_format.rs` (the
 //! text of a cell).
 //! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
@@ -108,17 +109,15 @@
 //! Outside unit tests and comments, these files in `src/` name a variant of [`domain::ThresholdMetric`]; all others
 //! iterate over its `ALL` or `PAPER`, or take a metric as an argument:
 //!
-//! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics; its default metric stays
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
-//! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
 //! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
 //! Also touched: the weights in `src/stages/register/confidence.rs`, `REVISION` in `src/stages/register/mod.rs`, the
-//! help text of `--metric` in `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
+//! help text of `--metric` in `src/cli/contact_sheet.rs` and `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
 //! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
 //!

@@ -1,6 +1,8 @@
 //! `report --compare`: the tables of two projects side by side.
 
 use super::table::columns;
+use crate::report::number_format::NumberStyle::{self, Score, Share};
+use crate::report::number_format::{format_number, format_share};
 use crate::report::{MetricRow, Report};
 
 /// Formats the numbers of both projects and their differences, one line per metric and number.
@@ -21,21 +23,32 @@ fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
     let acc_by_truth = |row: &MetricRow| row.truth.as_ref()?.acc;
     let within_5deg = |row: &MetricRow| row.truth.as_ref()?.angle_le_5deg;
     let numbers = [
-        ("Acc", here.acc, there.acc),
-        ("SSIM", here.ssim, there.ssim),
-        ("IoU", here.iou, there.iou),
-        ("IoU box", here.iou_box, there.iou_box),
-        ("Dice", here.dice, there.dice),
-        ("Acc by truth", acc_by_truth(here), acc_by_truth(there)),
-        ("in 5° by truth", within_5deg(here), within_5deg(there)),
+        ("Acc %", Share, here.acc, there.acc),
+        ("SSIM", Score, here.ssim, there.ssim),
+        ("IoU", Score, here.iou, there.iou),
+        ("IoU box", Score, here.iou_box, there.iou_box),
+        ("Dice", Score, here.dice, there.dice),
+        (
+            "Acc % by truth",
+            Share,
+            acc_by_truth(here),
+            acc_by_truth(there),
+        ),
+        (
+            "in 5° % by truth",
+            Share,
+            within_5deg(here),
+            within_5deg(there),
+        ),
     ];
     let counts = vec!["n".to_owned(), here.n.to_string(), there.n.to_string()];
     let lines = numbers
         .iter()
-        .filter(|(_, a, b)| a.is_some() || b.is_some())
-        .map(|(name, a, b)| {
-            let difference = a.zip(*b).map(|(a, b)| format!("{:+.3}", a - b));
-            let show = |value: &Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+        .filter(|(_, _, a, b)| a.is_some() || b.is_some())
+        .map(|(name, style, a, b)| {
+            let difference = a.zip(*b).map(|(a, b)| signed(a - b, *style));
+            let show =
+                |value: &Option<f64>| value.map_or("-".to_owned(), |value| shown(value, *style));
             let mut line = vec![(*name).to_owned(), show(a), show(b)];
             line.extend(difference);
             line
@@ -47,10 +60,35 @@ fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
         .collect()
 }
 
+/// Formats a number as the tables of a report do.
+fn shown(value: f64, style: NumberStyle) -> String {
+    match style {
+        Share => format_share(value),
+        other => format_number(value, other),
+    }
+}
+
+/// Formats a difference with its sign; that of two shares is in percentage points.
+fn signed(difference: f64, style: NumberStyle) -> String {
+    let text = format_number(difference, style);
+    if text.starts_with('-') {
+        text
+    } else {
+        format!("+{text}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::side_by_side;
+    use super::{Score, Share, side_by_side, signed};
     use crate::report::ReportAccumulator;
+
+    #[test]
+    fn differences_have_a_sign() {
+        assert_eq!(signed(0.012, Share), "+1.2");
+        assert_eq!(signed(-0.012, Score), "-0.012");
+        assert_eq!(signed(-0.0001, Score), "+0.000");
+    }
 
     #[test]
     fn empty_projects_have_only_counts() {

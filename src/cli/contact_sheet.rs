@@ -23,7 +23,7 @@ pub(super) struct ContactSheetArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief
-    #[arg(long, default_value = "ensemble")]
+    #[arg(long, default_value_t = ThresholdMetric::DEFAULT)]
     pub(super) metric: ThresholdMetric,
     /// Order of the pairs: worst, score, margin, confidence (least confident first) or name
     #[arg(long, default_value = "worst")]
@@ -44,7 +44,7 @@ impl Default for ContactSheetArgs {
         Self {
             pairs: Vec::new(),
             output: None,
-            metric: ThresholdMetric::Ensemble,
+            metric: ThresholdMetric::DEFAULT,
             order: ContactSheetOrder::Worst,
             limit: 60,
             columns: 5,

@@ -11,6 +11,7 @@ use super::exit::{ExitCode, Refusal};
 use super::time_text::day;
 use super::{files, output};
 use crate::catalog::Catalog;
+use crate::config::{self, Sources};
 use crate::export::{GallerySelection, draw_gallery};
 use crate::report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
@@ -32,7 +33,7 @@ pub(super) struct ReportArgs {
     /// Confidence intervals of Acc: wilson, or exact (Clopper-Pearson)
     #[arg(long, value_name = "METHOD", default_value = "wilson")]
     pub(super) ci: IntervalMethod,
-    /// Include computing times by stage, as html always does; the output then differs from run to run
+    /// Include computing times by stage and the time of the last result, as html always does; the output then differs from run to run
     #[arg(long)]
     pub(super) with_times: bool,
     /// Also print the table of another project; only with the formats text and json
@@ -70,7 +71,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     } else {
         build(&catalog, &project).await?
     };
-    let mut report = report.with_interval(args.ci);
+    let mut report = with_defaults(report)?.with_interval(args.ci);
     if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
@@ -178,6 +179,14 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
     let (project, catalog) = context.open_read_only().await?;
     let report = build(&catalog, &project).await?.without_times();
     catalog.close().await;
+    with_defaults(report)
+}
+
+/// Names the settings of the results that are not the default ones.
+fn with_defaults(mut report: Report) -> anyhow::Result<Report> {
+    let defaults = config::load(&Sources::default())?.config.stages;
+    let fields = |stage| defaults.fingerprint_fields(stage);
+    report.provenance.compare_with(fields);
     Ok(report)
 }
 

@@ -9,7 +9,7 @@ use crate::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use crate::raster::{ImageLimits, jpeg_rgb8};
 use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
 use crate::report::ground_truth::TruthErrors;
-use crate::report::number_format::NumberStyle::{Degrees, Percent, Share};
+use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::format_number;
 use crate::report::pair_artifacts::group_identical;
 use crate::report::{Consensus, TruthEvaluation};
@@ -24,7 +24,7 @@ const MAX_PER_REASON: usize = 80;
 /// Pairs in the random sample.
 const SAMPLE_SIZE: usize = 20;
 /// The metric whose results are sampled.
-const SAMPLE_METRIC: ThresholdMetric = ThresholdMetric::Ensemble;
+const SAMPLE_METRIC: ThresholdMetric = ThresholdMetric::DEFAULT;
 
 /// A result to be drawn: of one metric, or of several that look the same.
 #[derive(Debug)]
@@ -198,17 +198,17 @@ impl GallerySubject {
         let Some(record) = self.record() else {
             return String::new();
         };
-        let share = |value| format_number(value, Share);
-        let mut text = format!("IoU {}", share(record.outcome.scores.iou));
+        let score = |value| format_number(value, Score);
+        let mut text = format!("IoU {}", score(record.outcome.scores.iou));
         let confidence = record.outcome.confidence;
-        text.extend(confidence.map(|confidence| format!(", confidence {}", share(confidence))));
+        text.extend(confidence.map(|confidence| format!(", confidence {}", score(confidence))));
         text.extend(self.truth.map(|errors| {
             let angle = format_number(errors.angle_deg, Degrees);
             let landmarks = format_number(errors.tre_pct, Percent);
             format!(", off the truth by {angle}\u{b0} and {landmarks} % of the height")
         }));
         let mask = self.truth.and_then(|errors| errors.mask_iou);
-        text.extend(mask.map(|iou| format!(", IoU with the true stroke tops {}", share(iou))));
+        text.extend(mask.map(|iou| format!(", IoU with the true stroke tops {}", score(iou))));
         text
     }
 

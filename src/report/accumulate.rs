@@ -12,8 +12,10 @@ use super::comparison::{Basis, ComparisonSums};
 use super::consensus::Consensus;
 use super::fail_reasons::FailReasonSums;
 use super::ground_truth::TruthErrors;
+use super::headline::headline;
 use super::manual_alignment::{ManualAlignmentErrors, ManualErrors};
 use super::model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+use super::provenance::ProvenanceSums;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{MeanIntervals, ScoreSample};
 use super::stage_times::StageTimes;
@@ -39,6 +41,7 @@ pub struct ReportAccumulator {
     times_ms: [Vec<f64>; Stage::ALL.len()],
     attention_checks: Option<AttentionCheckRates>,
     truth_problems: TruthProblems,
+    provenance: ProvenanceSums,
 }
 
 /// The sums of one metric.
@@ -50,6 +53,9 @@ struct MetricSums {
     unsure: u64,
     conflicts: u64,
     stale: u64,
+    /// Results with a confidence, and those of low confidence.
+    with_confidence: u64,
+    low_confidence: u64,
     rules: AdjudicationRules,
     reasons: FailReasonSums,
     /// Of SSIM, NL-SSIM, `IoU`, `IoU` of boxes, Dice.
@@ -73,6 +79,7 @@ impl ReportAccumulator {
         self.pairs += 1;
         self.count_status(pair);
         self.truth_problems.add(pair, truth);
+        self.provenance.add(pair);
         for record in &pair.stages {
             self.times_ms[record.stage.index()].push(record.ms as f64);
         }
@@ -152,8 +159,9 @@ impl ReportAccumulator {
         }
         let comparisons = self.comparisons.into_iter().zip(Basis::ALL);
         let times = Stage::ALL.into_iter().zip(&mut self.times_ms);
-        Report {
+        let mut report = Report {
             schema: SCHEMA,
+            headline: Vec::new(),
             pairs: self.pairs,
             interval: IntervalMethod::default(),
             progress: self.progress,
@@ -177,7 +185,10 @@ impl ReportAccumulator {
                 .collect(),
             attention_checks: self.attention_checks,
             unusable_truth: self.truth_problems.first,
-        }
+            provenance: self.provenance.finish(),
+        };
+        report.headline = headline(&report);
+        report
     }
 }
 
@@ -196,6 +207,8 @@ impl MetricSums {
             *sum += score;
         }
         let found = &outcome.disagreement;
+        self.with_confidence += u64::from(outcome.confidence.is_some());
+        self.low_confidence += u64::from(outcome.is_low_confidence());
         self.disagreeing += u64::from(found.pieces > 0);
         self.missing[0] += found.missing_ink;
         self.missing[1] += found.missing_wood;
@@ -240,6 +253,7 @@ impl MetricSums {
             unsure: self.unsure,
             conflicts: self.conflicts,
             stale: self.stale,
+            low_confidence: (self.with_confidence > 0).then_some(self.low_confidence),
             acc: acc.share,
             acc_ci95: acc.ci95,
             rules: (judged > 0).then_some(self.rules),

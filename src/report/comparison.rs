@@ -8,7 +8,7 @@ use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 use crate::domain::enum_names;
 
 /// Largest sample size that is stated. Above it, texts say "more than".
-const MAX_SAMPLE_SIZE: f64 = 100_000.0;
+const MAX_SAMPLE_SIZE: u64 = 100_000;
 
 /// The comparisons between metrics: every two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
@@ -30,10 +30,18 @@ pub enum Basis {
 
 impl Basis {
     /// Returns the words for pairs that count on this basis.
-    const fn pairs(self) -> &'static str {
+    pub(super) const fn pairs(self) -> &'static str {
         match self {
             Self::Verdicts => "judged pairs",
             Self::Truth => "pairs with ground truth",
+        }
+    }
+
+    /// Returns its name in texts.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Verdicts => "verdicts",
+            Self::Truth => "ground truth",
         }
     }
 }
@@ -61,6 +69,9 @@ pub struct Comparison {
     pub p: Option<f64>,
     /// `p` after Holm's correction over the comparisons of this basis.
     pub p_holm: Option<f64>,
+    /// Pairs that would be needed to show the difference with 80 % power at the 5 % level, rounded up to two significant
+    /// digits. `None` if each metric alone is right on as many pairs as the other.
+    pub pairs_needed: Option<u64>,
     /// The conclusion, in whole sentences.
     pub conclusion: String,
 }
@@ -96,6 +107,7 @@ impl ComparisonSums {
                 test: McNemarTest::NAME,
                 p: test.p(),
                 p_holm,
+                pairs_needed: test.sample_size().map(two_digits),
                 conclusion: conclusion(basis, (a, b), test, p_holm),
             })
             .collect()
@@ -126,8 +138,9 @@ fn conclusion(
             "{better} is right more often, but not significantly after correction for several comparisons."
         );
     }
-    let Some(pairs) = test.sample_size() else {
-        return "No significant difference: each alone is right on as many pairs.".to_owned();
+    let Some(pairs) = test.sample_size().map(two_digits) else {
+        return "No significant difference: each alone is right on as many pairs as the other."
+            .to_owned();
     };
     let (pairs, known, a, b) = (about(pairs), basis.pairs(), a.title(), b.title());
     format!(
@@ -136,19 +149,23 @@ fn conclusion(
     )
 }
 
-/// Formats a sample size, rounded up to two significant digits. The estimate is not more precise than that.
-fn about(pairs: f64) -> String {
-    if pairs > MAX_SAMPLE_SIZE {
-        return format!("more than {}", format_count(MAX_SAMPLE_SIZE as u64));
-    }
+/// Rounds a sample size up to two significant digits. The estimate is not more precise than that.
+fn two_digits(pairs: f64) -> u64 {
     let unit = 10.0_f64.powf((pairs.log10().floor() - 1.0).max(0.0));
-    let rounded = (pairs / unit).ceil() * unit;
-    format!("about {}", format_count(rounded as u64))
+    ((pairs / unit).ceil() * unit) as u64
+}
+
+/// Formats a sample size, such as `about 4,700` or `more than 100,000`.
+pub(super) fn about(pairs: u64) -> String {
+    if pairs > MAX_SAMPLE_SIZE {
+        return format!("more than {}", format_count(MAX_SAMPLE_SIZE));
+    }
+    format!("about {}", format_count(pairs))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Basis, Comparison, ComparisonSums, about};
+    use super::{Basis, Comparison, ComparisonSums, about, two_digits};
     use crate::domain::ThresholdMetric;
 
     /// Compares over `(times, [nl_ssim, density, ensemble])`.
@@ -215,8 +232,9 @@ mod tests {
     #[test]
     fn sample_sizes_have_two_digits_and_a_limit() {
         let wanted = ["about 7", "about 99", "about 240", "about 4,700"];
-        assert_eq!([6.3, 99.0, 233.1, 4605.0].map(about), wanted);
-        assert_eq!(about(100_001.0), "more than 100,000");
+        let sizes = [6.3, 99.0, 233.1, 4605.0].map(two_digits);
+        assert_eq!(sizes.map(about), wanted);
+        assert_eq!(about(two_digits(100_001.0)), "more than 100,000");
     }
 
     #[test]

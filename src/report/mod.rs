@@ -12,10 +12,13 @@ pub(crate) mod consensus;
 mod fail_reasons;
 pub mod gallery;
 pub mod ground_truth;
+mod headline;
+mod intervals;
 mod manual_alignment;
 mod model;
 pub mod number_format;
 pub mod pair_artifacts;
+mod provenance;
 pub mod quality_gate;
 mod render;
 mod reviewer_agreement;
@@ -40,6 +43,7 @@ pub use consensus::Consensus;
 pub use fail_reasons::FailReasonCount;
 pub use manual_alignment::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
 pub use model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render};
 pub use reviewer_agreement::{
     MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord, VerdictAgreement, agreement,

@@ -8,6 +8,7 @@ use super::comparison::{Basis, Comparison};
 use super::fail_reasons::FailReasonCount;
 use super::manual_alignment::ManualAlignmentErrors;
 use super::number_format::count_list;
+use super::provenance::Provenance;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{BootstrapSettings, MeanIntervals};
 use super::score_comparison::ScoreComparison;
@@ -25,6 +26,9 @@ pub const SCHEMA: u32 = 1;
 pub struct Report {
     /// Version of the JSON form.
     pub schema: u32,
+    /// The answer in at most three sentences: how many pairs are aligned, Acc, and which differences are significant.
+    /// Commands are in backticks.
+    pub headline: Vec<String>,
     /// Pairs in the project, in every state.
     pub pairs: u64,
     /// How the intervals of shares are computed.
@@ -56,6 +60,8 @@ pub struct Report {
     pub unusable_truth: Option<String>,
     /// Caveats on the numbers, in whole sentences.
     pub warnings: Vec<String>,
+    /// What the numbers were computed from.
+    pub provenance: Provenance,
 }
 
 /// Numbers of pairs by state.
@@ -96,6 +102,8 @@ pub struct MetricRow {
     pub conflicts: u64,
     /// Results without a verdict whose earlier result had one.
     pub stale: u64,
+    /// Results with a confidence below 0.5. `None` if no result has a confidence.
+    pub low_confidence: Option<u64>,
     /// `passed / (passed + failed)`. `None` if nothing was passed or failed.
     pub acc: Option<f64>,
     /// The 95 % interval of `acc`, by the report's method.
@@ -170,36 +178,12 @@ impl MetricRow {
 }
 
 impl Report {
-    /// Returns the same report with intervals of shares computed by `method`.
+    /// Returns the report without computing times and dates, which differ from run to run.
     #[must_use]
-    pub fn with_interval(mut self, method: IntervalMethod) -> Self {
-        self.interval = method;
-        if let Some(rates) = &mut self.attention_checks {
-            rates.set_interval(method);
-        }
-        for row in &mut self.rows {
-            row.acc_ci95 = method.interval_95(row.passed, row.passed + row.failed);
-            if let Some(rules) = &mut row.rules {
-                rules.set_interval(method);
-            }
-            if let Some(truth) = &mut row.truth {
-                truth.acc_ci95 = method.interval_95(truth.passed, truth.n);
-            }
-        }
-        let curves = self.risk_coverage.iter_mut();
-        for point in curves.flat_map(|curve| &mut curve.points) {
-            point.acc_ci95 = method.interval_95(point.passed, point.n);
-        }
+    pub fn without_times(mut self) -> Self {
+        self.times = Vec::new();
+        self.provenance.last_result = None;
         self
-    }
-
-    /// Returns the report without computing times, which differ from run to run.
-    #[must_use]
-    pub fn without_times(self) -> Self {
-        Self {
-            times: Vec::new(),
-            ..self
-        }
     }
 
     /// Returns whether anybody judged a result.

@@ -146,6 +146,7 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
         unsure: 0,
         conflicts: 0,
         stale: 0,
+        low_confidence: None,
         acc: None,
         acc_ci95: None,
         rules: None,

@@ -1,8 +1,8 @@
 //! Caveats on the numbers of a report, in whole sentences.
 
 use super::model::{MetricRow, PairProgress};
-use super::number_format::NumberStyle::Share;
-use super::number_format::{count_list, counted, format_count, format_number};
+use super::number_format::NumberStyle::Score;
+use super::number_format::{counted, format_count, format_number};
 use super::score_bootstrap::BootstrapSkipped;
 use super::stats::{MAX_UNITS, MIN_UNITS};
 use super::truth_evaluation::TruthProblems;
@@ -19,10 +19,8 @@ pub(super) fn warnings(
 ) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
-    for row in rows {
-        warnings.extend(impossible_dice(row));
-        warnings.extend(qualified_results(row));
-    }
+    warnings.extend(rows.iter().filter_map(impossible_dice));
+    warnings.extend(qualified_results(rows));
     warnings.extend(unusable_truth(truth));
     warnings.extend(skipped.map(bootstrap_skipped));
     warnings
@@ -60,7 +58,7 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
     let (iou, dice) = (row.iou?, row.dice?);
     let bound = 2.0 * iou / (1.0 + iou);
     let [iou, shown_bound, shown_dice] =
-        [iou, bound, dice].map(|score| format_number(score, Share));
+        [iou, bound, dice].map(|score| format_number(score, Score));
     (dice > bound + ROUNDING).then(|| {
         format!(
             "{}: a mean Dice of {shown_dice} is above {shown_bound}, the most that a mean IoU of {iou} allows; the two \
@@ -70,19 +68,50 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
     })
 }
 
-/// Returns warnings that count stale verdicts, conflicts and mirrored results.
-fn qualified_results(row: &MetricRow) -> Vec<String> {
-    let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
-    let verdicts = count_list([
-        (row.stale, "have a verdict on an earlier result only"),
-        (row.conflicts, "are unsure because reviewers disagree"),
-    ]);
-    let mirrored = count_list([(mirrored, "are mirrored (angle error 180 degrees)")]);
-    let (title, results) = (row.metric.title(), counted(row.n, "result"));
-    let counts = [verdicts, mirrored].into_iter().flatten();
-    counts
-        .map(|counts| format!("{title}: of {results}, {counts}."))
+/// Returns warnings that count stale verdicts, conflicts and mirrored results. Metrics with the same counts share one.
+fn qualified_results(rows: &[MetricRow]) -> Vec<String> {
+    let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
+    for (row, text) in rows
+        .iter()
+        .flat_map(|row| qualifications(row).map(move |text| (row, text)))
+    {
+        match groups.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, titles)) => titles.push(row.metric.title()),
+            None => groups.push((text, vec![row.metric.title()])),
+        }
+    }
+    let groups = groups.into_iter();
+    groups
+        .map(|(text, titles)| format!("{}: {text}", titles.join(", ")))
         .collect()
+}
+
+/// Returns the counts of one metric, each as a sentence without the metric.
+fn qualifications(row: &MetricRow) -> impl Iterator<Item = String> + use<> {
+    let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
+    let counts = [
+        (
+            row.stale,
+            ["has", "have"],
+            "a verdict on an earlier result only",
+        ),
+        (
+            row.conflicts,
+            ["is", "are"],
+            "unsure because reviewers disagree",
+        ),
+        (
+            mirrored,
+            ["is", "are"],
+            "mirrored (angle error 180 degrees)",
+        ),
+    ];
+    let results = counted(row.n, "result");
+    let counts = counts.into_iter().filter(|(n, _, _)| *n > 0);
+    counts.map(move |(n, [one, more], what)| {
+        let verb = if n == 1 { one } else { more };
+        format!("of {results}, {} {verb} {what}.", format_count(n))
+    })
 }
 
 fn unusable_truth(truth: &TruthProblems) -> Option<String> {
@@ -94,7 +123,7 @@ fn unusable_truth(truth: &TruthProblems) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{bootstrap_skipped, impossible_dice, missing_pairs};
+    use super::{bootstrap_skipped, impossible_dice, missing_pairs, qualified_results};
     use crate::domain::ThresholdMetric;
     use crate::report::model::PairProgress;
     use crate::report::score_bootstrap::BootstrapSkipped;
@@ -134,6 +163,26 @@ mod tests {
         assert_eq!(
             impossible_dice(&test_fixtures::row(ThresholdMetric::NlSsim, iou, dice)),
             None
+        );
+    }
+
+    #[test]
+    fn metrics_with_the_same_counts_share_a_warning() {
+        let row = |metric, conflicts| crate::report::MetricRow {
+            conflicts,
+            ..test_fixtures::row(metric, 0.8, 0.88)
+        };
+        let rows = [
+            row(ThresholdMetric::NlSsim, 1),
+            row(ThresholdMetric::Density, 2),
+            row(ThresholdMetric::Ensemble, 1),
+        ];
+        assert_eq!(
+            qualified_results(&rows),
+            [
+                "Non-luminous SSIM, Ensemble: of 587 results, 1 is unsure because reviewers disagree.",
+                "Pixel density: of 587 results, 2 are unsure because reviewers disagree.",
+            ]
         );
     }
 

@@ -2,6 +2,7 @@
 
 use super::table::Table;
 use super::text::{with_caption, wrapped};
+use crate::report::number_format::NumberStyle::Share;
 use crate::report::number_format::format_count;
 use crate::report::reviewer_agreement::{
     MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord,
@@ -33,12 +34,12 @@ fn agreement(found: &ReviewerAgreement) -> Table {
     Table::of(&found.reviewer_pairs)
         .text("Reviewers", |pair| format!("{}, {}", pair.a, pair.b))
         .count("n", |pair| pair.agreement.n)
-        .share("agreement", |pair| pair.agreement.agreement)
-        .interval(IntervalMethod::Wilson.title(), |pair| {
+        .share("agreement %", |pair| pair.agreement.agreement)
+        .interval(IntervalMethod::Wilson.title(), Share, |pair| {
             pair.agreement.agreement_ci95
         })
-        .share("kappa", |pair| if_sufficient(pair, pair.agreement.kappa))
-        .share("AC1", |pair| if_sufficient(pair, pair.agreement.ac1))
+        .score("kappa", |pair| if_sufficient(pair, pair.agreement.kappa))
+        .score("AC1", |pair| if_sufficient(pair, pair.agreement.ac1))
         .text("", |pair| {
             if pair.agreement.sufficient {
                 ""
@@ -46,7 +47,7 @@ fn agreement(found: &ReviewerAgreement) -> Table {
                 "too few results"
             }
         })
-        .caption(format!(
+        .caption("agreement", format!(
             "Over the n results that both passed or failed; kappa (Cohen) and AC1 (Gwet) need at least {MIN_RESULTS}. \
              Kappa falls to 0 when failures are rare, however well reviewers agree; AC1 does not."
         ))
@@ -58,7 +59,7 @@ fn failures(found: &ReviewerAgreement) -> Table {
         .count("by any", |pair| pair.agreement.failed_by_any)
         .count("by both", |pair| pair.agreement.failed_by_both)
         .count("unsure", |pair| pair.agreement.unsure)
-        .caption(
+        .caption("agreement-failures",
             "Results that at least one of the two failed, and that both failed. Unsure: results that both judged and at \
              least one was unsure about.",
         )
@@ -82,10 +83,10 @@ fn reviewers(found: &ReviewerAgreement) -> Table {
             (!is_total(record)).then_some(record.judged)
         })
         .optional_text("duplicates", |record| out_of(&record.duplicates))
-        .interval(interval, |record| record.duplicates.ci95)
+        .interval(interval, Share, |record| record.duplicates.ci95)
         .optional_text("detected", |record| out_of(&record.attention_checks.all))
-        .interval(interval, |record| record.attention_checks.all.ci95)
-        .caption(
+        .interval(interval, Share, |record| record.attention_checks.all.ci95)
+        .caption("reviewers",
             "Duplicates: results shown twice that got the same verdict twice. Detected: planted faults (attention \
              checks) that the reviewer failed; this shows how well they find such faults, and no others.",
         )
@@ -112,7 +113,7 @@ mod tests {
     #[test]
     fn few_results_have_no_kappa() {
         let text = agreement_text(&test_fixtures::agreement(28, 1));
-        let line = "lan, minh  29      0.966  0.828-0.994      -    -  too few results\n";
+        let line = "lan, minh  29         96.6  82.8–99.4        -    -  too few results\n";
         assert!(text.contains(line), "{text}");
     }
 

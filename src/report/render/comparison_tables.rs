@@ -1,64 +1,94 @@
 //! Tables that compare metrics, and the table of bootstrap intervals.
 
 use super::table::Table;
-use crate::report::comparison::{Comparison, versus};
+use crate::report::comparison::{Basis, Comparison, versus};
 use crate::report::model::Report;
-use crate::report::number_format::NumberStyle::Share;
+use crate::report::number_format::NumberStyle::{self, Score, Share};
 use crate::report::number_format::{format_count, format_number};
 use crate::report::score_bootstrap::{BootstrapSettings, MeanIntervals};
 
 /// Reads one interval of a metric's means.
 type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 
-/// Returns the table of McNemar's tests, one for every two compared metrics, or `None` without comparisons.
-pub(super) fn comparisons(report: &Report) -> Option<Table> {
-    let test = report.comparisons.first()?.test;
-    let table = Table::of(&report.comparisons)
-        .text("Comparison", |found| versus(found.a, found.b))
-        .text("by", |found| found.basis.name())
-        .count("n", |found| found.n)
-        .count("first only", |found| found.a_only)
-        .count("second only", |found| found.b_only)
-        .p_value("p", |found| found.p)
-        .p_value("Holm", |found| found.p_holm);
-    Some(table.caption(format!(
-        "Metrics compared by which results are right ({test}; Holm's correction within each basis)."
-    )))
+/// Returns a table of McNemar's tests for each basis, with a row for every two compared metrics.
+pub(super) fn comparisons(report: &Report) -> Vec<Table> {
+    let table = |basis: Basis| {
+        let compared = report.comparisons.iter();
+        let compared: Vec<&Comparison> = compared.filter(|found| found.basis == basis).collect();
+        let test = compared.first()?.test;
+        let (id, header) = match basis {
+            Basis::Verdicts => ("comparisons-verdicts", "Right by verdicts"),
+            Basis::Truth => ("comparisons-truth", "Right by ground truth"),
+        };
+        Some(
+            Table::of(compared)
+                .text(header, |found| versus(found.a, found.b))
+                .count("n", |found| found.n)
+                .count("1st only", |found| found.a_only)
+                .count("2nd only", |found| found.b_only)
+                .p_value("p", |found| found.p)
+                .p_value("Holm p", |found| found.p_holm)
+                .caption(
+                    id,
+                    format!(
+                        "Metrics compared by which of n pairs they are right on, by {}: pairs on which only the first \
+                         or only the second is right ({test}; Holm's correction).",
+                        basis.title()
+                    ),
+                ),
+        )
+    };
+    Basis::ALL.into_iter().filter_map(table).collect()
 }
 
-/// Returns a sentence or two on each comparison.
+/// Returns the conclusions from the comparisons. Comparisons with the same conclusion share a line.
 pub(super) fn comparison_sentences(report: &Report) -> Vec<String> {
-    let sentence = |found: &Comparison| {
-        let (metrics, basis) = (versus(found.a, found.b), found.basis.name());
-        format!("{metrics}, by {basis}: {}", found.conclusion)
+    let mut groups: Vec<(Basis, &str, Vec<String>)> = Vec::new();
+    for found in &report.comparisons {
+        let metrics = versus(found.a, found.b);
+        let mut known = groups.iter_mut();
+        let same = known.find(|(basis, conclusion, _)| {
+            *basis == found.basis && *conclusion == found.conclusion
+        });
+        match same {
+            Some((_, _, compared)) => compared.push(metrics),
+            None => groups.push((found.basis, &found.conclusion, vec![metrics])),
+        }
+    }
+    let line = |(basis, conclusion, compared): (Basis, &str, Vec<String>)| {
+        let (basis, compared) = (basis.title(), compared.join("; "));
+        format!("By {basis}, {compared}: {conclusion}")
     };
-    report.comparisons.iter().map(sentence).collect()
+    groups.into_iter().map(line).collect()
 }
 
 /// Returns the table of bootstrap intervals: of mean scores and, if whole blocks were resampled, of Acc. Returns `None`
 /// if there is no interval.
 pub(super) fn mean_intervals(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
-    let fields: [(&'static str, MeanIntervalField); 4] = [
-        ("SSIM", |means| means.ssim),
-        ("IoU", |means| means.iou),
-        ("Dice", |means| means.dice),
-        ("Acc", |means| means.acc_by_block),
+    let fields: [(&'static str, NumberStyle, MeanIntervalField); 4] = [
+        ("SSIM", Score, |means| means.ssim),
+        ("IoU", Score, |means| means.iou),
+        ("Dice", Score, |means| means.dice),
+        ("Acc %", Share, |means| means.acc_by_block),
     ];
-    let mut table = Table::of(&report.rows).text("95% bootstrap", |row| row.metric.title());
+    let mut table = Table::of(&report.rows).text("95 % bootstrap", |row| row.metric.title());
     let mut is_any = false;
-    for (header, read) in fields {
+    for (header, style, read) in fields {
         let mut rows = report.rows.iter();
         if rows.any(|row| read(&row.means_ci95).is_some()) {
-            table = table.interval(header, |row| read(&row.means_ci95));
+            table = table.interval(header, style, |row| read(&row.means_ci95));
             is_any = true;
         }
     }
     is_any.then(|| {
-        table.caption(format!(
-            "95 % intervals of the means above, by the {}.",
-            method(settings)
-        ))
+        table.caption(
+            "mean-intervals",
+            format!(
+                "95 % intervals of the means above, by the {}.",
+                method(settings)
+            ),
+        )
     })
 }
 
@@ -78,16 +108,16 @@ pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
     let mut compared = report.score_comparisons.iter();
     let has_interval = compared.any(|found| found.ci95.is_some());
-    let bounds = |bounds: [f64; 2]| bounds.map(|bound| format_number(bound, Share)).join(", ");
+    let bounds = |bounds: [f64; 2]| bounds.map(|bound| format_number(bound, Score)).join(", ");
     has_interval.then(|| {
         Table::of(&report.score_comparisons)
             .text("Scores compared", |found| versus(found.a, found.b))
             .text("by", |found| found.score.title())
-            .share("diff.", |found| Some(found.difference))
-            .optional_text("95% bootstrap", |found| found.ci95.map(bounds))
+            .score("diff.", |found| Some(found.difference))
+            .optional_text("95 % bootstrap", |found| found.ci95.map(bounds))
             .p_value("p", |found| found.p)
-            .p_value("Holm", |found| found.p_holm)
-            .caption(format!(
+            .p_value("Holm p", |found| found.p_holm)
+            .caption("score-comparisons", format!(
                 "Mean of the first minus mean of the second on the same pairs, by the {}; two-sided p with Holm's \
                  correction within each score. A higher score does not mean a better alignment: a mask that copies the \
                  ink would score best.",
@@ -127,7 +157,7 @@ mod tests {
         };
         let table = mean_intervals(&report).expect("20 pairs");
         assert_eq!(table.columns.len(), 4, "no Acc without verdicts");
-        let ensemble = ["Ensemble", "0.810-0.810", "0.750-0.750", "0.824-0.824"];
+        let ensemble = ["Ensemble", "0.810–0.810", "0.750–0.750", "0.824–0.824"];
         assert_eq!(cells(&table.rows[2]), ensemble);
         assert!(
             table
@@ -157,7 +187,10 @@ mod tests {
             .find(|line| line.contains("Non-luminous SSIM v. Pixel density  IoU"));
         let wanted = "  -0.050  -0.050, -0.050  <0.001  0.001";
         assert!(found.expect("a line").ends_with(wanted), "{text}");
-        assert!(text.lines().all(|line| line.len() <= 80), "{text}");
+        assert!(
+            text.lines().all(|line| line.chars().count() <= 80),
+            "{text}"
+        );
     }
 
     #[test]

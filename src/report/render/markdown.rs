@@ -1,7 +1,9 @@
 //! The report as Markdown tables of GitHub's dialect.
 
+use super::code_spans::{SentencePart, parts};
 use super::comparison_tables::{comparison_sentences, comparisons, score_comparisons};
-use super::report_tables::{headline, tables};
+use super::provenance_lines::provenance_lines;
+use super::report_tables::tables;
 use super::risk_coverage_tables::full_tables;
 use super::table::{ColumnFormat, Table};
 use crate::domain::one_line;
@@ -11,13 +13,15 @@ use crate::report::score_comparison::conclusions;
 
 /// Returns the report as Markdown.
 pub(super) fn render(report: &Report) -> String {
-    let mut blocks = vec![format!("{}\n", headline(report))];
+    let headline = report.headline.iter().map(|text| sentence(text));
+    let mut blocks = vec![format!("{}\n", headline.collect::<Vec<_>>().join("\n"))];
     for found in tables(report).iter().chain(&full_tables(report)) {
         blocks.extend(with_caption(found));
     }
-    if let Some(found) = comparisons(report) {
+    let compared = comparisons(report);
+    if !compared.is_empty() {
         blocks.push(list(&comparison_sentences(report)));
-        blocks.extend(with_caption(&found));
+        blocks.extend(compared.iter().flat_map(with_caption));
     }
     if let Some(found) = score_comparisons(report) {
         blocks.push(list(&conclusions(&report.score_comparisons)));
@@ -27,7 +31,22 @@ pub(super) fn render(report: &Report) -> String {
         blocks.push(format!("> **Note:** {}\n", escape(warning)));
     }
     blocks.extend(report.failures.iter().map(failures));
+    let provenance = provenance_lines(report).into_iter();
+    let provenance = provenance.map(|(what, text)| format!("- {what}: {}\n", escape(&text)));
+    blocks.push(format!(
+        "**Provenance**\n\n{}",
+        provenance.collect::<String>()
+    ));
     blocks.join("\n")
+}
+
+/// Returns a sentence with its commands as code.
+fn sentence(text: &str) -> String {
+    let part = |part| match part {
+        SentencePart::Words(words) => escape(words),
+        SentencePart::Command(command) => format!("`{command}`"),
+    };
+    parts(text).map(part).collect()
 }
 
 fn list(sentences: &[String]) -> String {

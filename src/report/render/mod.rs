@@ -1,11 +1,14 @@
 //! The formats of a report.
 
 mod agreement_text;
+mod code_spans;
 mod comparison_tables;
 mod csv;
 mod html;
 mod latex;
+mod latex_text;
 mod markdown;
+mod provenance_lines;
 mod report_tables;
 mod risk_coverage_tables;
 #[cfg(test)]
@@ -133,9 +136,46 @@ mod tests {
         let formats = ReportFormat::ALL.into_iter();
         for format in formats.filter(|format| *format != ReportFormat::Csv) {
             let text = render(&report, format);
-            let names = ["95% exact", r"95\% exact", r#""interval": "exact""#];
+            let names = [
+                "95 % exact",
+                r"95\,\% exact",
+                "95\u{202f}% exact",
+                r#""interval": "exact""#,
+            ];
             assert!(names.iter().any(|name| text.contains(name)), "{text}");
             assert!(!text.to_lowercase().contains("wilson"), "{text}");
+        }
+    }
+
+    #[test]
+    fn every_format_for_people_opens_with_the_answer_and_ends_with_its_origin() {
+        let report = test_fixtures::full_report();
+        for (format, table, end) in [
+            (ReportFormat::Text, "Method  ", "Program "),
+            (ReportFormat::Markdown, "| Method", "- Program:"),
+            (ReportFormat::Latex, "\\begin{table}", "Program &"),
+            (ReportFormat::Html, "<table", "<dt>Program"),
+        ] {
+            let text = render(&report, format);
+            let at = |part: &str| {
+                text.find(part)
+                    .unwrap_or_else(|| panic!("{format}: {part}"))
+            };
+            let answers = [
+                "36 of 38 pairs",
+                "Acc of Ensemble",
+                "By verdicts, all metrics",
+            ];
+            let [first, second, third] = answers.map(at);
+            assert!(
+                first < second && second < third && third < at(table),
+                "{format}"
+            );
+            assert!(
+                text.rfind("36 aligned pairs") > text.rfind("McNemar"),
+                "{format}"
+            );
+            assert!(at(end) > at("McNemar"), "{format}");
         }
     }
 

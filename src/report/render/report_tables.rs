@@ -5,8 +5,8 @@ use super::table::Table;
 use crate::domain::Reason;
 use crate::report::manual_alignment::ManualAlignmentErrors;
 use crate::report::model::{MetricRow, Report};
-use crate::report::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds};
-use crate::report::number_format::{counted, format_count};
+use crate::report::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
+use crate::report::number_format::format_count;
 use crate::report::stats::Rate;
 use crate::report::truth_summary::TruthSummary;
 
@@ -32,13 +32,13 @@ pub(super) fn scores(report: &Report) -> Table {
     Table::of(&report.rows)
         .text("Method", |row| row.metric.title())
         .count("n", |row| row.n)
-        .share("Acc", |row| row.acc)
-        .interval(report.interval.title(), |row| row.acc_ci95)
-        .share("SSIM", |row| row.ssim)
-        .share("IoU", |row| row.iou)
-        .share("IoU box", |row| row.iou_box)
-        .share("Dice", |row| row.dice)
-        .caption(format!(
+        .share("Acc %", |row| row.acc)
+        .interval(report.interval.title(), Share, |row| row.acc_ci95)
+        .score("SSIM", |row| row.ssim)
+        .score("IoU", |row| row.iou)
+        .score("IoU box", |row| row.iou_box)
+        .score("Dice", |row| row.dice)
+        .caption("scores", format!(
             "Acc is the share of passed results among those that reviewers passed or failed{}. SSIM, IoU and Dice are \
              means over n pairs, computed by pixel; IoU box is that of the bounding boxes.",
             passed_counts(report)
@@ -70,7 +70,10 @@ pub(super) fn verdicts(report: &Report) -> Table {
         .count("failed", |row| row.failed)
         .count("unsure", |row| row.unsure)
         .count("stale", |row| row.stale)
-        .caption("Results by verdict. Stale: only an earlier result has a verdict.")
+        .caption(
+            "verdicts",
+            "Results by verdict. Stale: only an earlier result has a verdict.",
+        )
 }
 
 /// Returns Acc under three rules for disagreement, or `None` if no result was decided by two reviewers.
@@ -80,13 +83,16 @@ pub(super) fn rules(report: &Report) -> Option<Table> {
     let mut table = Table::of(&report.rows)
         .text("Rules", |row| row.metric.title())
         .count("double", |row| row.rules.map(|rules| rules.double_read));
-    for (i, header) in ["either", "adjudicated", "both"].into_iter().enumerate() {
+    for (i, header) in ["either %", "adjudicated %", "both %"]
+        .into_iter()
+        .enumerate()
+    {
         table = table
             .share(header, |row| rate(row, i)?.share)
             .count("n", |row| rate(row, i).map(|rate| rate.n));
     }
     report.rows.iter().any(is_double).then(|| {
-        table.caption(
+        table.caption("rules",
             "Acc under three rules for results on which reviewers disagree: a result fails if either reviewer fails it; \
              it counts as adjudicated (the Acc above); it fails only if both fail it. n is the number of decided \
              results; double is the number that at least two reviewers decided.",
@@ -111,6 +117,7 @@ pub(super) fn fail_reasons(report: &Report) -> Option<Table> {
     }
     is_any.then(|| {
         table.caption(
+            "fail-reasons",
             "Failed results by the reasons that reviewers gave; a result may have several.",
         )
     })
@@ -125,9 +132,9 @@ pub(super) fn attention_checks(report: &Report) -> Option<Table> {
         .text("Attention checks", |(kind, _)| *kind)
         .count("n", |(_, rate)| rate.n)
         .count("detected", |(_, rate)| rate.count)
-        .share("share", |(_, rate)| rate.share)
-        .interval(report.interval.title(), |(_, rate)| rate.ci95);
-    Some(table.caption(
+        .share("share %", |(_, rate)| rate.share)
+        .interval(report.interval.title(), Share, |(_, rate)| rate.ci95);
+    Some(table.caption("attention-checks",
         "Faults planted in good results that reviewers failed, of those that they answered. This shows how well they \
          find such faults, and no others.",
     ))
@@ -140,19 +147,19 @@ pub(super) fn truth(report: &Report) -> Table {
     Table::of(&report.rows)
         .text("Truth", |row| row.metric.title())
         .count("n", |row| row.truth.as_ref().map_or(0, |truth| truth.n))
-        .share("Acc", |row| value(row, |truth| truth.acc))
-        .interval(report.interval.title(), |row| {
+        .share("Acc %", |row| value(row, |truth| truth.acc))
+        .interval(report.interval.title(), Share, |row| {
             row.truth.as_ref()?.acc_ci95
         })
-        .share("in 5\u{b0}", |row| value(row, |truth| truth.angle_le_5deg))
+        .share("in 5\u{b0} %", |row| value(row, |truth| truth.angle_le_5deg))
         .number("angle \u{b0}", Degrees, |row| {
             value(row, |truth| truth.angle_median_deg)
         })
         .number("landm. %", Percent, |row| {
             value(row, |truth| truth.tre_median_pct)
         })
-        .share("mask IoU", |row| value(row, |truth| truth.mask_iou_median))
-        .caption(
+        .score("mask IoU", |row| value(row, |truth| truth.mask_iou_median))
+        .caption("truth",
             "Errors against ground truth. Acc here: angle within 5 degrees, landmarks within 5 % of the character's \
              height, and mask IoU with the true stroke tops at least 0.7. Angle, landmarks and mask IoU are medians.",
         )
@@ -168,7 +175,7 @@ pub(super) fn manual_alignments(report: &Report) -> Option<Table> {
         Table::of(found)
             .text("Manual", |(title, _)| *title)
             .count("n", |(_, errors)| errors.n)
-            .share("in 5\u{b0}", |(_, errors)| errors.angle_le_5deg)
+            .share("in 5\u{b0} %", |(_, errors)| errors.angle_le_5deg)
             .number("angle \u{b0}", Degrees, |(_, errors)| {
                 errors.angle_median_deg
             })
@@ -177,7 +184,7 @@ pub(super) fn manual_alignments(report: &Report) -> Option<Table> {
             .number("95 %", Percent, |(_, errors)| errors.shift_p95_pct)
             .number("scale %", Percent, |(_, errors)| errors.scale_median_pct)
             .number("95 %", Percent, |(_, errors)| errors.scale_p95_pct)
-            .caption(
+            .caption("manual-alignments",
                 "Errors against manual alignments, over the n pairs that have one: share within 5 degrees; angle, shift \
                  in percent of the relief's longer side, and difference in scale, each as median and 95th percentile.",
             )
@@ -190,10 +197,10 @@ pub(super) fn thresholds(report: &Report) -> Option<Table> {
         Table::of(&report.thresholds)
             .text("Thresholds", |found| found.metric.title())
             .count("n", |found| found.n)
-            .share("5 %", |found| Some(found.p5))
-            .share("median", |found| Some(found.median))
-            .share("95 %", |found| Some(found.p95))
-            .caption(
+            .score("5 %", |found| Some(found.p5))
+            .score("median", |found| Some(found.median))
+            .score("95 %", |found| Some(found.p95))
+            .caption("thresholds",
                 "Relative height of the thresholds, from 0 (the lowest point of a depth map) to 1 (its highest): 5th \
                  percentile, median and 95th percentile.",
             )
@@ -209,27 +216,11 @@ pub(super) fn times(report: &Report) -> Option<Table> {
             .number("median ms", Milliseconds, |time| Some(time.median_ms))
             .number("95 % ms", Milliseconds, |time| Some(time.p95_ms))
             .number("sum s", Seconds, |time| Some(time.total_s))
-            .caption(
+            .caption("times",
                 "Computing time of the current results by stage, on one core: median and 95th percentile in \
                  milliseconds, sum in seconds.",
             )
     })
-}
-
-/// Returns the state of the pairs in one line, such as `24 pairs: 22 done, 2 failed`.
-pub(super) fn headline(report: &Report) -> String {
-    let (pairs, done) = (
-        counted(report.pairs, "pair"),
-        format_count(report.progress.done),
-    );
-    let mut line = format!("{pairs}: {done} done");
-    line.extend(
-        report
-            .progress
-            .without_results()
-            .map(|rest| format!(", {rest}")),
-    );
-    line
 }
 
 #[cfg(test)]
@@ -277,7 +268,7 @@ mod tests {
             .into(),
         });
         let table = attention_checks(&report.finish()).expect("22 were answered");
-        let turned = ["turned", "20", "19", "0.950", "0.764-0.991"];
+        let turned = ["turned", "20", "19", "95.0", "76.4–99.1"];
         assert_eq!(cells(&table, 1), turned);
         assert_eq!(cells(&table, 2)[..3], ["all", "22", "20"]);
         let mut none = ReportAccumulator::default();

@@ -3,7 +3,7 @@
 use super::table::Table;
 use crate::report::comparison::Basis;
 use crate::report::model::Report;
-use crate::report::number_format::NumberStyle::Percent;
+use crate::report::number_format::NumberStyle::{Percent, Share};
 use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve};
 
@@ -20,7 +20,7 @@ pub(super) fn short_tables(report: &Report) -> Vec<Table> {
         for (i, header) in HEADERS.into_iter().enumerate() {
             table = table.share(header, |curve| curve.points.get(i)?.acc);
         }
-        table.caption(caption(basis, curves))
+        table.caption(id(basis), caption(basis, curves))
     })
 }
 
@@ -37,10 +37,10 @@ pub(super) fn full_tables(report: &Report) -> Vec<Table> {
                 Some(100.0 * point.coverage)
             })
             .count("n", |(_, point)| point.n)
-            .share("Acc", |(_, point)| point.acc)
-            .interval(report.interval.title(), |(_, point)| point.acc_ci95)
-            .share("least confidence", |(_, point)| point.least_confidence)
-            .caption(caption(basis, curves))
+            .share("Acc %", |(_, point)| point.acc)
+            .interval(report.interval.title(), Share, |(_, point)| point.acc_ci95)
+            .score("least confidence", |(_, point)| point.least_confidence)
+            .caption(id(basis), caption(basis, curves))
     })
 }
 
@@ -53,6 +53,13 @@ fn by_basis(report: &Report, table: impl Fn(Basis, &[&RiskCoverageCurve]) -> Tab
     Basis::ALL.into_iter().filter_map(of_basis).collect()
 }
 
+const fn id(basis: Basis) -> &'static str {
+    match basis {
+        Basis::Verdicts => "coverage-verdicts",
+        Basis::Truth => "coverage-truth",
+    }
+}
+
 const fn title(basis: Basis) -> &'static str {
     match basis {
         Basis::Verdicts => "Coverage, verdicts",
@@ -62,8 +69,8 @@ const fn title(basis: Basis) -> &'static str {
 
 fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
     let mut sentences = vec![format!(
-        "Acc by {} of the most confident results, at the share of results that is kept (coverage).",
-        basis.name()
+        "Acc in percent by {} of the most confident results, at the share of results that is kept (coverage).",
+        basis.title()
     )];
     sentences.extend(curves.iter().filter_map(|curve| failures(curve)));
     sentences.join(" ")
@@ -119,7 +126,7 @@ mod tests {
         let wanted = "Ensemble: the least confident 2 of 34 results (5.9 %) hold 1 of 2 failures.";
         assert!(table.caption.contains(wanted), "{}", table.caption);
         let row: Vec<_> = table.rows[3].iter().flatten().map(String::as_str).collect();
-        assert_eq!(row[..4], ["Relief", "34", "0.941", "0.970"]);
+        assert_eq!(row[..4], ["Relief", "34", "94.1", "97.0"]);
         let [table] = &full_tables(&report)[..] else {
             panic!("one basis: there are no verdicts");
         };
@@ -129,8 +136,8 @@ mod tests {
             "Non-luminous SSIM",
             "99.0",
             "33",
-            "0.970",
-            "0.847-0.995",
+            "97.0",
+            "84.7–99.5",
             "0.800",
         ];
         assert_eq!(row, wanted);

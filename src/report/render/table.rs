@@ -1,12 +1,14 @@
 //! A table of text cells, which the text, Markdown, LaTeX and HTML renderers share.
 
 use crate::domain::one_line;
-use crate::report::number_format::NumberStyle::{self, Count, Share};
-use crate::report::number_format::{format_count, format_number};
+use crate::report::number_format::NumberStyle::{self, Count, Score, Share};
+use crate::report::number_format::{format_count, format_interval, format_number, format_share};
 
 /// A table of text cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Table {
+    /// Its name in labels and addresses, unique in a report: lower case letters and hyphens.
+    pub(super) id: &'static str,
     /// Whole sentences on what it shows.
     pub(super) caption: String,
     /// Its columns.
@@ -29,7 +31,7 @@ pub(super) struct TableColumn {
 pub(super) enum ColumnFormat {
     /// Text, aligned to the left.
     Text,
-    /// The two bounds of a share, joined by a hyphen and aligned to the left.
+    /// The two bounds of a number, joined by an en dash and aligned to the left.
     Interval,
     /// Numbers with this many decimals, aligned at the decimal point, with a comma between thousands.
     Number(usize),
@@ -83,9 +85,15 @@ impl<T> TableBuilder<T> {
         self.column(header, format, |item| value(item).into().map(format_count))
     }
 
-    /// Adds a column of shares or scores.
+    /// Adds a column of scores, confidences, heights or coefficients.
+    pub(super) fn score(self, header: &'static str, value: impl Fn(&T) -> Option<f64>) -> Self {
+        self.number(header, Score, value)
+    }
+
+    /// Adds a column of shares of counted results, in percent.
     pub(super) fn share(self, header: &'static str, value: impl Fn(&T) -> Option<f64>) -> Self {
-        self.number(header, Share, value)
+        let format = ColumnFormat::Number(Share.decimals());
+        self.column(header, format, |item| value(item).map(format_share))
     }
 
     /// Adds a column of numbers.
@@ -106,13 +114,14 @@ impl<T> TableBuilder<T> {
         self.optional_text(header, |item| value(item).map(text))
     }
 
-    /// Adds a column of intervals of shares or scores.
+    /// Adds a column of intervals of numbers of a style.
     pub(super) fn interval(
         self,
         header: &'static str,
+        style: NumberStyle,
         value: impl Fn(&T) -> Option<[f64; 2]>,
     ) -> Self {
-        let text = |bounds: [f64; 2]| bounds.map(|bound| format_number(bound, Share)).join("-");
+        let text = |bounds| format_interval(bounds, style);
         self.column(header, ColumnFormat::Interval, |item| value(item).map(text))
     }
 
@@ -129,9 +138,10 @@ impl<T> TableBuilder<T> {
         self
     }
 
-    /// Finishes the table.
-    pub(super) fn caption(self, caption: impl Into<String>) -> Table {
+    /// Finishes the table with its name and caption.
+    pub(super) fn caption(self, id: &'static str, caption: impl Into<String>) -> Table {
         Table {
+            id,
             caption: caption.into(),
             columns: self.columns,
             rows: self.rows,

@@ -1,13 +1,13 @@
 //! The report for a terminal of 80 columns.
 
-use super::comparison_tables::{comparison_sentences, score_comparisons};
-use super::report_tables::{headline, tables};
+use super::comparison_tables::{comparison_sentences, comparisons, score_comparisons};
+use super::provenance_lines::provenance_lines;
+use super::report_tables::tables;
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
 use crate::domain::one_line;
 use crate::report::model::{FailureGroup, Report};
-use crate::report::number_format::NumberStyle::PValue;
-use crate::report::number_format::{format_count, format_number};
+use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
 
 /// Columns of the terminal.
@@ -17,17 +17,14 @@ const MAX_LISTED: usize = 5;
 
 /// Returns the report as aligned text.
 pub(super) fn render(report: &Report) -> String {
-    let mut blocks = vec![format!("{}\n", headline(report))];
+    let headline = report.headline.iter();
+    let mut blocks = vec![headline.map(|text| wrapped("", text)).collect()];
     let tables = tables(report).into_iter().chain(short_tables(report));
     blocks.extend(tables.map(|table| with_caption(&table)));
-    if !report.has_verdicts() && report.progress.done > 0 {
-        let note = "Nobody has judged these results yet, so there is no Acc.";
-        blocks.push(wrapped("", note));
-    }
-    blocks.extend((!report.comparisons.is_empty()).then(|| comparisons(report)));
+    blocks.extend(sentences(&comparison_sentences(report)));
+    blocks.extend(comparisons(report).iter().map(with_caption));
     if let Some(table) = score_comparisons(report) {
-        let sentences = conclusions(&report.score_comparisons);
-        blocks.push(sentences.iter().map(|text| wrapped("", text)).collect());
+        blocks.extend(sentences(&conclusions(&report.score_comparisons)));
         blocks.push(with_caption(&table));
     }
     if !report.warnings.is_empty() {
@@ -35,7 +32,18 @@ pub(super) fn render(report: &Report) -> String {
         blocks.push(warnings.map(|warning| wrapped("! ", warning)).collect());
     }
     blocks.extend(report.failures.iter().map(failures));
+    let provenance = provenance_lines(report).into_iter();
+    blocks.push(
+        provenance
+            .map(|(what, text)| wrapped(&format!("{what:<12} "), &text))
+            .collect(),
+    );
     blocks.join("\n")
+}
+
+/// Returns a block with sentences, or `None` without sentences.
+fn sentences(texts: &[String]) -> Option<String> {
+    (!texts.is_empty()).then(|| texts.iter().map(|text| wrapped("", text)).collect())
 }
 
 /// Returns a table with its caption below.
@@ -78,22 +86,6 @@ fn line(cells: &[&str], columns: &[TableColumn], widths: &[usize]) -> String {
     format!("{}\n", padded.join("  ").trim_end())
 }
 
-fn comparisons(report: &Report) -> String {
-    let sentences = comparison_sentences(report);
-    let mut lines = Vec::new();
-    for (found, sentence) in report.comparisons.iter().zip(sentences) {
-        lines.push(wrapped("", &sentence));
-        if let Some((p, p_holm)) = found.p.zip(found.p_holm) {
-            let [a_only, b_only, n] = [found.a_only, found.b_only, found.n].map(format_count);
-            let [p, p_holm] = [p, p_holm].map(|p| format_number(p, PValue));
-            lines.push(format!(
-                "    only the first is right: {a_only} of {n}, only the second: {b_only}; p {p}, Holm {p_holm}\n"
-            ));
-        }
-    }
-    lines.concat()
-}
-
 fn failures(group: &FailureGroup) -> String {
     let mut lines = vec![format!(
         "Failed: {} {}\n",
@@ -109,11 +101,16 @@ fn failures(group: &FailureGroup) -> String {
     lines.concat()
 }
 
-/// Breaks a text into lines. The first line begins with `mark`; the others are indented to the same column.
+/// Breaks a text into lines. The first line begins with `mark`; the others are indented to the same column. A sign of
+/// percent stays on the line of its number.
 pub(super) fn wrapped(mark: &str, text: &str) -> String {
     let indent = mark.chars().count();
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
+    let text = text.replace(" %", "\u{a0}%");
+    let words = text
+        .split([' ', '\n', '\t'])
+        .filter(|word| !word.is_empty());
+    for word in words {
         let width = |line: &String| indent + line.chars().count() + 1 + word.chars().count();
         match lines.last_mut() {
             Some(line) if width(line) <= WIDTH => *line = format!("{line} {word}"),
@@ -121,7 +118,7 @@ pub(super) fn wrapped(mark: &str, text: &str) -> String {
         }
     }
     let break_and_indent = format!("\n{}", " ".repeat(indent));
-    format!("{mark}{}\n", lines.join(&break_and_indent))
+    format!("{mark}{}\n", lines.join(&break_and_indent)).replace('\u{a0}', " ")
 }
 
 #[cfg(test)]
@@ -135,6 +132,12 @@ mod tests {
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "{line:?}");
         }
+    }
+
+    #[test]
+    fn a_percentage_is_not_broken() {
+        let text = wrapped("", &"96.6 % ".repeat(30));
+        assert!(text.lines().all(|line| line.ends_with('%')), "{text}");
     }
 
     #[test]

@@ -23,8 +23,8 @@ impl IntervalMethod {
     /// Returns the header of a column of intervals.
     pub const fn title(self) -> &'static str {
         match self {
-            Self::Wilson => "95% Wilson",
-            Self::Exact => "95% exact",
+            Self::Wilson => "95 % Wilson",
+            Self::Exact => "95 % exact",
         }
     }
 

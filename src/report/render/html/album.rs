@@ -13,6 +13,9 @@ const LAYERS: [&str; 3] = [
     "edges of the relief's strokes over the print",
 ];
 
+/// Results of a group that are shown before the reader opens the others, so that the tables are not far below.
+const OPEN_ITEMS: usize = 6;
+
 /// The images on the page.
 pub(super) struct Album<'a> {
     gallery: &'a Gallery,
@@ -53,6 +56,7 @@ impl<'a> Album<'a> {
 
     fn group(&self, group: &GalleryGroup, figures: &[String]) -> Markup {
         let (id, title, introduction) = texts(group.reason);
+        let (first, rest) = figures.split_at(figures.len().min(OPEN_ITEMS));
         html! {
             h3 id={ "images-" (id) } { (title) }
             p {
@@ -60,9 +64,16 @@ impl<'a> Album<'a> {
                 @if group.reason == GalleryReason::Random { ", chosen at random with seed " (self.gallery.seed) }
                 "."
             }
-            ul.items { @for figure in figures { li { (PreEscaped(figure)) } } }
+            (items(first))
+            @if !rest.is_empty() {
+                details { summary { (format_count(rest.len() as u64)) " more" } (items(rest)) }
+            }
         }
     }
+}
+
+fn items(figures: &[String]) -> Markup {
+    html! { ul.items { @for figure in figures { li { (PreEscaped(figure)) } } } }
 }
 
 /// Returns three texts on a group: its name in URL fragments, its title and its introduction.

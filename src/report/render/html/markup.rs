@@ -1,16 +1,34 @@
-//! Tables as HTML. Each has a caption and column headers, and the first cell of a row is the row's header.
+//! Sentences and tables as HTML. A table has a caption and column headers, and the first cell of a row is its header.
 
 use maud::{Markup, html};
 
+use crate::report::render::code_spans::{SentencePart, parts};
 use crate::report::render::table::{ColumnFormat, Table, TableColumn};
+
+/// Returns a text of the report with narrow spaces before signs of percent, which stay on the line of their number.
+pub(super) fn prose(text: &str) -> String {
+    text.replace(" %", "\u{202f}%")
+}
+
+/// Returns a sentence with its commands as code.
+pub(super) fn sentence(text: &str) -> Markup {
+    html! {
+        @for part in parts(text) {
+            @match part {
+                SentencePart::Words(words) => (prose(words)),
+                SentencePart::Command(command) => code { (command) },
+            }
+        }
+    }
+}
 
 /// Returns a table in a frame that scrolls sideways if the table is too wide.
 pub(super) fn table(table: &Table) -> Markup {
     html! {
-        div.wide tabindex="0" role="region" aria-label=(name(table)) {
+        div.wide id={ "table-" (table.id) } tabindex="0" role="region" aria-label=(name(table)) {
             table {
-                caption { span { (table.caption) } }
-                thead { tr { @for column in &table.columns { th scope="col" class=(class(column)) { (column.header) } } } }
+                caption { span { (prose(&table.caption)) } }
+                thead { tr { @for column in &table.columns { th scope="col" class=(class(column)) { (prose(column.header)) } } } }
                 tbody { @for row in &table.rows { (line(table, row)) } }
             }
         }
@@ -36,12 +54,11 @@ fn line(table: &Table, row: &[Option<String>]) -> Markup {
     }
 }
 
-/// Returns a cell with its hyphen replaced by an en dash or a minus sign.
+/// Returns a cell. The hyphen of a negative number becomes a minus sign.
 fn cell_text(cell: Option<&str>, format: ColumnFormat) -> Markup {
     match (cell, format) {
-        (Some(text), ColumnFormat::Interval) => html! { (text.replace('-', "\u{2013}")) },
         (Some(text), ColumnFormat::Number(_)) => html! { (text.replace('-', "\u{2212}")) },
-        (Some(text), ColumnFormat::Text) => html! { (text) },
+        (Some(text), ColumnFormat::Text | ColumnFormat::Interval) => html! { (text) },
         (None, _) => html! { span.none title="does not exist" { "\u{2013}" } },
     }
 }

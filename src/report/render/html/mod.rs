@@ -8,7 +8,7 @@ mod sections;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::album::Album;
-use super::report_tables::headline;
+use self::markup::sentence;
 use crate::domain::visible;
 use crate::report::gallery::Gallery;
 use crate::report::model::Report;
@@ -58,7 +58,8 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
                 header {
                     p.kind { "Report on aligned woodblock characters" }
                     h1 { (title) }
-                    p { (headline(report)) @if let Some(date) = &cover.date { " · " (date) } }
+                    div.headline { @for text in &report.headline { p { (sentence(text)) } } }
+                    @if let Some(date) = &cover.date { p.date { "Made on " (date) } }
                 }
                 nav aria-label="Contents" {
                     ol { @for section in &sections { li { a href={ "#" (section.id) } { (section.title) } } } }
@@ -72,8 +73,7 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
                     }
                 }
                 footer {
-                    p { "mocban " (env!("CARGO_PKG_VERSION")) ". All digits: "
-                        code { "mocban report --format json" } "." }
+                    p { "Made by mocban " (report.provenance.version) "." }
                 }
             }
         }
@@ -144,10 +144,20 @@ mod tests {
         let text = page(&report(), &gallery(80, 60_000), &Cover::default());
         for kind in ["failed", "conflict", "off-truth", "random"] {
             let group = text.split(&format!("id=\"images-{kind}\"")).nth(1);
-            let group = group.expect(kind).split("</ul>").next().expect(kind);
+            let group = group.expect(kind).split("<h3").next().expect(kind);
             let shown = group.matches("<figure").count();
             assert!((10..=11).contains(&shown), "{kind}: {shown}");
         }
+    }
+
+    #[test]
+    fn plots_and_pictures_come_before_tables() {
+        let text = page(&report(), &gallery(8, 9), &Cover::default());
+        let at = |part: &str| text.find(part).expect("a part of the page");
+        assert!(at("<svg") < at("<figure class=\"item\""));
+        assert!(at("<figure class=\"item\"") < at("<table"));
+        // Two of the eight results of each group are shown when the reader opens them.
+        assert_eq!(text.matches("<summary>2 more</summary>").count(), 4);
     }
 
     #[test]

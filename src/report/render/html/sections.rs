@@ -3,16 +3,16 @@
 use maud::{Markup, html};
 
 use super::album::Album;
-use super::markup::table;
+use super::markup::{prose, table};
 use super::plots;
 use crate::domain::one_line;
-use crate::report::comparison::{Basis, Comparison};
+use crate::report::comparison::Basis;
 use crate::report::model::{FailureGroup, Report};
-use crate::report::number_format::NumberStyle::PValue;
-use crate::report::number_format::{format_count, format_number};
+use crate::report::number_format::format_count;
 use crate::report::render::comparison_tables::{
     comparison_sentences, comparisons, mean_intervals, score_comparisons,
 };
+use crate::report::render::provenance_lines::provenance_lines;
 use crate::report::render::report_tables as tables;
 use crate::report::render::risk_coverage_tables::{full_tables, short_tables};
 use crate::report::render::table::Table;
@@ -31,29 +31,25 @@ pub(super) struct Section {
     pub(super) body: Markup,
 }
 
-/// Returns the sections that have content, in order.
+/// Returns the sections that have content, in order: pictures come before tables.
 pub(super) fn all(report: &Report, album: &Album<'_>) -> Vec<Section> {
-    let manual_alignments = tables::manual_alignments(report);
+    let manual = tables::manual_alignments(report);
     let thresholds = tables::thresholds(report);
     let times = tables::times(report);
+    let with_plot =
+        |plot: Markup, found: Option<Table>| found.map(|found| html! { (plot) (table(&found)) });
     let sections = [
-        ("result", "Result", Some(result(report))),
+        ("overview", "Overview", overview(report)),
         ("notes", "Notes", notes(report)),
-        (
-            "verdicts",
-            "Verdicts",
-            report.has_verdicts().then(|| verdicts(report)),
-        ),
+        ("images", "Images", album.body()),
+        ("result", "Scores", Some(result(report))),
+        ("verdicts", "Verdicts", verdicts(report)),
         ("tests", "Methods compared", tests(report)),
-        (
-            "truth",
-            "Against ground truth",
-            report.has_truth().then(|| truth(report)),
-        ),
+        ("truth", "Against ground truth", truth(report)),
         (
             "manual",
             "Against manual alignments",
-            manual_alignments.map(|found| table(&found)),
+            manual.map(|found| table(&found)),
         ),
         (
             "coverage",
@@ -63,15 +59,15 @@ pub(super) fn all(report: &Report, album: &Album<'_>) -> Vec<Section> {
         (
             "thresholds",
             "Thresholds",
-            thresholds.map(|found| html! { (plots::thresholds(report)) (table(&found)) }),
+            with_plot(plots::thresholds(report), thresholds),
         ),
         (
             "times",
             "Computing times",
-            times.map(|found| html! { (plots::times(report)) (table(&found)) }),
+            with_plot(plots::times(report), times),
         ),
         ("failures", "Failed pairs", failures(report)),
-        ("images", "Images", album.body()),
+        ("provenance", "Provenance", Some(provenance(report))),
     ];
     let section = |(id, title, body): (_, _, Option<Markup>)| {
         Some(Section {
@@ -83,20 +79,26 @@ pub(super) fn all(report: &Report, album: &Album<'_>) -> Vec<Section> {
     sections.into_iter().filter_map(section).collect()
 }
 
+/// Returns the plots that show the answer, or `None` if there are none.
+fn overview(report: &Report) -> Option<Markup> {
+    let plots: Vec<Markup> = (Basis::ALL.into_iter())
+        .flat_map(|basis| {
+            [
+                plots::accuracy(report, basis),
+                plots::risk_coverage(report, basis),
+            ]
+        })
+        .filter(|plot| !plot.0.is_empty())
+        .collect();
+    (!plots.is_empty()).then(|| html! { div.plots { @for plot in plots { (plot) } } })
+}
+
 fn tables_of(found: impl IntoIterator<Item = Table>) -> Markup {
     html! { @for found in found { (table(&found)) } }
 }
 
 fn result(report: &Report) -> Markup {
-    html! {
-        (table(&tables::scores(report)))
-        (tables_of(mean_intervals(report)))
-        @if report.has_verdicts() {
-            (plots::accuracy(report, Basis::Verdicts))
-        } @else {
-            p { "Nobody has judged these results yet, so there is no Acc." }
-        }
-    }
+    html! { (table(&tables::scores(report))) (tables_of(mean_intervals(report))) }
 }
 
 fn notes(report: &Report) -> Option<Markup> {
@@ -105,39 +107,45 @@ fn notes(report: &Report) -> Option<Markup> {
         .then(|| html! { ul.notes { @for warning in warnings { li { (warning) } } } })
 }
 
-fn verdicts(report: &Report) -> Markup {
-    html! {
-        (table(&tables::verdicts(report)))
-        (tables_of(tables::rules(report)))
-        (tables_of(tables::fail_reasons(report)))
-        (tables_of(tables::attention_checks(report)))
-    }
+fn verdicts(report: &Report) -> Option<Markup> {
+    report.has_verdicts().then(|| {
+        html! {
+            (table(&tables::verdicts(report)))
+            (tables_of(tables::rules(report)))
+            (tables_of(tables::fail_reasons(report)))
+            (tables_of(tables::attention_checks(report)))
+        }
+    })
 }
 
-fn truth(report: &Report) -> Markup {
-    html! { (table(&tables::truth(report))) (plots::accuracy(report, Basis::Truth)) }
+fn truth(report: &Report) -> Option<Markup> {
+    report.has_truth().then(|| table(&tables::truth(report)))
 }
 
 fn tests(report: &Report) -> Option<Markup> {
     let by_score = score_comparisons(report);
     let is_any = !report.comparisons.is_empty() || by_score.is_some();
-    let sentences = report.comparisons.iter().zip(comparison_sentences(report));
     is_any.then(|| {
         html! {
-            ul.conclusions { @for (found, sentence) in sentences { li { (sentence) (p_values(found)) } } }
+            ul.conclusions { @for text in comparison_sentences(report) { li { (prose(&text)) } } }
             (tables_of(comparisons(report)))
             @if let Some(found) = by_score {
                 h3 { "By score" }
-                ul.conclusions { @for sentence in conclusions(&report.score_comparisons) { li { (sentence) } } }
+                ul.conclusions { @for text in conclusions(&report.score_comparisons) { li { (text) } } }
                 (table(&found))
             }
         }
     })
 }
 
-fn p_values(found: &Comparison) -> Markup {
+/// Returns the list of what the numbers were computed from.
+fn provenance(report: &Report) -> Markup {
     html! {
-        @if let Some(p) = found.p_holm { " (p " (format_number(p, PValue)) " after Holm's correction)" }
+        dl.provenance {
+            @for (what, text) in provenance_lines(report) { dt { (what) } dd { (text) } }
+        }
+        p { "Hashes are the first 12 digits; " code { "mocban report --format json" }
+            " has them whole, and all digits of every number." }
     }
 }
 
