@@ -14,7 +14,7 @@ use super::screen::{Palette, Tone, clear_code};
 use super::table::{columns, count};
 use super::verdict::reviewer_name;
 use crate::catalog::{StageCounts, StatusCounts};
-use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict, one_line};
+use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
 use crate::store::RunLock;
 
@@ -201,7 +201,8 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
 fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
     (counts.low_confidence > 0).then(|| {
         let pairs = count(counts.low_confidence, "done pair");
-        format!("{pairs} below {}", MetricOutcome::LOW_CONFIDENCE)
+        let metric = ThresholdMetric::DEFAULT;
+        format!("{pairs} below {} ({metric})", MetricOutcome::LOW_CONFIDENCE)
     })
 }
 
@@ -327,7 +328,7 @@ mod tests {
         assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
         status.counts.low_confidence = 1;
         let text = screen(&status, "demo", Palette::PLAIN);
-        let line = "confidence   1 done pair below 0.5\n";
+        let line = "confidence   1 done pair below 0.5 (ensemble)\n";
         assert!(text.ends_with(line), "{text}");
         assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
     }

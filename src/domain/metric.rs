@@ -53,7 +53,8 @@ enum_names! { pub ThresholdMetric, "a metric":
 }
 
 impl ThresholdMetric {
-    /// The metric of files that show one result per pair. Both methods compute it.
+    /// The metric of everything that shows one result per pair: files, contact sheets, the headline of a report, and the
+    /// pairs of low confidence in `status`. Both methods compute it.
     pub const DEFAULT: Self = Self::Ensemble;
 
     /// The paper's three metrics, which both methods compute.

@@ -8,7 +8,7 @@ use crate::catalog::queue::counters::{CounterKey, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
-use crate::domain::{JobStatus, PairId, Stage};
+use crate::domain::{JobStatus, PairId, Stage, ThresholdMetric};
 use crate::failpoint::{self, Point};
 
 /// A lease, and the finished stages to store under it, in the order they were computed.
@@ -158,8 +158,9 @@ fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     let last = stages.last()?;
     let after = key_after(last);
     let deadline = (after.status == JobStatus::Leased).then_some(last.next_deadline);
-    let mut metrics = last.metrics.iter();
-    let low_confidence = metrics.any(|metric| metric.outcome.is_low_confidence());
+    let low_confidence = last.metrics.iter().any(|metric| {
+        metric.outcome.metric == ThresholdMetric::DEFAULT && metric.outcome.is_low_confidence()
+    });
     let (first, follow) = chain(stages);
     Some(json!({
         "pair": lease.pair, "worker": lease.worker, "token": lease.token, "next": after.cursor,

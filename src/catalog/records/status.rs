@@ -21,7 +21,7 @@ WHERE v.id = (
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
 GROUP BY v.verdict";
 
-/// Completed pairs with a metric of low confidence.
+/// Completed pairs whose result of the default metric has a low confidence.
 pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 

@@ -53,7 +53,8 @@ async fn pairs_of_low_confidence_are_counted() {
         loop {
             let mut done = world.done(lease.cursor());
             for metric in &mut done.metrics {
-                metric.outcome.confidence = confidence;
+                let is_default = metric.outcome.metric == ThresholdMetric::DEFAULT;
+                metric.outcome.confidence = if is_default { confidence } else { Some(0.0) };
             }
             match world.catalog.checkpoint_now(lease, done).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
