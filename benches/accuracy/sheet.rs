@@ -5,7 +5,9 @@ use std::path::Path;
 use anyhow::Context as _;
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
-use mocban::export::pictures::{ContactSheetCell, PrintView, Rgb, contact_sheet, tile_side};
+use mocban::export::pictures::{
+    ContactSheetCell, FrameKind, PrintView, Rgb, SheetLegend, contact_sheet, tile_side,
+};
 use mocban::raster::{Grid, PrintImage, png_rgb8};
 
 use super::method::Method;
@@ -56,6 +58,7 @@ fn worst<'a>(
 
 /// The few pairs on the sheet are run again, because images are not kept while all pairs run.
 fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<Rgb> {
+    let side = tile_side(COLUMNS, worst.len());
     let cells = in_order(worst.len(), options.workers, |index| {
         let trial = worst[index];
         let (pair, input) = trial.case.make()?;
@@ -63,11 +66,21 @@ fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<
         Ok(ContactSheetCell {
             id: format!("{} seed {}", pair.id, trial.case.seed),
             note: note(trial, options.metric),
-            wrong: trial.severity(options.metric) > 1.0,
-            tiles: tiles(&run, &pair.tops, &input.print, options.metric),
+            character: None,
+            state: Vec::new(),
+            frame: if trial.severity(options.metric) > 1.0 {
+                FrameKind::Wrong
+            } else {
+                FrameKind::Other
+            },
+            tiles: tiles(&run, &pair.tops, &input.print, options.metric, side),
         })
     })?;
-    Ok(contact_sheet(&cells, COLUMNS))
+    let legend = SheetLegend {
+        title: format!("{}: {} pairs, worst first", method.name, worst.len()),
+        explanation: "Blue: true stroke tops. Orange: stroke edges of the relief.".to_owned(),
+    };
+    Ok(contact_sheet(&cells, COLUMNS, &legend))
 }
 
 /// Returns the errors, or the reason for a failure.
@@ -84,8 +97,13 @@ fn note(trial: &Trial, metric: ThresholdMetric) -> String {
     }
 }
 
-fn tiles(run: &Run, tops: &Grid<u8>, print: &[u8], metric: ThresholdMetric) -> [Option<Rgb>; 3] {
-    let side = tile_side(COLUMNS);
+fn tiles(
+    run: &Run,
+    tops: &Grid<u8>,
+    print: &[u8],
+    metric: ThresholdMetric,
+    side: usize,
+) -> [Option<Rgb>; 3] {
     let decode =
         |bytes| mocban::raster::decode(bytes, &mocban::raster::ImageLimits::SUGGESTED).ok();
     let Ok((print, aligned)) = &run.result else {

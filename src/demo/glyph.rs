@@ -4,9 +4,7 @@ use ab_glyph::{Font, FontRef, GlyphId, OutlinedGlyph, PxScale, point};
 
 use super::scalar_field::SampleFrame;
 use crate::raster::Grid;
-
-/// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. See `assets/LICENSE-mocban-demo-mincho.txt`.
-const FONT: &[u8] = include_bytes!("../../assets/mocban-demo-mincho.ttf");
+use crate::raster::fonts::MINCHO;
 
 /// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so
 /// flat characters, such as a single horizontal bar, are left out.
@@ -21,7 +19,7 @@ pub(super) struct Glyphs {
 impl Glyphs {
     /// Parses the embedded font.
     pub(super) fn embedded() -> Self {
-        let font = FontRef::try_from_slice(FONT).expect("the embedded font is valid");
+        let font = FontRef::try_from_slice(MINCHO).expect("the embedded font is valid");
         let mut characters: Vec<char> = font
             .codepoint_ids()
             .filter(|(id, character)| !character.is_ascii() && is_usable(&font, *id))

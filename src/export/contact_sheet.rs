@@ -2,12 +2,16 @@
 
 use rayon::prelude::*;
 
-use super::pictures::{ContactSheetCell, Rgb, contact_sheet, tile_side};
+use super::pictures::{
+    ContactSheetCell, FrameKind, NOTE_SPACE, Rgb, SheetLegend, contact_sheet, tile_side,
+};
 use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
+use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
+use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::{Consensus, evaluate_pairs};
 use crate::store::Project;
 
@@ -32,6 +36,19 @@ pub enum ContactSheetOrder {
 enum_names! {
     pub ContactSheetOrder, "an order":
     Worst = "worst", Score = "score", Margin = "margin", Confidence = "confidence", Name = "name",
+}
+
+impl ContactSheetOrder {
+    /// Returns its text in the legend.
+    const fn title(self) -> &'static str {
+        match self {
+            Self::Worst => "worst first",
+            Self::Score => "lowest IoU first",
+            Self::Margin => "smallest margin first",
+            Self::Confidence => "least confident first",
+            Self::Name => "by name",
+        }
+    }
 }
 
 /// What to draw.
@@ -99,7 +116,8 @@ pub async fn draw_contact_sheet(
     let (chosen, of) = choose(catalog, project, &options).await?;
     let project = project.clone();
     let picture = move || {
-        let draw = |candidate| cell(&project, candidate, &options);
+        let side = tile_side(options.columns, chosen.len());
+        let draw = |candidate| cell(&project, candidate, &options, side);
         let drawn: Vec<(ContactSheetCell, Option<String>)> = chosen.par_iter().map(draw).collect();
         let (cells, problems): (Vec<_>, Vec<_>) = drawn.into_iter().unzip();
         let problems = (chosen.iter().zip(problems))
@@ -109,7 +127,7 @@ pub async fn draw_contact_sheet(
             })
             .collect();
         ContactSheet {
-            picture: contact_sheet(&cells, options.columns),
+            picture: contact_sheet(&cells, options.columns, &legend(&chosen, of, &options)),
             shown: cells.len(),
             of,
             problems,
@@ -170,71 +188,100 @@ fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetO
     }
 }
 
-/// Draws the cell of a pair. Also returns the reason if the images of its result cannot be drawn.
+/// Returns the texts above the cells.
+fn legend(chosen: &[SheetCandidate], of: usize, options: &ContactSheetOptions) -> SheetLegend {
+    let shown = format_count(chosen.len() as u64);
+    let (metric, pairs) = (options.metric.title(), counted(of as u64, "pair"));
+    let numbers = if chosen.iter().any(|candidate| candidate.truth.is_some()) {
+        "angle error, landmark error in % of the character's height, IoU with the true stroke tops"
+    } else {
+        "margin over the second-best pose"
+    };
+    SheetLegend {
+        title: format!("{metric}: {shown} of {pairs}, {}", options.order.title()),
+        explanation: format!(
+            "Pictures: print, relief lit from the upper left, print with stroke edges of the relief in orange. \
+             Numbers: IoU of the masks, {numbers}."
+        ),
+    }
+}
+
+/// Draws the cell of a pair with images of `side` pixels. Also returns the reason if the images of its result cannot be drawn.
 fn cell(
     project: &Project,
     candidate: &SheetCandidate,
     options: &ContactSheetOptions,
+    side: usize,
 ) -> (ContactSheetCell, Option<String>) {
     let pair = &candidate.pair;
     let consensus = pair.metric(options.metric).map(Consensus::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
-    let side = tile_side(options.columns);
     let (tiles, problem) = result_images(project, pair, options.metric, side, &options.limits);
     let cell = ContactSheetCell {
-        id: title(pair, options.metric),
+        id: pair.attributes.name.to_string(),
+        character: pair.attributes.character.clone(),
+        state: state(pair, options.metric),
         note: (problem.clone()).unwrap_or_else(|| note(candidate, options.metric)),
-        wrong: off_truth || consensus.is_none_or(|consensus| consensus == Consensus::Failed),
+        frame: frame(consensus, off_truth),
         tiles,
     };
     (cell, problem)
 }
 
-/// Returns the id of a pair, with its confidence and its verdict if they exist.
-fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
-    let mut title = pair.attributes.name.to_string();
-    if let Some(record) = pair.metric(metric) {
-        let confidence = record.outcome.confidence;
-        title.extend(confidence.map(|confidence| format!("  conf {confidence:.2}")));
-        let verdict = Consensus::of(record).verdict();
-        title.extend(verdict.map(|verdict| format!("  {verdict}")));
+/// Returns what the frame of a result stands for. `None` is a pair without a result.
+fn frame(consensus: Option<Consensus>, is_off_truth: bool) -> FrameKind {
+    match consensus {
+        None | Some(Consensus::Failed) => FrameKind::Wrong,
+        Some(_) if is_off_truth => FrameKind::Wrong,
+        Some(Consensus::Passed) => FrameKind::Passed,
+        Some(_) => FrameKind::Other,
     }
-    title
+}
+
+/// Returns the confidence and the verdict of a result, as far as they exist.
+fn state(pair: &PairResults, metric: ThresholdMetric) -> Vec<String> {
+    let Some(record) = pair.metric(metric) else {
+        return Vec::new();
+    };
+    let confidence = record.outcome.confidence;
+    let confidence = confidence.map(|value| format!("conf. {}", format_number(value, Score)));
+    let verdict = Consensus::of(record).verdict();
+    let parts = [confidence, verdict.map(|verdict| verdict.to_string())];
+    parts.into_iter().flatten().collect()
 }
 
 /// Returns scores and errors of a pair, or why it failed.
 fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
     let pair = &candidate.pair;
-    match (pair.metric(metric), &candidate.truth, &pair.failure) {
-        (Some(record), Some(errors), _) => {
-            let (iou, tops) = (record.outcome.scores.iou, errors.mask_iou);
-            let tops = tops.map_or(String::new(), |tops| format!(" tops {tops:.2}"));
-            let [angle, landmarks] = [errors.angle_deg, errors.tre_pct].map(short);
-            format!("IoU {iou:.2}  {angle}\u{b0} {landmarks}%{tops}")
+    let score = |value| format_number(value, Score);
+    let Some(record) = pair.metric(metric) else {
+        let failure = pair.failure.as_ref().map(|stored| &stored.failure);
+        let text = failure.map(|failure| format!("{}: {}", failure.class, failure.message));
+        return text.unwrap_or_default();
+    };
+    let outcome = &record.outcome;
+    let mut numbers = vec![format!("IoU {}", score(outcome.scores.iou))];
+    match &candidate.truth {
+        Some(errors) => {
+            numbers.push(format!(
+                "{}\u{b0}",
+                format_number(errors.angle_deg, Degrees)
+            ));
+            numbers.push(format!("{} %", format_number(errors.tre_pct, Percent)));
+            numbers.extend(errors.mask_iou.map(|tops| format!("tops {}", score(tops))));
         }
-        (Some(record), None, _) => format!(
-            "IoU {:.2}  margin {:.2}",
-            record.outcome.scores.iou, record.outcome.margin
-        ),
-        (None, _, Some(stored)) => format!("{}: {}", stored.failure.class, stored.failure.message),
-        (None, _, None) => String::new(),
+        None => numbers.push(format!("margin {}", score(outcome.margin))),
     }
-}
-
-/// Formats with one decimal below 10 and none above.
-fn short(value: f64) -> String {
-    if value < 9.95 {
-        format!("{value:.1}")
-    } else {
-        format!("{value:.0}")
-    }
+    numbers.join(NOTE_SPACE)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ContactSheetOptions, ContactSheetOrder, is_shown, rank, title};
+    use super::{ContactSheetOptions, ContactSheetOrder, frame, is_shown, rank, state};
     use crate::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
+    use crate::export::pictures::FrameKind;
     use crate::raster::ImageLimits;
+    use crate::report::Consensus;
     use crate::report::test_fixtures;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
@@ -275,9 +322,18 @@ mod tests {
         let rank = |pair| rank(pair, None, &order);
         assert!(rank(&low) < rank(&high));
         assert!(rank(&high) < rank(&test_fixtures::done("c", 0.1, &[])));
-        assert_eq!(title(&low, order.metric), "b  conf 0.20");
+        assert_eq!(state(&low, order.metric), ["conf. 0.200"]);
         let judged = test_fixtures::done("c", 0.1, &[Verdict::Fail]);
-        assert_eq!(title(&judged, order.metric), "c  fail");
+        assert_eq!(state(&judged, order.metric), ["fail"]);
+    }
+
+    #[test]
+    fn frames_say_what_is_wrong_and_what_passed() {
+        assert_eq!(frame(None, false), FrameKind::Wrong);
+        assert_eq!(frame(Some(Consensus::Failed), false), FrameKind::Wrong);
+        assert_eq!(frame(Some(Consensus::Passed), true), FrameKind::Wrong);
+        assert_eq!(frame(Some(Consensus::Passed), false), FrameKind::Passed);
+        assert_eq!(frame(Some(Consensus::Unjudged), false), FrameKind::Other);
     }
 
     #[test]

@@ -4,6 +4,7 @@ pub(crate) mod components;
 mod decode;
 mod depth_map;
 pub mod encode;
+pub(crate) mod fonts;
 mod grid;
 mod mask;
 mod minmax_pyramid;

@@ -10,4 +10,6 @@ pub use overlay::PrintView;
 pub use paint::Rgb;
 pub(super) use paint::eight_bits;
 pub use relief::shaded;
-pub use sheet_layout::{ContactSheetCell, SHEET_WIDTH, contact_sheet, tile_side};
+pub use sheet_layout::{
+    ContactSheetCell, FrameKind, NOTE_SPACE, SHEET_WIDTH, SheetLegend, contact_sheet, tile_side,
+};

@@ -1,6 +1,5 @@
-//! Drawing on colour images: copying, resizing, text.
+//! Drawing on colour images: copying, resizing, rectangles.
 
-use super::font;
 use crate::raster::{Grid, PrintImage};
 
 /// An 8-bit colour image.
@@ -97,42 +96,9 @@ pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8
     }
 }
 
-/// Returns the width of a text in pixels, with dots of `dot` pixels.
-pub(super) const fn text_width(letters: usize, dot: usize) -> usize {
-    letters * (font::WIDTH + 1) * dot
-}
-
-/// Returns the line height in pixels, with dots of `dot` pixels.
-pub(super) const fn text_height(dot: usize) -> usize {
-    (font::HEIGHT + 2) * dot
-}
-
-/// Shortens a text to a width in pixels. A shortened text ends in `..`.
-pub(super) fn truncated(text: &str, width: usize, dot: usize) -> String {
-    let most = width / text_width(1, dot);
-    if text.chars().count() <= most {
-        return text.to_owned();
-    }
-    let kept: String = text.chars().take(most.saturating_sub(2)).collect();
-    kept + ".."
-}
-
-/// Draws a text with its top left corner at (x, y). A dot of a letter is a square of `dot` pixels.
-pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize) {
-    for (i, letter) in text.chars().enumerate() {
-        let left = x + text_width(i, dot);
-        for (row, bits) in font::glyph(letter).into_iter().enumerate() {
-            for column in (0..font::WIDTH).filter(|c| bits >> (font::WIDTH - 1 - c) & 1 == 1) {
-                let corner = [left + column * dot, y + row * dot];
-                fill(onto, corner, [dot, dot], TEXT);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Rgb, TEXT, copy, eight_bits, resized, truncated, write};
+    use super::{Rgb, copy, eight_bits, fill, resized};
     use crate::raster::{Grid, PrintImage};
 
     #[test]
@@ -157,15 +123,9 @@ mod tests {
     #[test]
     fn drawing_is_clipped() {
         let mut sheet = Rgb::new(8, 8, [255; 3]);
-        write(&mut sheet, "W", 6, 3, 2);
+        fill(&mut sheet, [6, 3], [9, 2], [7; 3]);
         copy(&mut sheet, &Rgb::new(5, 5, [9; 3]), 7, 7);
-        assert_eq!(sheet.at(6, 3), TEXT);
+        assert_eq!((sheet.at(6, 3), sheet.at(7, 4)), ([7; 3], [7; 3]));
         assert_eq!(sheet.at(7, 7), [9; 3]);
-    }
-
-    #[test]
-    fn long_text_ends_in_dots() {
-        assert_eq!(truncated("b01-0002", 48, 1), "b01-0002");
-        assert_eq!(truncated("b01-00023", 48, 1), "b01-00..");
     }
 }
