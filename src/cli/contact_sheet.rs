@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
+use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::files;
@@ -95,7 +96,10 @@ pub(super) async fn write(
         columns: usize::from(args.columns),
         limits: context.settings()?.config.limits.image,
     };
-    let sheet = draw_contact_sheet(&catalog, &project, options).await?;
+    let busy = Busy::start(context, "drawing the contact sheet");
+    let sheet = draw_contact_sheet(&catalog, &project, options).await;
+    drop(busy);
+    let sheet = sheet?;
     catalog.close().await;
     if sheet.shown == 0 {
         let metric = args.metric;

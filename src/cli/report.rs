@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
+use super::busy::Busy;
 use super::compare::side_by_side;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
@@ -65,6 +66,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     }
     context.warn_about_stale(&catalog).await?;
     let format = chosen_format(args.format, context);
+    let busy = Busy::start(context, "reading the results");
     let mut pictures = GallerySelection::new(IMAGE_SEED);
     let report = if format == ReportFormat::Html {
         build_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
@@ -89,6 +91,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         render(&report, format)
     };
     catalog.close().await;
+    drop(busy);
     match &args.output {
         Some(path) => {
             files::write_output(path, text.as_bytes(), args.allow_missing || is_complete)?;
