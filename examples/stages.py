@@ -1,9 +1,9 @@
-"""Draws the stages of one pair with a label under each panel, such as docs/stages.png in the README:
+"""Draws the stages of one pair with a label under each panel, such as docs/pictures/stages.png in the README:
 
     mocban demo demo --tier pose --pairs 4 --seed 1
     mocban -C demo export -o demo-export
     pip install pillow numpy
-    python examples/stages.py demo-export pose-0003 docs/stages.png
+    python examples/stages.py demo-export pose-0003 docs/pictures/stages.png
 """
 
 import json

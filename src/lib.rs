@@ -118,7 +118,7 @@
 //!
 //! Also touched: the weights in `src/stages/register/confidence.rs`, `REVISION` in `src/stages/register/mod.rs`, the
 //! help text of `--metric` in `src/cli/contact_sheet.rs` and `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
-//! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, and tests and snapshots.
+//! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/reference/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## An export

@@ -34,7 +34,7 @@ pub(super) struct DemoArgs {
     /// Seed of the dataset; the same seed gives the same bytes
     #[arg(long, value_name = "S", default_value = "1")]
     pub(super) seed: u64,
-    /// Kind of pairs: upright, pose, hard, real, all, or another of docs/demo.md
+    /// Kind of pairs: upright, pose, hard, real, all, or another of docs/guides/demo.md
     #[arg(long, default_value = "upright")]
     pub(super) tier: Tier,
     /// Create and import the dataset without running it

@@ -12,7 +12,7 @@ pub(super) const README: &str = "README.md";
 pub(super) const SCHEMA: &str = "schema.json";
 
 /// Frames and heights, which are the same in all exports.
-const COORDINATES: &str = include_str!("../../docs/coordinates.md");
+const COORDINATES: &str = include_str!("../../docs/reference/coordinates.md");
 
 const CITATION: &str = "\
 Cite the program as mocban (version above), and the method that it extends as arXiv:2411.05524. `export.json` holds all

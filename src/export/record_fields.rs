@@ -282,9 +282,12 @@ mod tests {
             ("", &METRIC_FIELDS[..]),
             ("", &FILE_FIELDS[..]),
         ];
-        let docs = include_str!("../../docs/data.md");
+        let docs = include_str!("../../docs/reference/data.md");
         for row in markdown_table(&schema, &tables).lines() {
-            assert!(docs.contains(row), "docs/data.md lacks the line\n{row}");
+            assert!(
+                docs.contains(row),
+                "docs/reference/data.md lacks the line\n{row}"
+            );
         }
     }
 }

@@ -76,7 +76,7 @@ fn the_figure_of_the_stages_is_drawn() {
     command.arg(demo.path("export/jsonl")).arg("hard-0003");
     if output(command.arg(&figure)).is_some() {
         let drawn = image::open(&figure).expect("a picture").to_rgb8();
-        let in_readme = image::open("docs/stages.png").expect("a picture");
+        let in_readme = image::open("docs/pictures/stages.png").expect("a picture");
         assert_eq!(drawn.dimensions(), (in_readme.width(), in_readme.height()));
         let paper = drawn.pixels().filter(|pixel| pixel.0 == [255; 3]).count();
         let all = drawn.width() * drawn.height();

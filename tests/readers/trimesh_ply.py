@@ -18,7 +18,7 @@ def check_matrix(name, matrix):
 
 
 def landing(line, points):
-    """Returns the print pixels of mesh points by `matrix.txt` and the scale of the print, as docs/data.md says."""
+    """Returns the print pixels of mesh points by `matrix.txt` and the scale of the print, as docs/reference/data.md says."""
     mm_per_print_px = line["mesh_unit_per_px"] * mm_per_mesh_unit(line) / line["scale"]
     centre = (np.array(sizes[line["id"]]) - 1) / 2
     return centre - apply(matrices[line["id"]][:2], points) / mm_per_print_px
