@@ -114,6 +114,7 @@ fn hide(command: Command, globals: &[clap::Id]) -> Command {
 #[cfg(test)]
 mod tests {
     use std::ffi::OsString;
+    use std::path::{Path, PathBuf};
 
     use super::EXAMPLES;
     use crate::cli::args;
@@ -139,6 +140,51 @@ mod tests {
                 assert!(line.contains(&format!(" {name}")), "{line}");
             }
         }
+    }
+
+    /// Returns the Markdown files of a folder and its subfolders.
+    fn markdown_files(folder: &Path) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).expect("a folder");
+        let paths = entries.map(|entry| entry.expect("an entry").path());
+        let (folders, mut files): (Vec<_>, Vec<_>) = paths.partition(|path| path.is_dir());
+        files.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+        files.extend(folders.iter().flat_map(|folder| markdown_files(folder)));
+        files
+    }
+
+    /// Splits a line of a shell into words, without its comment. Only quotes are known.
+    fn words(line: &str) -> Vec<String> {
+        let line = line.split(" #").next().unwrap_or_default();
+        let parts = line
+            .split('"')
+            .enumerate()
+            .flat_map(|(i, part)| match i % 2 {
+                0 => part.split_whitespace().map(str::to_owned).collect(),
+                _ => vec![part.to_owned()],
+            });
+        parts.collect()
+    }
+
+    #[test]
+    fn commands_of_the_documentation_parse() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut files = markdown_files(&root.join("docs"));
+        files.extend(["README.md", "CONTRIBUTING.md"].map(|name| root.join(name)));
+        let mut count = 0;
+        for file in files {
+            let text = std::fs::read_to_string(&file).expect("UTF-8");
+            let text = text.replace("cargo run --release -- ", "mocban ");
+            let commands = text.lines().flat_map(|line| line.split(" && "));
+            for line in commands.filter(|line| line.starts_with("mocban ")) {
+                let words: Vec<_> = words(line).into_iter().map(OsString::from).collect();
+                let parsed = args::parse(&words)
+                    .map(drop)
+                    .map_err(|error| error.to_string());
+                assert_eq!(parsed, Ok(()), "{}: {line}", file.display());
+                count += 1;
+            }
+        }
+        assert!(count > 60, "{count} commands");
     }
 
     #[test]

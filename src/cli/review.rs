@@ -117,9 +117,9 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         catalog.close().await;
         return no_conflict(&args, context);
     }
-    let _file = announce(&page, &args, context)?;
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
+    let _file = announce(&page, &args, context)?;
     let drain = stop.clone();
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
     let cut_off = tokio::select! {

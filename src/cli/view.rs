@@ -64,9 +64,9 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
     };
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let page = view::bind(address, name.as_str(), &scan).await?;
-    let _file = announce(&page.url(), &args, context)?;
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
+    let _file = announce(&page.url(), &args, context)?;
     let drain = stop.clone();
     tokio::select! {
         () = page.serve(async move { drain.reached(StopLevel::Drain).await }) => {}

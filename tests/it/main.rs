@@ -17,6 +17,7 @@ mod crowd;
 mod decoy;
 mod decoys;
 mod demo;
+mod docs;
 mod error_snapshots;
 #[cfg(target_os = "linux")]
 mod every_call;

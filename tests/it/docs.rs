@@ -1,0 +1,202 @@
+//! The documentation: links and pictures exist, the book lists every page, and the commands of the tutorials work.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
+
+use crate::cli::{binary, shell};
+use crate::page::Page;
+use crate::source_text::package_dir;
+
+/// Returns the Markdown files of a folder and its subfolders.
+fn pages(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let (folders, mut files): (Vec<_>, Vec<_>) = paths.partition(|path| path.is_dir());
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+    files.extend(folders.iter().flat_map(|folder| pages(folder)));
+    files
+}
+
+/// What other pages need to know of a page.
+#[derive(Debug, Default)]
+struct MarkdownPage {
+    /// Targets of links and pictures.
+    links: Vec<String>,
+    /// Names by which other pages link to headings.
+    anchors: BTreeSet<String>,
+    /// Lines of the code blocks marked `sh`.
+    commands: Vec<String>,
+}
+
+impl MarkdownPage {
+    fn read(path: &Path) -> Self {
+        let text = fs::read_to_string(path).expect("UTF-8");
+        let mut page = Self::default();
+        let (mut heading, mut is_shell) = (None, false);
+        for event in Parser::new_ext(&text, Options::ENABLE_TABLES) {
+            match event {
+                Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => {
+                    page.links.push(dest_url.into_string());
+                }
+                Event::Start(Tag::Heading { .. }) => heading = Some(String::new()),
+                Event::End(TagEnd::Heading(_)) => {
+                    page.anchors
+                        .insert(anchor(&heading.take().unwrap_or_default()));
+                }
+                Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(kind))) => {
+                    is_shell = &*kind == "sh"
+                }
+                Event::End(TagEnd::CodeBlock) => is_shell = false,
+                Event::Text(text) if is_shell => {
+                    page.commands.extend(text.lines().map(str::to_owned))
+                }
+                Event::Text(text) | Event::Code(text) => {
+                    if let Some(heading) = &mut heading {
+                        heading.push_str(&text);
+                    }
+                }
+                _ => {}
+            }
+        }
+        page
+    }
+}
+
+/// Returns the anchor of a heading as code hosts and mdBook write it.
+fn anchor(heading: &str) -> String {
+    let kept = heading.to_lowercase();
+    let kept = kept
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_a_heading() {
+    let root = package_dir();
+    let mut files = pages(&root.join("docs"));
+    let at_top = [
+        "README.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "SECURITY.md",
+    ];
+    files.extend(at_top.map(|name| root.join(name)));
+    let all: BTreeMap<PathBuf, MarkdownPage> = files
+        .iter()
+        .map(|path| {
+            (
+                path.canonicalize().expect("a path"),
+                MarkdownPage::read(path),
+            )
+        })
+        .collect();
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for (path, page) in &all {
+        let folder = path.parent().expect("a folder");
+        for link in page.links.iter().filter(|link| !link.contains("://")) {
+            count += 1;
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = if file.is_empty() {
+                path.clone()
+            } else {
+                folder.join(file)
+            };
+            let found = target.canonicalize().ok();
+            let of_page = found.as_ref().and_then(|found| all.get(found));
+            let has_anchor =
+                anchor.is_empty() || of_page.is_some_and(|page| page.anchors.contains(anchor));
+            if found.is_none() || !has_anchor {
+                wrong.push(format!("{}: {link}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 60, "{count} links");
+}
+
+#[test]
+fn the_book_lists_every_page() {
+    let docs = package_dir().join("docs");
+    let summary = MarkdownPage::read(&docs.join("SUMMARY.md"));
+    let listed: BTreeSet<PathBuf> = summary.links.iter().map(|link| docs.join(link)).collect();
+    let mut all: BTreeSet<PathBuf> = pages(&docs).into_iter().collect();
+    all.remove(&docs.join("SUMMARY.md"));
+    assert_eq!(listed, all);
+}
+
+#[test]
+fn both_tutorials_have_the_same_commands() {
+    let commands = |name: &str| MarkdownPage::read(&package_dir().join(name)).commands;
+    let english = commands("docs/tutorial/first-hour.md");
+    assert_eq!(english, commands("docs/vi/gio-dau-tien.md"));
+    assert!(english.len() > 10, "{english:?}");
+}
+
+/// Returns the folder of the program.
+fn binary_folder() -> PathBuf {
+    let program = PathBuf::from(binary().get_program());
+    program.parent().expect("a folder").to_owned()
+}
+
+/// Copies the demo pairs to the folders of the tutorial, under Vietnamese names.
+fn own_files(dir: &Path) {
+    for (from, to) in [("meshes", "quét"), ("prints", "in")] {
+        fs::create_dir(dir.join(to)).expect("created");
+        for entry in fs::read_dir(dir.join("mocban-demo/data").join(from)).expect("a folder") {
+            let file = entry.expect("an entry").path();
+            let stem = file.file_stem().expect("a name").to_string_lossy();
+            let number = stem.trim_start_matches("upright-000");
+            let extension = file.extension().expect("an extension").to_string_lossy();
+            let name = format!("chữ số {number}.{extension}");
+            fs::copy(&file, dir.join(to).join(name)).expect("copied");
+        }
+    }
+}
+
+#[test]
+fn the_commands_of_the_tutorial_work_in_order() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let commands = MarkdownPage::read(&package_dir().join("docs/tutorial/first-hour.md")).commands;
+    let path = [binary_folder(), "/usr/bin".into(), "/bin".into()];
+    let path = std::env::join_paths(path).expect("a search path");
+    for line in &commands {
+        let line = match line.as_str() {
+            // The demo is smaller, and other files of a reader are copies of its files.
+            "mocban demo" => "mocban demo --pairs 6",
+            other => other,
+        };
+        if line.contains(" import ") {
+            own_files(dir.path());
+        }
+        if [" view ", " review "]
+            .iter()
+            .any(|name| line.contains(name))
+        {
+            // A server runs until a person presses Ctrl-C.
+            let words = line.split(' ').skip(1).chain(["--no-open", "--json"]);
+            let mut page = Page::of(binary().current_dir(dir.path()).args(words));
+            rustix::process::kill_process(page.pid(), rustix::process::Signal::INT).expect("sent");
+            assert_eq!(page.exit_code(), Some(0), "{line}");
+            continue;
+        }
+        let output = shell(line)
+            .current_dir(dir.path())
+            .env("PATH", &path)
+            .output()
+            .expect("a shell");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{line}: {text}");
+    }
+    for file in [
+        "mocban-demo/sheet.png",
+        "khối-4/sheet.png",
+        "báo-cáo.html",
+        "bảng/README.md",
+    ] {
+        assert!(dir.path().join(file).is_file(), "{file}");
+    }
+}
