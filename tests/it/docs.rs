@@ -47,11 +47,11 @@ impl MarkdownPage {
                         .insert(anchor(&heading.take().unwrap_or_default()));
                 }
                 Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(kind))) => {
-                    is_shell = &*kind == "sh"
+                    is_shell = &*kind == "sh";
                 }
                 Event::End(TagEnd::CodeBlock) => is_shell = false,
                 Event::Text(text) if is_shell => {
-                    page.commands.extend(text.lines().map(str::to_owned))
+                    page.commands.extend(text.lines().map(str::to_owned));
                 }
                 Event::Text(text) | Event::Code(text) => {
                     if let Some(heading) = &mut heading {
