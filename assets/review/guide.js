@@ -1,6 +1,8 @@
 // The guide: when to pass, with example pictures.
 
+import { translate } from "./config.js";
 import { images } from "./image-cache.js";
+import { alert } from "./ui.js";
 
 const dialog = document.getElementById("guide");
 
@@ -19,7 +21,11 @@ async function draw(figure) {
 export async function openGuide() {
   dialog.showModal();
   // One after the other: the cache holds fewer items than the guide and the queue need together.
-  for (const figure of dialog.querySelectorAll("figure:not([data-drawn])")) await draw(figure);
+  try {
+    for (const figure of dialog.querySelectorAll("figure:not([data-drawn])")) await draw(figure);
+  } catch (error) {
+    alert(translate("no_image", { why: error.message }));
+  }
 }
 
 export const closeGuide = () => dialog.close();

@@ -30,8 +30,10 @@ export class Practice {
     this.viewer.clear();
     ui.practice(this.index, this.examples.length, translate("practice_ask"), false);
     this.refresh();
-    const layers = await images(`example-${example.name}`).loading;
-    if (this.current !== example) return;
+    const layers = await images(`example-${example.name}`).loading.catch((error) => {
+      ui.alert(translate("no_image", { why: error.message }));
+    });
+    if (!layers || this.current !== example) return;
     this.viewer.show(layers);
     ui.sideImages(layers);
     ui.busy(false);

@@ -188,7 +188,10 @@ export function confirmWorse(before, after) {
   dialog.returnValue = "";
   dialog.showModal();
   return new Promise((resolve) => {
-    dialog.onclose = () => resolve(dialog.returnValue === "yes");
+    dialog.onclose = () => {
+      // The event of an earlier question may arrive late.
+      if (!dialog.open) resolve(dialog.returnValue === "yes");
+    };
   });
 }
 

@@ -135,7 +135,7 @@ fn viewer(language: Language) -> Markup {
             div.picture {
                 canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
                 p #hint .hint hidden {}
-                div #end .end tabindex="-1" hidden {}
+                div #end .end tabindex="0" role="region" aria-label=(language.translate("summary")) hidden {}
             }
             p.caption { span #legend {} span.spacer {} span #paint-time {} }
         }
