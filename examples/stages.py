@@ -15,8 +15,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 PANEL_PX = 260
 GAP_PX = 16
-LABEL_PX = 52
-FONT = ImageFont.load_default(17)
+LABEL_PX = 84
+# Large enough to be read when a page shows the picture 800 pixels wide.
+FONT = ImageFont.load_default(32)
+SMALL_FONT = ImageFont.load_default(23)
 METRIC = "ensemble"
 
 
@@ -38,10 +40,10 @@ def panels(export: Path, line: dict) -> list[tuple[Image.Image, str, str]]:
     files = {name: export / path for name, path in line["files"].items()}
     return [
         (Image.open(files["print"]), "1  Print", "as scanned"),
-        (shaded_relief(export, line), "2  Depth map", "on the fitted plane, mirrored"),
-        (Image.open(files["depth_mask"]), "3  Relief mask", "at the selected threshold"),
+        (shaded_relief(export, line), "2  Depth map", "mirrored, on the plane"),
+        (Image.open(files["depth_mask"]), "3  Relief mask", "above the threshold"),
         (Image.open(files["aligned_mask"]), "4  Aligned mask", "in the print's frame"),
-        (Image.open(files["overlay"]), "5  Overlay", "relief outline on the print"),
+        (Image.open(files["overlay"]), "5  Overlay", "outline on the print"),
     ]
 
 
@@ -63,7 +65,7 @@ def main(export: str, pair: str, output: str) -> None:
         sheet.paste(panel, (left + (PANEL_PX - panel.width) // 2, GAP_PX + (PANEL_PX - panel.height) // 2))
         middle = left + PANEL_PX // 2
         draw.text((middle, GAP_PX + PANEL_PX + 8), title, "black", FONT, anchor="mt")
-        draw.text((middle, GAP_PX + PANEL_PX + 32), text, "#555555", ImageFont.load_default(14), anchor="mt")
+        draw.text((middle, GAP_PX + PANEL_PX + 50), text, "#444444", SMALL_FONT, anchor="mt")
     sheet.convert("P", palette=Image.Palette.ADAPTIVE, colors=128).save(output, optimize=True)
 
 
