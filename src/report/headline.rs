@@ -219,7 +219,11 @@ fn without_basis(report: &Report) -> String {
     let (n, significant) = tested.fold((0_u64, 0_u64), |(n, k), p| {
         (n + 1, k + u64::from(p < SIGNIFICANCE_LEVEL))
     });
-    let start = "Without verdicts, no metric is known to be right more often than another";
+    let start = if report.has_verdicts() {
+        "Reviewers judged the results of one metric only, so no metric is known to be right more often than another"
+    } else {
+        "Without verdicts, no metric is known to be right more often than another"
+    };
     if n == 0 {
         return format!("{start}.");
     }
@@ -320,6 +324,25 @@ mod tests {
         assert!(
             exact.headline[1].contains("(85.8–100.0, 95 % exact interval)"),
             "{exact:?}"
+        );
+    }
+
+    #[test]
+    fn verdicts_on_one_metric_compare_nothing() {
+        let mut report = ReportAccumulator::default();
+        for i in 0..3 {
+            let mut pair = test_fixtures::done(&format!("p{i}"), 0.8, &[Pass]);
+            for record in &mut pair.metrics {
+                if record.outcome.metric != Ensemble {
+                    record.verdicts.clear();
+                }
+            }
+            report.add(&pair, &TruthEvaluation::default());
+        }
+        let found = report.finish().headline;
+        assert!(
+            found[2].starts_with("Reviewers judged the results of one metric only"),
+            "{found:?}"
         );
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 
-use crate::cli::{binary, shell};
+use crate::cli::{binary, mocban, shell};
 use crate::page::Page;
 use crate::source_text::package_dir;
 
@@ -97,8 +97,12 @@ fn every_link_leads_to_a_file_and_a_heading() {
     let (mut wrong, mut count) = (Vec::new(), 0);
     for (path, page) in &all {
         let folder = path.parent().expect("a folder");
+        let is_in_book = path.starts_with(root.join("docs"));
         for link in page.links.iter().filter(|link| !link.contains("://")) {
             count += 1;
+            if is_in_book && link.starts_with("../../") {
+                wrong.push(format!("{}: {link} is not in the book", path.display()));
+            }
             let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
             let target = if file.is_empty() {
                 path.clone()
@@ -134,6 +138,63 @@ fn both_tutorials_have_the_same_commands() {
     let english = commands("docs/tutorial/first-hour.md");
     assert_eq!(english, commands("docs/vi/gio-dau-tien.md"));
     assert!(english.len() > 10, "{english:?}");
+}
+
+/// Compares a page with what the program prints, or writes the page if `MOCBAN_UPDATE_DOCS` is set.
+fn check_generated(name: &str, text: &str) {
+    let path = package_dir().join("docs/reference").join(name);
+    if std::env::var_os("MOCBAN_UPDATE_DOCS").is_some() {
+        fs::write(&path, text).expect("written");
+    }
+    let found = fs::read_to_string(&path).expect("UTF-8");
+    assert!(
+        found == text,
+        "{} is out of date; run: MOCBAN_UPDATE_DOCS=1 cargo test --test it docs::",
+        path.display()
+    );
+}
+
+#[test]
+fn the_reference_of_settings_is_current() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let settings = mocban(dir.path(), &["config", "show", "--explain"])
+        .expect(0)
+        .out;
+    check_generated(
+        "settings.md",
+        &format!(
+            "# Settings\n\nThe defaults, as `mocban config show --explain` prints them. Values that differ belong in `mocban.toml` \
+             in the\nproject, in an environment variable such as `MOCBAN_RUN_WORKERS`, or in \
+             `--set run.workers=4`.\n\n```toml\n{}\n```\n",
+            settings.trim_end()
+        ),
+    );
+}
+
+#[test]
+fn the_reference_of_commands_is_current() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let help = |args: &[&str]| {
+        let text = mocban(dir.path(), args).expect(0).out;
+        format!("```text\n{}\n```\n", text.trim_end())
+    };
+    let overview = help(&["--help"]);
+    let names = overview
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1);
+    let names = names.take_while(|line| !line.is_empty());
+    // Continued lines are indented further.
+    let names = names.filter(|line| !line.starts_with("   "));
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    let mut text = format!(
+        "# Commands\n\nWhat `mocban --help` and `mocban COMMAND --help` print.\n\n{overview}"
+    );
+    for name in names.filter(|name| *name != "help") {
+        text += &format!("\n## {name}\n\n{}", help(&[name, "--help"]));
+    }
+    assert!(text.matches("\n## ").count() > 15, "{text}");
+    check_generated("commands.md", &text);
 }
 
 /// Returns the folder of the program.
