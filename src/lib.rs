@@ -150,7 +150,7 @@
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
-//! | `local_server` | a web server for the browser of one user: guard, session, connection limits | `domain` |
+//! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
 //! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint` |

@@ -8,6 +8,7 @@ mod address;
 mod connection;
 mod connections;
 mod guard;
+mod page_frame;
 mod session;
 
 pub use access_control::{AccessControl, START};
@@ -15,3 +16,4 @@ pub use address::listen;
 pub use connection::ConnectionLimits;
 pub use connections::serve;
 pub use guard::guard;
+pub use page_frame::{document, forward_page, used_token_page};

@@ -1,46 +1,28 @@
 //! HTML of the review page. The page is the same for every item, and a script fills in the current item.
 
-use maud::{DOCTYPE, Markup, html};
+use maud::{Markup, html};
 
 use super::i18n::Language;
 use super::options::QueueOptions;
 use super::page_dialogs::{confirm, guide, help, jump};
 use crate::domain::{Reason, ReviewOrder, one_line};
+use crate::local_server::{document, forward_page, used_token_page};
 
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
 const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
 
-/// Returns a whole document.
-fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Markup {
-    html! {
-        (DOCTYPE)
-        html lang=(language.name()) {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                (head)
-            }
-            body { (body) }
-        }
-    }
-}
-
 /// Returns the page at the start address. It sends the browser on to the review page.
 pub(super) fn forward(language: Language) -> Markup {
     let title = language.translate("forward");
-    let head = html! { meta http-equiv="refresh" content="0;url=/"; };
-    let body = html! { p { a href="/" { (title) } } };
-    document(language, title, &head, &body)
+    forward_page(language.name(), title, title)
 }
 
 /// Returns the page for a one-time token that was used before.
 pub(super) fn token_used(language: Language) -> Markup {
-    let body = html! { h1 { (language.translate("token_used")) } };
-    document(language, language.translate("title"), &html! {}, &body)
+    let text = language.translate("token_used");
+    used_token_page(language.name(), language.translate("title"), text)
 }
 
 /// Returns the review page.
@@ -82,7 +64,7 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         dialog #scan .scan-dialog aria-label=(language.translate("scan_view")) {}
         p #live .live aria-live="polite" {}
     };
-    document(language, &title, &head, &body)
+    document(language.name(), &title, &head, &html! { body { (body) } })
 }
 
 fn top(options: &QueueOptions, language: Language) -> Markup {

@@ -1,28 +1,14 @@
 //! HTML of the page.
 
-use maud::{DOCTYPE, Markup, html};
+use maud::html;
 
+use crate::local_server::{document, forward_page, used_token_page};
+
+/// Language of the page before its script translates it.
+const LANGUAGE: &str = "en";
 /// Shown if the one-time address was used before.
 const REFUSED: &str =
     "This address has already been used. Run the view command again to get a new one.";
-
-/// Returns a whole document.
-fn document(title: &str, head: &Markup, body: &Markup) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                (head)
-            }
-            (body)
-        }
-    };
-    page.into_string()
-}
 
 /// Returns the page of a pair. Its script loads the data and creates the controls.
 pub(super) fn view(pair: &str) -> String {
@@ -37,20 +23,17 @@ pub(super) fn view(pair: &str) -> String {
             noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
         }
     };
-    document(pair, &head, &body)
+    document(LANGUAGE, pair, &head, &body).into_string()
 }
 
 /// Returns the page at the start address. It sends the browser on to the view.
 pub(super) fn forward() -> String {
-    let head = html! { meta http-equiv="refresh" content="0;url=/"; };
-    let body = html! { body { p { a href="/" { "3D view" } } } };
-    document("mocban", &head, &body)
+    forward_page(LANGUAGE, "mocban", "3D view").into_string()
 }
 
 /// Returns the page for a one-time token that was used before.
 pub(super) fn token_used() -> String {
-    let body = html! { body { h1 { (REFUSED) } } };
-    document("mocban", &html! {}, &body)
+    used_token_page(LANGUAGE, "mocban", REFUSED).into_string()
 }
 
 #[cfg(test)]

@@ -191,7 +191,7 @@ fn the_reference_of_commands_is_current() {
         "# Commands\n\nWhat `mocban --help` and `mocban COMMAND --help` print.\n\n{overview}"
     );
     for name in names.filter(|name| *name != "help") {
-        text += &format!("\n## {name}\n\n{}", help(&[name, "--help"]));
+        text.extend(["\n## ", name, "\n\n", &help(&[name, "--help"])]);
     }
     assert!(text.matches("\n## ").count() > 15, "{text}");
     check_generated("commands.md", &text);

@@ -17,7 +17,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
 ];
 
-/// Rooms without files, processes, clocks and async code.
+/// Modules without files, processes, clocks and async code.
 const PURE_MODULES: &[&str] = &["domain", "raster", "mesh", "stages"];
 const IMPURE: &[&str] = &[
     "tokio::",
