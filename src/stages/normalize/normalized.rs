@@ -36,7 +36,7 @@ impl PrintMasks {
         })
     }
 
-    /// Decodes an image from [`Self::to_grey`].
+    /// Decodes a stored mask: 255 is ink, 64 is a speck, 0 is background and 128 is unknown.
     pub fn from_grey(grey: &Grid<u8>) -> Self {
         Self {
             ink: grey.map(|grey| *grey == Self::INK),
