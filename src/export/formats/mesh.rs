@@ -1,5 +1,7 @@
 //! The format `mesh`: scans in the frame of their prints.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::single_results::{FileOfPair, SingleResults};
 use crate::export::export_folder::FolderError;
 use crate::export::format_writer::{
@@ -68,12 +70,15 @@ tops = scan.vertices[vertices[\"stroke\"] == 1]                # mm
 /// Writes the scans.
 pub(super) struct MeshWriter {
     results: SingleResults,
+    /// Held while a scan is read. Until its repeated vertices are merged, a scan takes several times its memory.
+    reading: Mutex<()>,
 }
 
 impl MeshWriter {
     pub(super) fn begin(folder: &FormatFolder) -> Result<Self, FolderError> {
         Ok(Self {
             results: SingleResults::begin(folder)?,
+            reading: Mutex::default(),
         })
     }
 }
@@ -96,7 +101,12 @@ impl FormatWriter for MeshWriter {
             pair: &view.record.pair.id,
             metric: shown.fields.metric,
         };
-        let files = ScanFiles::new(pictures.mesh()?, &placement, &print, &title)
+        let mesh = {
+            // The lock guards no data, so a panic of another thread does not matter.
+            let _reading = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+            pictures.mesh()?.welded()
+        };
+        let files = ScanFiles::new(mesh, &placement, &print, &title)
             .map_err(|error| PictureError::Unencodable(error.to_string()))?;
         let contents = [
             files.ply,

@@ -49,7 +49,7 @@ pub(in crate::export) struct ScanFiles {
 }
 
 impl ScanFiles {
-    /// Places a scan and encodes its files. Repeated vertices are merged.
+    /// Places a scan, whose repeated vertices were merged, and encodes its files.
     ///
     /// # Errors
     /// Returns an error if a file would be too large for its format.
@@ -59,7 +59,7 @@ impl ScanFiles {
         print: &Rgb,
         title: &ScanTitle<'_>,
     ) -> io::Result<Self> {
-        let placed = PlacedMesh::new(mesh.welded(), placement, print);
+        let placed = PlacedMesh::new(mesh, placement, print);
         let png = print_png(print);
         let bytes = VERTEX_BYTES * placed.positions.len()
             + FACE_BYTES * placed.source.triangles.len()
