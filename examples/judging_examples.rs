@@ -13,7 +13,7 @@ use mocban::catalog::{Catalog, PairResults};
 use mocban::domain::{Affine2, MetricOutcome, PairName, ThresholdMetric};
 use mocban::export::SourcePrint;
 use mocban::export::pictures::PrintView;
-use mocban::raster::{DepthMap, ImageLimits, Mask, jpeg_rgb8, png_grey8, png_mask};
+use mocban::raster::{DepthMap, ImageLimits, jpeg_rgb8, png_grey8, png_mask};
 use mocban::report::pair_artifacts::PairArtifacts;
 use mocban::stages::normalize::PrintMasks;
 use mocban::stages::register::StrokeMap;
@@ -212,15 +212,6 @@ fn stroke_map(
     let side = artifacts.canvas_print_mask()?.width() as u32;
     let found = StrokeMap::of_alignment(depth, masks, &canvas_from_print, map, side, level);
     let print_from_canvas = canvas_from_print.inverse().unwrap_or(Affine2::IDENTITY);
-    let drawn = |value: u8| -> Mask {
-        view.mask(&found.grey.map(|grey| *grey == value), &print_from_canvas)
-    };
-    let [ink, wood] = [StrokeMap::MISSING_INK, StrokeMap::MISSING_WOOD].map(drawn);
-    Ok(png_grey8(&ink.zip_map(&wood, |ink, wood| {
-        match (ink, wood) {
-            (true, _) => StrokeMap::MISSING_INK,
-            (false, true) => StrokeMap::MISSING_WOOD,
-            (false, false) => StrokeMap::AGREE,
-        }
-    })))
+    let drawn = view.labels(&found.grey, StrokeMap::DISAGREEMENTS, &print_from_canvas);
+    Ok(png_grey8(&drawn))
 }

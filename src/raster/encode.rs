@@ -119,7 +119,7 @@ fn png_of<T: Copy>(
     depth: png::BitDepth,
     samples: &[u8],
 ) -> Vec<u8> {
-    // A depth map of 512 px takes 0.7 ms and 283 kB with this setting, and 5 ms and 255 kB with any level of DEFLATE.
+    // A depth map of 512 px takes 0.8 ms and 278 kB with this setting, and 2.2 ms and 251 kB with level 1 of miniz.
     let deflate = png::DeflateCompression::FdeflateUltraFast;
     encode(grid, (color, depth), samples, deflate)
 }

@@ -185,13 +185,7 @@ fn stroke_map(
     );
     let print_from_canvas = inputs.canvas_from_print.inverse();
     let print_from_canvas = print_from_canvas.unwrap_or(Affine2::IDENTITY);
-    let drawn = |value: u8| view.mask(&map.grey.map(|grey| *grey == value), &print_from_canvas);
-    let [ink, wood] = [StrokeMap::MISSING_INK, StrokeMap::MISSING_WOOD].map(drawn);
-    png_grey8(&ink.zip_map(&wood, |ink, wood| match (ink, wood) {
-        (true, _) => StrokeMap::MISSING_INK,
-        (false, true) => StrokeMap::MISSING_WOOD,
-        (false, false) => StrokeMap::AGREE,
-    }))
+    png_grey8(&view.labels(&map.grey, StrokeMap::DISAGREEMENTS, &print_from_canvas))
 }
 
 /// Renders the images of items and caches the latest.

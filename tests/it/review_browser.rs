@@ -31,12 +31,14 @@ pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Ta
 
 /// Opens a page on a new project; skips if there is no browser.
 fn on_a_page(test: impl FnOnce(&Project, &Tab<'_>)) {
-    on_a_page_of(read_project, test);
+    on_a_page_of(read_project, &PLAIN, [1440, 900], test);
 }
 
-/// Opens a page on a project that `make` makes in a directory; skips if there is no browser.
-fn on_a_page_of(
+/// Opens a page of a size on a project that `make` makes in a directory; skips if there is no browser.
+pub(crate) fn on_a_page_of(
     make: impl FnOnce(&tempfile::TempDir) -> Project,
+    options: &[&str],
+    size: [u32; 2],
     test: impl FnOnce(&Project, &Tab<'_>),
 ) {
     let Some(browser) = Browser::start() else {
@@ -44,8 +46,8 @@ fn on_a_page_of(
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = make(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1440, 900]);
+    let page = Page::start(&project, "lan", options);
+    let tab = enter(&browser, &page, size);
     test(&project, &tab);
 }
 
@@ -101,7 +103,7 @@ fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
         call(&mut run(&project, &[])).expect(0);
         project
     };
-    on_a_page_of(made, |project, tab| {
+    on_a_page_of(made, &PLAIN, [1440, 900], |project, tab| {
         let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
         let mut paints = Vec::new();
         for i in 0..50 {

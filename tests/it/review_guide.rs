@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::page::{Page, open_review, read_project};
-use crate::review_browser::{PLAIN, enter, judge};
+use crate::review_browser::{PLAIN, enter, judge, on_a_page_of};
 
 /// Position and size of the large image.
 fn picture(tab: &Tab<'_>) -> Value {
@@ -40,19 +40,12 @@ fn practise(tab: &Tab<'_>, key: &str) -> String {
 
 #[test]
 fn a_new_reviewer_sees_the_guide_and_practises() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let options = ["--metric", "density", "--sample", "2"];
-    let options = [&PLAIN[1..], &options].concat();
-    let page = Page::start(&project, "lan", &options);
-    let tab = enter(&browser, &page, [1440, 900]);
-    tab.wait("document.querySelector('#guide[open]')");
-    tab.wait("document.querySelectorAll('#guide figure[data-drawn]').length === 9");
-    tab.screenshot("guide");
-    let drawn = tab.eval(
+    let options = [&PLAIN[1..], &["--metric", "density", "--sample", "2"]].concat();
+    on_a_page_of(read_project, &options, [1440, 900], |_, tab| {
+        tab.wait("document.querySelector('#guide[open]')");
+        tab.wait("document.querySelectorAll('#guide figure[data-drawn]').length === 9");
+        tab.screenshot("guide");
+        let drawn = tab.eval(
         "[...document.querySelectorAll('#guide canvas')].every((canvas) => {
             const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
             let orange = 0;
@@ -62,47 +55,48 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
             return orange > 100;
         })",
     );
-    assert_eq!(drawn, json!(true), "each example has an outline");
-    tab.eval("document.querySelector('[data-action=practice]').click()");
-    tab.wait("!document.querySelector('#guide[open]')");
-    // The fourth answer is wrong.
-    let keys = ["KeyP", "Digit1", "KeyF", "KeyF", "Digit3", "KeyP"];
-    for (i, key) in keys.into_iter().enumerate() {
-        let text = practise(&tab, key);
-        let starts = if i == 3 {
-            "Not correct. Pass"
-        } else {
-            "Correct."
-        };
-        assert!(text.starts_with(starts), "{i}: {text}");
-        if i == 1 {
-            assert!(text.contains("Wrong angle. Rotated by 9°"), "{text}");
-            tab.screenshot("practice");
+        assert_eq!(drawn, json!(true), "each example has an outline");
+        tab.eval("document.querySelector('[data-action=practice]').click()");
+        tab.wait("!document.querySelector('#guide[open]')");
+        // The fourth answer is wrong.
+        let keys = ["KeyP", "Digit1", "KeyF", "KeyF", "Digit3", "KeyP"];
+        for (i, key) in keys.into_iter().enumerate() {
+            let text = practise(tab, key);
+            let starts = if i == 3 {
+                "Not correct. Pass"
+            } else {
+                "Correct."
+            };
+            assert!(text.starts_with(starts), "{i}: {text}");
+            if i == 1 {
+                assert!(text.contains("Wrong angle. Rotated by 9°"), "{text}");
+                tab.screenshot("practice");
+            }
+            tab.key("Enter");
         }
-        tab.key("Enter");
-    }
-    tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
-    tab.wait("document.getElementById('practice').hidden");
-    assert_eq!(
-        tab.eval("document.getElementById('bar').value"),
-        0,
-        "nothing is stored"
-    );
-    // The question mark opens the guide again; Escape leaves the practice round at any time.
-    tab.wait("!document.body.dataset.shown.startsWith('example-')");
-    tab.key("Slash");
-    tab.wait("document.querySelector('#guide[open]')");
-    tab.eval("document.querySelector('[data-action=practice]').click()");
-    tab.wait("!document.getElementById('practice').hidden");
-    tab.key("Escape");
-    tab.wait("document.getElementById('practice').hidden");
-    tab.wait("!document.body.dataset.shown.startsWith('example-')");
-    judge(&tab, "KeyP");
-    tab.wait("document.getElementById('saved').textContent.includes('✓')");
-    tab.reload();
-    tab.wait("document.body?.dataset.ready");
-    let opened = tab.eval("Boolean(document.querySelector('#guide[open]'))");
-    assert_eq!(opened, json!(false), "only before the first answer");
+        tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
+        tab.wait("document.getElementById('practice').hidden");
+        assert_eq!(
+            tab.eval("document.getElementById('bar').value"),
+            0,
+            "nothing is stored"
+        );
+        // The question mark opens the guide again; Escape leaves the practice round at any time.
+        tab.wait("!document.body.dataset.shown.startsWith('example-')");
+        tab.key("Slash");
+        tab.wait("document.querySelector('#guide[open]')");
+        tab.eval("document.querySelector('[data-action=practice]').click()");
+        tab.wait("!document.getElementById('practice').hidden");
+        tab.key("Escape");
+        tab.wait("document.getElementById('practice').hidden");
+        tab.wait("!document.body.dataset.shown.startsWith('example-')");
+        judge(tab, "KeyP");
+        tab.wait("document.getElementById('saved').textContent.includes('✓')");
+        tab.reload();
+        tab.wait("document.body?.dataset.ready");
+        let opened = tab.eval("Boolean(document.querySelector('#guide[open]'))");
+        assert_eq!(opened, json!(false), "only before the first answer");
+    });
 }
 
 #[test]
@@ -153,92 +147,77 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
 
 #[test]
 fn hints_do_not_move_the_picture_and_fast_answers_are_named() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1366, 660]);
-    judge(&tab, "KeyP");
-    let before = picture(&tab);
-    for (key, shown) in [
-        ("KeyN", "!document.getElementById('note-row').hidden"),
-        (
-            "KeyW",
-            "document.querySelector('[data-action=overlay]').classList.contains('on')",
-        ),
-        (
-            "KeyC",
-            "document.getElementById('legend').textContent.includes('IoU')",
-        ),
-    ] {
-        tab.key(key);
-        tab.wait(shown);
-        assert_eq!(picture(&tab), before, "{key}");
-        tab.key("Escape");
-        tab.wait("document.getElementById('note-row').hidden");
-    }
-    tab.wait("!document.querySelector('[data-action=align]').classList.contains('on')");
-    for _ in 0..10 {
-        judge(&tab, "KeyP");
-    }
-    tab.wait("document.getElementById('saved').textContent.includes('✓')");
-    tab.wait("document.getElementById('alert').innerText.includes('last 10 answers')");
-    assert_eq!(
-        tab.eval("document.getElementById('alert').hidden"),
-        json!(false)
-    );
-    tab.screenshot("too-fast");
-    assert_eq!(picture(&tab), before, "the warning");
+    on_a_page_of(read_project, &PLAIN, [1366, 660], |_, tab| {
+        judge(tab, "KeyP");
+        let before = picture(tab);
+        for (key, shown) in [
+            ("KeyN", "!document.getElementById('note-row').hidden"),
+            (
+                "KeyW",
+                "document.querySelector('[data-action=overlay]').classList.contains('on')",
+            ),
+            (
+                "KeyC",
+                "document.getElementById('legend').textContent.includes('IoU')",
+            ),
+        ] {
+            tab.key(key);
+            tab.wait(shown);
+            assert_eq!(picture(tab), before, "{key}");
+            tab.key("Escape");
+            tab.wait("document.getElementById('note-row').hidden");
+        }
+        tab.wait("!document.querySelector('[data-action=align]').classList.contains('on')");
+        for _ in 0..10 {
+            judge(tab, "KeyP");
+        }
+        tab.wait("document.getElementById('saved').textContent.includes('✓')");
+        tab.wait("document.getElementById('alert').innerText.includes('last 10 answers')");
+        assert_eq!(
+            tab.eval("document.getElementById('alert').hidden"),
+            json!(false)
+        );
+        tab.screenshot("too-fast");
+        assert_eq!(picture(tab), before, "the warning");
+    });
 }
 
 #[test]
 fn a_worse_alignment_is_saved_only_after_a_question() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1440, 900]);
-    let is_open = "document.querySelector('[data-action=align]').classList.contains('on')";
-    tab.key("KeyC");
-    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
-    for _ in 0..12 {
-        tab.key("ArrowRight");
-    }
-    tab.key("Enter");
-    tab.wait("document.querySelector('#confirm[open]')");
-    tab.screenshot("confirm");
-    tab.key("Escape");
-    tab.wait("!document.querySelector('#confirm[open]')");
-    assert_eq!(tab.eval(is_open), json!(true), "the editor stays open");
-    tab.key("Enter");
-    tab.wait("document.querySelector('#confirm[open]')");
-    tab.eval("document.querySelector('#confirm button[value=yes]').click()");
-    tab.wait("document.getElementById('live').textContent.includes('alignment saved')");
-    tab.wait(&format!("!{is_open}"));
+    on_a_page_of(read_project, &PLAIN, [1440, 900], |_, tab| {
+        let is_open = "document.querySelector('[data-action=align]').classList.contains('on')";
+        tab.key("KeyC");
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+        for _ in 0..12 {
+            tab.key("ArrowRight");
+        }
+        tab.key("Enter");
+        tab.wait("document.querySelector('#confirm[open]')");
+        tab.screenshot("confirm");
+        tab.key("Escape");
+        tab.wait("!document.querySelector('#confirm[open]')");
+        assert_eq!(tab.eval(is_open), json!(true), "the editor stays open");
+        tab.key("Enter");
+        tab.wait("document.querySelector('#confirm[open]')");
+        tab.eval("document.querySelector('#confirm button[value=yes]').click()");
+        tab.wait("document.getElementById('live').textContent.includes('alignment saved')");
+        tab.wait(&format!("!{is_open}"));
+    });
 }
 
 #[test]
 fn every_answer_is_reachable_on_a_narrow_screen() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
     for language in ["en", "vi"] {
         let options = [&PLAIN[..], &["--lang", language]].concat();
-        let page = Page::start(&project, language, &options);
-        let tab = enter(&browser, &page, [400, 800]);
-        tab.screenshot(&format!("narrow-{language}"));
-        let actions = "pass fail unsure angle strokes_lost background_in shift_or_scale mirrored wrong_pair note undo";
-        for action in actions.split_whitespace() {
-            let selector = format!("footer [data-action={action}]");
-            assert!(is_reachable(&tab, &selector), "{language}: {action}");
-        }
-        tab.screenshot(&format!("narrow-{language}-reasons"));
+        on_a_page_of(read_project, &options, [400, 800], |_, tab| {
+            tab.screenshot(&format!("narrow-{language}"));
+            let actions = "pass fail unsure angle strokes_lost background_in shift_or_scale mirrored wrong_pair note undo";
+            for action in actions.split_whitespace() {
+                let selector = format!("footer [data-action={action}]");
+                assert!(is_reachable(tab, &selector), "{language}: {action}");
+            }
+            tab.screenshot(&format!("narrow-{language}-reasons"));
+        });
     }
 }
 

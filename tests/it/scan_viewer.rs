@@ -167,77 +167,79 @@ fn the_print_registers_with_the_relief() {
     }
 }
 
-#[test]
-fn every_control_changes_the_picture() {
+/// Opens the view of one pair; skips if there is no browser.
+fn on_a_view(size: [u32; 2], test: impl FnOnce(&Tab<'_>)) {
     let Some(browser) = Browser::start() else {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let pair = one_pair(dir.path());
     let page = view(dir.path(), pair);
-    let tab = mounted(&browser, &page.url, [900, 600]);
-    let start = canvas(&tab);
-    tab.screenshot("scan-start");
-    let mut seen = BTreeSet::from([start.clone()]);
-    for (name, settings) in [
-        ("wood", "ink: 0"),
-        ("ink", "ink: 1"),
-        ("raking", "ink: 0, lightDirection: 315, lightHeight: 8"),
-        ("threshold", "showsThreshold: true"),
-        ("lower", "threshold: mocbanViewer.settings.threshold - 0.5"),
-        ("strokes", "showsThreshold: false, showsStrokes: true"),
-        ("outline", "showsInkOutline: true"),
-        ("plane", "showsPlane: true"),
-        ("exaggerated", "exaggeration: 4"),
-        ("block", "asPrinted: false"),
-    ] {
-        tab.eval(&format!("mocbanViewer.set({{ {settings} }}), null"));
-        assert!(seen.insert(canvas(&tab)), "{name}");
-        tab.screenshot(&format!("scan-{name}"));
-    }
-    for code in ["ArrowLeft", "ArrowUp", "Equal", "KeyW", "BracketLeft"] {
-        tab.key(code);
-        assert!(seen.insert(canvas(&tab)), "{code}");
-    }
-    tab.drag([200.0, 300.0], [280.0, 340.0]);
-    assert!(seen.insert(canvas(&tab)), "drag");
-    tab.key("Digit0");
-    assert_eq!(canvas(&tab), start);
-    // Arrow keys on a slider move the slider, not the scan.
-    tab.eval("document.querySelector('[data-setting=ink]').focus()");
-    tab.key("ArrowLeft");
-    assert_eq!(tab.eval("mocbanViewer.orbit.azimuth"), 0);
-    tab.dark(true);
-    tab.screenshot("scan-dark");
-    let labels = "[...document.querySelectorAll('.scan-viewer input')].every((input) => input.labels.length === 1)";
-    assert_eq!(tab.eval(labels), true);
+    test(&mounted(&browser, &page.url, size));
+}
+
+#[test]
+fn every_control_changes_the_picture() {
+    on_a_view([900, 600], |tab| {
+        let start = canvas(tab);
+        tab.screenshot("scan-start");
+        let mut seen = BTreeSet::from([start.clone()]);
+        for (name, settings) in [
+            ("wood", "ink: 0"),
+            ("ink", "ink: 1"),
+            ("raking", "ink: 0, lightDirection: 315, lightHeight: 8"),
+            ("threshold", "showsThreshold: true"),
+            ("lower", "threshold: mocbanViewer.settings.threshold - 0.5"),
+            ("strokes", "showsThreshold: false, showsStrokes: true"),
+            ("outline", "showsInkOutline: true"),
+            ("plane", "showsPlane: true"),
+            ("exaggerated", "exaggeration: 4"),
+            ("block", "asPrinted: false"),
+        ] {
+            tab.eval(&format!("mocbanViewer.set({{ {settings} }}), null"));
+            assert!(seen.insert(canvas(tab)), "{name}");
+            tab.screenshot(&format!("scan-{name}"));
+        }
+        for code in ["ArrowLeft", "ArrowUp", "Equal", "KeyW", "BracketLeft"] {
+            tab.key(code);
+            assert!(seen.insert(canvas(tab)), "{code}");
+        }
+        tab.drag([200.0, 300.0], [280.0, 340.0]);
+        assert!(seen.insert(canvas(tab)), "drag");
+        tab.key("Digit0");
+        assert_eq!(canvas(tab), start);
+        // Arrow keys on a slider move the slider, not the scan.
+        tab.eval("document.querySelector('[data-setting=ink]').focus()");
+        tab.key("ArrowLeft");
+        assert_eq!(tab.eval("mocbanViewer.orbit.azimuth"), 0);
+        tab.dark(true);
+        tab.screenshot("scan-dark");
+        let labels = "[...document.querySelectorAll('.scan-viewer input')].every((input) => input.labels.length === 1)";
+        assert_eq!(tab.eval(labels), true);
+    });
 }
 
 #[test]
 fn fingers_turn_zoom_and_move_the_scan() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let pair = one_pair(dir.path());
-    let page = view(dir.path(), pair);
-    let tab = mounted(&browser, &page.url, [400, 800]);
-    let orbit = |tab: &Tab<'_>| {
-        let orbit = tab
-            .eval("[mocbanViewer.orbit.azimuth, mocbanViewer.orbit.tilt, mocbanViewer.orbit.zoom]");
-        numbers(&orbit)
-    };
-    tab.touch(&[[150.0, 200.0]], &[[190.0, 220.0]]);
-    let turned = orbit(&tab);
-    assert!(turned[0] < -5.0 && turned[1] > 2.0, "{turned:?}");
-    assert_eq!(turned[2], 1.0);
-    tab.touch(
-        &[[150.0, 200.0], [200.0, 200.0]],
-        &[[120.0, 200.0], [220.0, 200.0]],
-    );
-    let zoomed = orbit(&tab);
-    assert!((1.8..2.2).contains(&zoomed[2]), "{zoomed:?}");
-    assert_eq!(zoomed[..2], turned[..2], "two fingers do not turn");
+    on_a_view([400, 800], |tab| {
+        let orbit = |tab: &Tab<'_>| {
+            let orbit = tab.eval(
+                "[mocbanViewer.orbit.azimuth, mocbanViewer.orbit.tilt, mocbanViewer.orbit.zoom]",
+            );
+            numbers(&orbit)
+        };
+        tab.touch(&[[150.0, 200.0]], &[[190.0, 220.0]]);
+        let turned = orbit(tab);
+        assert!(turned[0] < -5.0 && turned[1] > 2.0, "{turned:?}");
+        assert_eq!(turned[2], 1.0);
+        tab.touch(
+            &[[150.0, 200.0], [200.0, 200.0]],
+            &[[120.0, 200.0], [220.0, 200.0]],
+        );
+        let zoomed = orbit(tab);
+        assert!((1.8..2.2).contains(&zoomed[2]), "{zoomed:?}");
+        assert_eq!(zoomed[..2], turned[..2], "two fingers do not turn");
+    });
 }
 
 #[test]

@@ -1,14 +1,14 @@
 //! The images of a result in one frame: the print, the aligned relief, and the print with the relief's stroke edges.
 
-use super::paint::{Rgb, eight_bits, resized};
+use super::paint::{BLUE, Rgb, VERMILLION, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
 use crate::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
-/// Vermillion from the palette of Okabe and Ito, which readers with colour blindness can distinguish from ink.
-const EDGE: [u8; 3] = [213, 94, 0];
-/// Blue of the same palette, for the edges of the true stroke tops.
-const TRUE_EDGE: [u8; 3] = [0, 114, 178];
+/// Colour of the edges of stroke masks.
+const EDGE: [u8; 3] = VERMILLION;
+/// Colour of the edges of the true stroke tops.
+const TRUE_EDGE: [u8; 3] = BLUE;
 /// Pixels of the longest side per pixel of edge width.
 const SIDE_PER_EDGE_PX: usize = 240;
 /// Minimal longest side of a saved overlay, pixels. An edge of one pixel then hides little of a stroke.
@@ -103,6 +103,18 @@ impl PrintView {
     pub fn mask(&self, mask: &Mask, print_from_mask: &Affine2) -> Mask {
         let view_from_mask = self.from_print.after(print_from_mask);
         warp_mask(mask, &view_from_mask, self.width, self.height)
+    }
+
+    /// Warps two labels of a map to the view; other pixels are 0. Where both labels reach a pixel, the first one counts.
+    /// `print_from_map` maps pixels of the map to print pixels.
+    pub fn labels(&self, map: &Grid<u8>, labels: [u8; 2], print_from_map: &Affine2) -> Grid<u8> {
+        let warped = |label: u8| self.mask(&map.map(|value| *value == label), print_from_map);
+        let [first, second] = labels.map(warped);
+        first.zip_map(&second, |first, second| match (first, second) {
+            (true, _) => labels[0],
+            (false, true) => labels[1],
+            (false, false) => 0,
+        })
     }
 
     /// Returns the map from print pixels to pixels of the view.

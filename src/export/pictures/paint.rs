@@ -5,6 +5,10 @@ use crate::raster::{Grid, PrintImage};
 /// An 8-bit colour image.
 pub type Rgb = Grid<[u8; 3]>;
 
+/// Vermillion of the palette of Okabe and Ito, which readers with colour blindness can distinguish from ink.
+pub(super) const VERMILLION: [u8; 3] = [213, 94, 0];
+/// Blue of the same palette.
+pub(super) const BLUE: [u8; 3] = [0, 114, 178];
 /// Colour of text.
 pub(super) const TEXT: [u8; 3] = [20, 20, 20];
 /// Background colour.

@@ -1,7 +1,7 @@
 //! Layout and drawing of contact sheets: a legend, and many pairs below it on one image.
 
 use super::font::{cut_at_end, cut_in_middle, has_glyphs, line_height, lines, text_width, write};
-use super::paint::{BACKGROUND, Rgb, TEXT, copy, fill, resized};
+use super::paint::{BACKGROUND, BLUE, Rgb, TEXT, VERMILLION, copy, fill, resized};
 
 /// Width of a contact sheet, pixels.
 pub const SHEET_WIDTH: usize = 2000;
@@ -43,11 +43,11 @@ impl FrameKind {
     /// Every kind, in the order of the legend.
     const ALL: [Self; 3] = [Self::Wrong, Self::Passed, Self::Other];
 
-    /// Returns its colour. Vermillion and blue are of the palette of Okabe and Ito.
+    /// Returns its colour.
     const fn colour(self) -> [u8; 3] {
         match self {
-            Self::Wrong => [213, 94, 0],
-            Self::Passed => [0, 114, 178],
+            Self::Wrong => VERMILLION,
+            Self::Passed => BLUE,
             Self::Other => [190, 190, 190],
         }
     }

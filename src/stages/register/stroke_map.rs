@@ -31,6 +31,8 @@ impl StrokeMap {
     pub const MISSING_INK: u8 = 128;
     /// Ink without stroke tops near it.
     pub const MISSING_WOOD: u8 = 255;
+    /// Both values of disagreement. Elsewhere the map is [`Self::AGREE`], which is 0.
+    pub const DISAGREEMENTS: [u8; 2] = [Self::MISSING_INK, Self::MISSING_WOOD];
 
     /// Maps the disagreement of an alignment. `level` is the lowest depth-map level that is stroke. The map has
     /// `canvas_px` pixels on each side.
