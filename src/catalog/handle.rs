@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sqlx::pool::PoolConnection;
-use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
+use sqlx::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::catalog::db::commit_delay::CommitDelay;
+use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
 use crate::catalog::db::request::{Message, Reply};
@@ -59,7 +59,7 @@ impl Catalog {
         let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let writer = WriteConnection::new(conn, Arc::clone(&path));
+        let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), Arc::clone(&path));
         let writer = writer::run(writer, inbox, Arc::clone(&delay));
         tokio::spawn(writer);
         Ok(Self {
@@ -97,19 +97,23 @@ impl Catalog {
         receiver.await.unwrap_or(Err(CatalogError::Closed))
     }
 
-    pub(crate) async fn read_conn(&self) -> Result<PoolConnection<Sqlite>> {
-        Ok(self.reader_pool.acquire().await?)
+    pub(crate) async fn read_conn(&self) -> Result<Conn> {
+        Ok(Conn::Sqlite(Held::Pooled(
+            self.reader_pool.acquire().await?,
+        )))
     }
 
     /// Begins a read transaction, which sees the catalog as of one moment.
-    pub(crate) async fn snapshot(&self) -> Result<Transaction<'static, Sqlite>> {
-        Ok(self.reader_pool.begin().await?)
+    pub(crate) async fn snapshot(&self) -> Result<Conn> {
+        Ok(Conn::Sqlite(Held::Snapshot(
+            self.reader_pool.begin().await?,
+        )))
     }
 
     /// Runs `work` in a separate write transaction on the writer task.
     pub(crate) async fn in_transaction<T: Send + 'static>(
         &self,
-        work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
+        work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>> + Send + 'static,
     ) -> Result<T> {
         self.reply_to(|reply| {
             Message::Transaction(Box::new(move |writer| {

@@ -20,6 +20,7 @@ use serde_json::{Map, Value, json};
 use tokio::sync::{mpsc, oneshot};
 
 use super::db::commit_delay::CommitDelay;
+use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints,
     ImportChunk, ImportRow, ImportSummary, InputVersion, InputVersions, Lease, MetricResult,
@@ -225,14 +226,14 @@ impl World {
     async fn count_stale(&self, fingerprints: &Fingerprints) -> u64 {
         let mut conn = self.catalog.read_conn().await.expect("a reader");
         let current = super::queue::fingerprint::current_json(&mut conn, fingerprints).await;
-        let n: i64 = sqlx::query_scalar(
+        let n: i64 = query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
                     r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash
                     OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes))",
         )
         .bind(current.expect("fingerprints"))
-        .fetch_one(&mut *conn)
+        .fetch_one(&mut conn)
         .await
         .expect("a count");
         n.unsigned_abs()

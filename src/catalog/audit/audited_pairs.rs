@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::sqlite::SqliteRow;
-use sqlx::{FromRow as _, Row as _, SqliteConnection};
-
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::query;
+use crate::catalog::db::row::{FromRow as _, Row, from_row};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::lease::MetricResult;
 use crate::catalog::records::pair_work::{self, KnownInputs};
@@ -43,7 +43,7 @@ pub struct AuditPage {
 }
 
 /// A stored result, left unparsed so that a check can also read invalid values.
-#[derive(Debug, Clone, PartialEq, Eq, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditedResult {
     /// The outcome as JSON text.
     pub outcome: String,
@@ -52,6 +52,8 @@ pub struct AuditedResult {
     /// Stored hash of the outcome and the artifacts.
     pub result_hash: ContentHash,
 }
+
+from_row! { AuditedResult { outcome, files, result_hash } }
 
 pub(crate) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
@@ -73,11 +75,11 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn audit_page(&self, after: Option<PairId>, limit: usize) -> Result<AuditPage> {
         let mut conn = self.snapshot().await?;
-        let query = sqlx::query(PAGE).bind(after.map_or(0, |pair| pair.0));
-        let found = query.bind(limit as i64).fetch_all(&mut *conn).await?;
+        let query = query(PAGE).bind(after.map_or(0, |pair| pair.0));
+        let found = query.bind(limit as i64).fetch_all(&mut conn).await?;
         let mut page = AuditPage::default();
         for row in &found {
-            let id = PairId(row.try_get("id")?);
+            let id = PairId(row.get("id")?);
             page.last = Some(id);
             match pair(row) {
                 Ok(pair) => page.pairs.push(pair),
@@ -96,13 +98,13 @@ impl Catalog {
     }
 }
 
-fn pair(row: &SqliteRow) -> Result<AuditedPair> {
-    let status: Option<JobStatus> = row.try_get("status")?;
+fn pair(row: &Row) -> Result<AuditedPair> {
+    let status: Option<JobStatus> = row.get("status")?;
     Ok(AuditedPair {
-        name: row.try_get("name")?,
+        name: row.get("name")?,
         inputs: pair_work::known_inputs(row)?,
-        job: status.zip(row.try_get("stage")?),
-        has_failure: row.try_get("has_failure")?,
+        job: status.zip(row.get("stage")?),
+        has_failure: row.get("has_failure")?,
         results: BTreeMap::new(),
         metrics: BTreeMap::new(),
     })
@@ -110,55 +112,55 @@ fn pair(row: &SqliteRow) -> Result<AuditedPair> {
 
 /// Reads the rows of a query with `read` and groups the values by pair. Leaves out rows with invalid values.
 async fn by_pair<K: Ord, V>(
-    conn: &mut SqliteConnection,
-    query: &'static str,
+    conn: &mut Conn,
+    sql: &'static str,
     pairs: &str,
-    read: impl Fn(&SqliteRow) -> Result<(K, V)>,
+    read: impl Fn(&Row) -> Result<(K, V)>,
 ) -> Result<BTreeMap<i64, BTreeMap<K, V>>> {
     let mut found: BTreeMap<i64, BTreeMap<K, V>> = BTreeMap::new();
-    for row in &sqlx::query(query).bind(pairs).fetch_all(conn).await? {
+    for row in &query(sql).bind(pairs).fetch_all(conn).await? {
         if let Ok((key, value)) = read(row) {
-            let of_pair = found.entry(row.try_get("pair")?).or_default();
+            let of_pair = found.entry(row.get("pair")?).or_default();
             of_pair.insert(key, value);
         }
     }
     Ok(found)
 }
 
-fn result(row: &SqliteRow) -> Result<(Stage, AuditedResult)> {
-    Ok((row.try_get("stage")?, AuditedResult::from_row(row)?))
+fn result(row: &Row) -> Result<(Stage, AuditedResult)> {
+    Ok((row.get("stage")?, AuditedResult::from_row(row)?))
 }
 
-fn metric(row: &SqliteRow) -> Result<(ThresholdMetric, MetricResult)> {
-    let metric = row.try_get("metric")?;
+fn metric(row: &Row) -> Result<(ThresholdMetric, MetricResult)> {
+    let metric = row.get("metric")?;
     let result = MetricResult {
         outcome: MetricOutcome {
             metric,
-            threshold_level: row.try_get("threshold_level")?,
-            threshold_depth: row.try_get("threshold_depth")?,
-            print_from_depth: row.try_get("print_from_depth")?,
-            angle_deg: row.try_get("angle_deg")?,
-            scale: row.try_get("scale")?,
-            shift_px: [row.try_get("shift_x_px")?, row.try_get("shift_y_px")?],
+            threshold_level: row.get("threshold_level")?,
+            threshold_depth: row.get("threshold_depth")?,
+            print_from_depth: row.get("print_from_depth")?,
+            angle_deg: row.get("angle_deg")?,
+            scale: row.get("scale")?,
+            shift_px: [row.get("shift_x_px")?, row.get("shift_y_px")?],
             scores: Scores {
-                ssim: row.try_get("ssim")?,
-                nl_ssim: row.try_get("nl_ssim")?,
-                iou: row.try_get("iou")?,
-                iou_box: row.try_get("iou_box")?,
-                dice: row.try_get("dice")?,
-                density_print: row.try_get("density_print")?,
-                density_depth: row.try_get("density_depth")?,
+                ssim: row.get("ssim")?,
+                nl_ssim: row.get("nl_ssim")?,
+                iou: row.get("iou")?,
+                iou_box: row.get("iou_box")?,
+                dice: row.get("dice")?,
+                density_print: row.get("density_print")?,
+                density_depth: row.get("density_depth")?,
             },
             disagreement: Disagreement {
-                pieces: row.try_get("disagreements")?,
-                missing_ink: row.try_get("missing_ink")?,
-                missing_wood: row.try_get("missing_wood")?,
+                pieces: row.get("disagreements")?,
+                missing_ink: row.get("missing_ink")?,
+                missing_wood: row.get("missing_wood")?,
             },
-            margin: row.try_get("margin")?,
-            confidence: row.try_get("confidence")?,
-            at_bound: row.try_get("at_bound")?,
+            margin: row.get("margin")?,
+            confidence: row.get("confidence")?,
+            at_bound: row.get("at_bound")?,
         },
-        result_hash: row.try_get("result_hash")?,
+        result_hash: row.get("result_hash")?,
     };
     Ok((metric, result))
 }

@@ -1,9 +1,10 @@
 //! Checks the fingerprints that jobs use against their settings, and repairs them.
 
 use serde_json::Value;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::row::Row;
 use crate::catalog::queue::fingerprint::hash_of;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{ContentHash, Stage};
@@ -40,13 +41,13 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn faulty_fingerprints(&self) -> Result<Vec<FaultyFingerprint>> {
         let mut conn = self.read_conn().await?;
-        let used = sqlx::query(USED).fetch_all(&mut *conn).await?;
+        let used = query(USED).fetch_all(&mut conn).await?;
         let mut faulty = Vec::new();
         for row in &used {
             if !is_sound(row) {
                 faulty.push(FaultyFingerprint {
-                    row: row.try_get("id")?,
-                    stage: row.try_get("stage").ok(),
+                    row: row.get("id")?,
+                    stage: row.get("stage").ok(),
                 });
             }
         }
@@ -63,7 +64,7 @@ impl Catalog {
                 for fingerprint in &faulty {
                     retire(conn, fingerprint).await?;
                 }
-                sqlx::query(MARK_ALL).execute(conn).await?;
+                query(MARK_ALL).execute(conn).await?;
                 Ok(())
             })
         })
@@ -71,27 +72,27 @@ impl Catalog {
     }
 }
 
-fn is_sound(row: &SqliteRow) -> bool {
+fn is_sound(row: &Row) -> bool {
     let (Ok(stage), Ok(hash), Ok(fields), Ok(upstream)) = (
-        row.try_get::<Stage, _>("stage"),
-        row.try_get::<ContentHash, _>("hash"),
-        row.try_get::<&str, _>("fields"),
-        row.try_get::<Option<ContentHash>, _>("upstream"),
+        row.get::<Stage>("stage"),
+        row.get::<ContentHash>("hash"),
+        row.get::<String>("fields"),
+        row.get::<Option<ContentHash>>("upstream"),
     ) else {
         return false;
     };
-    serde_json::from_str::<Value>(fields)
+    serde_json::from_str::<Value>(&fields)
         .is_ok_and(|fields| hash_of(stage, &fields, upstream) == hash)
 }
 
 /// Replaces the settings of a fingerprint by a note, and its hash by a hash of the note.
-async fn retire(conn: &mut SqliteConnection, faulty: &FaultyFingerprint) -> Result<()> {
+async fn retire(conn: &mut Conn, faulty: &FaultyFingerprint) -> Result<()> {
     let fields = serde_json::json!({ "damaged_row": faulty.row });
     let stage = faulty.stage.unwrap_or(Stage::Fit);
-    let upstream = sqlx::query_scalar(UPSTREAM).bind(faulty.row);
+    let upstream = query_scalar(UPSTREAM).bind(faulty.row);
     let upstream: Option<ContentHash> = upstream.fetch_optional(&mut *conn).await?;
     let hash = hash_of(stage, &fields, upstream);
-    let set = sqlx::query(SET).bind(faulty.row).bind(&hash.as_bytes()[..]);
+    let set = query(SET).bind(faulty.row).bind(&hash.as_bytes()[..]);
     set.bind(fields.to_string()).execute(conn).await?;
     Ok(())
 }

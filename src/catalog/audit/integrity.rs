@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, SqliteConnection};
 
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
+use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
@@ -71,7 +73,7 @@ impl Catalog {
     /// # Errors
     /// Returns an error if the disk fails to read part of the file, or if SQLite reports an error other than damage.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
-        let mut conn = self.read_conn().await?;
+        let Conn::Sqlite(mut conn) = self.read_conn().await?;
         match integrity(&mut conn, quick).await {
             Ok(lines) if lines.iter().any(|line| is_unread(line)) => {
                 Err(CatalogError::Unread(self.path.to_path_buf()))
@@ -94,8 +96,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn broken_references(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
-        let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
-        Ok(lines.fetch_all(&mut *conn).await?)
+        let lines = query_scalar(REFERENCES).bind(LINES as i64);
+        Ok(lines.fetch_all(&mut conn).await?)
     }
 
     /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.
@@ -103,7 +105,7 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
-        let mut conn = self.read_conn().await?;
+        let Conn::Sqlite(mut conn) = self.read_conn().await?;
         let found = objects(&mut conn).await?;
         let wanted = wanted_objects().await?;
         let gone = wanted.keys().filter(|name| !found.contains_key(*name));
@@ -141,7 +143,7 @@ impl Catalog {
             ),
         ];
         for (sql, what) in checks.into_iter().filter(|_| !quick) {
-            let pairs: i64 = sqlx::query_scalar(sql).fetch_one(&mut *conn).await?;
+            let pairs: i64 = query_scalar(sql).fetch_one(&mut conn).await?;
             if pairs > 0 {
                 marks.push(format!("{pairs} pairs {what}"));
             }
@@ -151,11 +153,11 @@ impl Catalog {
 }
 
 /// Compares the counters with the jobs.
-async fn counter_drift(conn: &mut SqliteConnection) -> Result<Vec<CounterDrift>> {
-    let stored: Vec<JobGroup> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
+async fn counter_drift(conn: &mut Conn) -> Result<Vec<CounterDrift>> {
+    let stored: Vec<JobGroup> = query_as(COUNTERS).fetch_all(&mut *conn).await?;
     let stored: BTreeMap<_, _> = stored.iter().map(|group| (group.key, group.n)).collect();
     let counted = count_jobs(conn).await?;
-    let fingerprints: Vec<(i64, i64)> = sqlx::query_as(FINGERPRINTS).fetch_all(conn).await?;
+    let fingerprints: Vec<(i64, i64)> = query_as(FINGERPRINTS).fetch_all(conn).await?;
     let needed = fingerprints.into_iter().flat_map(|(cursor, fingerprint)| {
         JobStatus::ALL.map(|status| CounterKey::new(cursor, status, Some(fingerprint)))
     });

@@ -1,9 +1,11 @@
 //! Repairs damage that a check found, while no run is active. Never changes verdicts.
 
 use serde_json::json;
-use sqlx::{AssertSqlSafe, SqliteConnection};
+use sqlx::AssertSqlSafe;
 
 use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
@@ -79,7 +81,7 @@ impl Catalog {
         self.in_transaction(|conn| {
             Box::pin(async move {
                 for sql in [FIX_FINGERPRINTS, MARK_DIRTY].iter().chain(&RESET_COUNTERS) {
-                    sqlx::query(*sql).execute(&mut *conn).await?;
+                    query(*sql).execute(&mut *conn).await?;
                 }
                 let mut deltas = Deltas::default();
                 for (key, jobs) in count_jobs(conn).await? {
@@ -99,7 +101,8 @@ impl Catalog {
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                sqlx::query("REINDEX").execute(&mut *conn).await?;
+                query("REINDEX").execute(&mut *conn).await?;
+                let Conn::Sqlite(conn) = conn;
                 integrity(conn, false).await
             })
         })
@@ -114,11 +117,12 @@ impl Catalog {
         let wanted = wanted_objects().await?;
         self.in_transaction(move |conn| {
             Box::pin(async move {
+                let Conn::Sqlite(conn) = conn;
                 let found = objects(conn).await?;
                 for (name, sql) in wanted {
                     if !name.starts_with("table ") && !found.contains_key(&name) {
                         // SQL of our own migrations.
-                        sqlx::query(AssertSqlSafe(sql)).execute(&mut *conn).await?;
+                        sqlx::query(AssertSqlSafe(sql)).execute(&mut **conn).await?;
                     }
                 }
                 Ok(())
@@ -128,32 +132,29 @@ impl Catalog {
     }
 }
 
-async fn restore(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
+async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {
     let items = json_array(
         pairs
             .iter()
             .map(|(pair, stage)| json!([pair.0, stage.index()])),
     );
     let mut deltas = Deltas::default();
-    let before = sqlx::query_as(POSITIONS).bind(&items);
+    let before = query_as(POSITIONS).bind(&items);
     let before: Vec<CounterKey> = before.fetch_all(&mut *conn).await?;
     for key in before {
         deltas.add(key, -1);
     }
-    sqlx::query(NEW_JOBS)
-        .bind(&items)
-        .execute(&mut *conn)
-        .await?;
-    let after = sqlx::query_as(RESTORE).bind(&items);
+    query(NEW_JOBS).bind(&items).execute(&mut *conn).await?;
+    let after = query_as(RESTORE).bind(&items);
     let after: Vec<CounterKey> = after.fetch_all(&mut *conn).await?;
     for key in after {
         deltas.add(key, 1);
     }
-    sqlx::query(REMOVE_RESULTS)
+    query(REMOVE_RESULTS)
         .bind(&items)
         .execute(&mut *conn)
         .await?;
-    sqlx::query(CLEAR_FAILURES)
+    query(CLEAR_FAILURES)
         .bind(&items)
         .execute(&mut *conn)
         .await?;

@@ -6,6 +6,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode};
 use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
 
 use crate::catalog::audit::integrity;
+use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity, wrong_identity};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -30,7 +31,10 @@ impl Catalog {
     pub async fn back_up(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
         // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
         // off, so that the pool keeps only read connections.
-        let mut conn = self.read_conn().await?.detach();
+        let Conn::Sqlite(Held::Pooled(conn)) = self.read_conn().await? else {
+            return Err(CatalogError::Closed);
+        };
+        let mut conn = conn.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)
             .await?;

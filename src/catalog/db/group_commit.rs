@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
@@ -91,7 +90,7 @@ impl Batch {
 
     /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
     /// the transaction may still be open, so the caller must roll it back.
-    pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<BatchReply> {
+    pub(crate) async fn apply(&self, conn: &mut Conn) -> Result<BatchReply> {
         let mut script = Script::default();
         script.execute("BEGIN IMMEDIATE");
         let statements = self.add_jobs(&mut script)?;

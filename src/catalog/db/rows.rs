@@ -2,52 +2,45 @@
 
 use serde_json::Value;
 use sqlx::error::BoxDynError;
-use sqlx::sqlite::{SqliteTypeInfo, SqliteValueRef};
-use sqlx::{Decode, Sqlite, Type};
 
+use crate::catalog::db::value::{FromValue, Value as ColumnValue, read_blob, read_text};
+use crate::catalog::queue::lease::FingerprintId;
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName,
     PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
-/// Implements `Type` and `Decode` for types. Each line has a type, the type of its column, and a conversion function.
+/// Implements [`FromValue`] for domain types. Each line has a type, the type of its column, and a conversion function.
 macro_rules! decode {
-    ($($type:ty: $column:ty = $convert:expr;)+) => {$(
-        impl Type<Sqlite> for $type {
-            fn type_info() -> SqliteTypeInfo {
-                <$column as Type<Sqlite>>::type_info()
-            }
-
-            fn compatible(ty: &SqliteTypeInfo) -> bool {
-                <$column as Type<Sqlite>>::compatible(ty)
-            }
-        }
-
-        impl<'r> Decode<'r, Sqlite> for $type {
-            fn decode(value: SqliteValueRef<'r>) -> Result<Self, BoxDynError> {
-                let column = <$column as Decode<Sqlite>>::decode(value)?;
-                Ok($convert(column)?)
+    ($($type:ty: $column:ident = $convert:expr;)+) => {$(
+        impl FromValue for $type {
+            fn from_value(value: ColumnValue<'_>) -> Result<Self, BoxDynError> {
+                decode!(@$column value, $convert)
             }
         }
     )+};
+    (@integer $value:ident, $convert:expr) => { Ok($convert(i64::from_value($value)?)?) };
+    (@text $value:ident, $convert:expr) => { read_text(&$value, |text| $convert(text)) };
+    (@blob $value:ident, $convert:expr) => { read_blob(&$value, $convert) };
 }
 
 decode! {
-    PairId: i64 = |id| Ok::<_, String>(Self(id));
-    WorkerId: i64 = |id| Ok::<_, String>(Self(id));
-    JobStatus: i64 = status;
-    Stage: i64 = stage;
-    ContentHash: &[u8] = hash;
-    PairName: &str = str::parse;
-    FailureClass: &str = str::parse;
-    LengthUnit: &str = str::parse;
-    Reason: &str = str::parse;
-    ReviewOrder: &str = str::parse;
-    ThresholdMetric: &str = str::parse;
-    Verdict: &str = str::parse;
-    Affine2: &str = serde_json::from_str;
-    AttentionCheck: &str = serde_json::from_str;
-    PrintFromMesh: &str = serde_json::from_str;
+    PairId: integer = |id| Ok::<_, String>(Self(id));
+    WorkerId: integer = |id| Ok::<_, String>(Self(id));
+    FingerprintId: integer = |id| Ok::<_, String>(Self(id));
+    JobStatus: integer = status;
+    Stage: integer = stage;
+    ContentHash: blob = hash;
+    PairName: text = str::parse;
+    FailureClass: text = str::parse;
+    LengthUnit: text = str::parse;
+    Reason: text = str::parse;
+    ReviewOrder: text = str::parse;
+    ThresholdMetric: text = str::parse;
+    Verdict: text = str::parse;
+    Affine2: text = |text| serde_json::from_str(text);
+    AttentionCheck: text = |text| serde_json::from_str(text);
+    PrintFromMesh: text = |text| serde_json::from_str(text);
 }
 
 fn status(code: i64) -> Result<JobStatus, String> {

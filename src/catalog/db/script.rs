@@ -6,13 +6,13 @@ use std::marker::PhantomData;
 
 use futures_util::TryStreamExt as _;
 use serde::Serialize;
-use sqlx::sqlite::{SqliteArguments, SqliteRow};
-use sqlx::{
-    Arguments as _, AssertSqlSafe, Either, Encode, Executor as _, FromRow, Sqlite,
-    SqliteConnection, Type,
-};
+use sqlx::{AssertSqlSafe, Either, Executor as _};
 
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::sqlite_arguments;
+use crate::catalog::db::row::{FromRow, Row};
+use crate::catalog::db::value::Argument;
 
 /// SQL statements with their parameters. They run in order until one of them fails.
 ///
@@ -20,7 +20,7 @@ use crate::catalog::db::error::Result;
 #[derive(Debug, Default)]
 pub(crate) struct Script {
     sql: String,
-    parameters: SqliteArguments,
+    parameters: Vec<Argument>,
     statements: usize,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct Statement<T> {
 
 /// The rows of each statement of a script.
 #[derive(Debug)]
-pub(crate) struct ScriptRows(Vec<Vec<SqliteRow>>);
+pub(crate) struct ScriptRows(Vec<Vec<Row>>);
 
 impl Script {
     /// Adds a statement; its parameters are bound next.
@@ -52,12 +52,8 @@ impl Script {
     }
 
     /// Binds the next parameter.
-    pub(crate) fn bind<'t, T: Encode<'t, Sqlite> + Type<Sqlite>>(
-        &mut self,
-        value: T,
-    ) -> Result<()> {
-        let bound = self.parameters.add(value);
-        Ok(bound.map_err(sqlx::Error::Encode)?)
+    pub(crate) fn bind(&mut self, value: impl Into<Argument>) {
+        self.parameters.push(value.into());
     }
 
     /// Adds a statement whose parameter is a JSON array of the items. Returns `None`, and adds nothing, if there are no
@@ -77,7 +73,7 @@ impl Script {
         }
         array.push(']');
         let statement = self.add(sql);
-        self.bind(array)?;
+        self.bind(array);
         Ok(Some(statement))
     }
 
@@ -91,42 +87,43 @@ impl Script {
     }
 
     /// Runs all statements.
-    pub(crate) async fn run(self, conn: &mut SqliteConnection) -> Result<ScriptRows> {
-        // Concatenated constants only.
-        let query = sqlx::query_with(AssertSqlSafe(self.sql), self.parameters);
-        let mut results = conn.fetch_many(query);
-        let mut rows = vec![Vec::new()];
-        while let Some(result) = results.try_next().await? {
-            match result {
-                Either::Right(row) => {
-                    if let Some(rows) = rows.last_mut() {
-                        rows.push(row);
+    pub(crate) async fn run(self, conn: &mut Conn) -> Result<ScriptRows> {
+        match conn {
+            Conn::Sqlite(conn) => {
+                let parameters = sqlite_arguments(self.parameters)?;
+                // Concatenated constants only.
+                let query = sqlx::query_with(AssertSqlSafe(self.sql), parameters);
+                let mut results = conn.fetch_many(query);
+                let mut rows = vec![Vec::new()];
+                while let Some(result) = results.try_next().await? {
+                    match result {
+                        Either::Right(row) => {
+                            if let Some(rows) = rows.last_mut() {
+                                rows.push(Row::Sqlite(row));
+                            }
+                        }
+                        // The end of a statement.
+                        Either::Left(_) => rows.push(Vec::new()),
                     }
                 }
-                // The end of a statement.
-                Either::Left(_) => rows.push(Vec::new()),
+                Ok(ScriptRows(rows))
             }
         }
-        Ok(ScriptRows(rows))
     }
 }
 
 impl ScriptRows {
     /// Reads the rows of a statement.
-    pub(crate) fn read<T>(&self, statement: &Statement<T>) -> Result<Vec<T>>
-    where
-        T: for<'r> FromRow<'r, SqliteRow>,
-    {
+    pub(crate) fn read<T: FromRow>(&self, statement: &Statement<T>) -> Result<Vec<T>> {
         let rows = self.0.get(statement.index).into_iter().flatten();
-        let rows = rows.map(T::from_row).collect::<Result<Vec<T>, _>>();
-        Ok(rows?)
+        rows.map(T::from_row).collect()
     }
 
     /// Reads the rows of a statement that may have been left out.
-    pub(crate) fn read_if_any<T>(&self, statement: Option<&Statement<T>>) -> Result<Vec<T>>
-    where
-        T: for<'r> FromRow<'r, SqliteRow>,
-    {
+    pub(crate) fn read_if_any<T: FromRow>(
+        &self,
+        statement: Option<&Statement<T>>,
+    ) -> Result<Vec<T>> {
         statement.map_or_else(|| Ok(Vec::new()), |statement| self.read(statement))
     }
 }
@@ -139,19 +136,18 @@ impl<T> fmt::Debug for Statement<T> {
 
 #[cfg(test)]
 mod tests {
-    use sqlx::{Connection as _, SqliteConnection};
-
     use super::{Script, Statement};
+    use crate::catalog::db::conn::Conn;
+    use crate::catalog::db::query::query_scalar;
 
     #[tokio::test]
     async fn each_statement_has_its_own_parameters_and_rows() {
-        let conn = SqliteConnection::connect("sqlite::memory:").await;
-        let mut conn = conn.expect("a database");
+        let mut conn = Conn::in_memory().await;
         let mut script = Script::default();
         script.execute("CREATE TABLE t (a, b)");
         script.execute("INSERT INTO t VALUES (?, ?)");
-        script.bind(1).expect("bound");
-        script.bind("x").expect("bound");
+        script.bind(1_i64);
+        script.bind("x");
         let items: Statement<(i64,)> = script
             .add_over(
                 "INSERT INTO t SELECT value, 'y' FROM json_each(?) WHERE true RETURNING a",
@@ -163,8 +159,8 @@ mod tests {
         assert!(none.expect("bound").is_none());
         let last: Statement<(String, i64)> =
             script.add("SELECT b, a FROM t WHERE a = ? UNION ALL SELECT b, ? FROM t WHERE a = 1");
-        script.bind(7).expect("bound");
-        script.bind(12).expect("bound");
+        script.bind(7_i64);
+        script.bind(12_i64);
         let rows = script.run(&mut conn).await.expect("rows");
         assert_eq!(rows.read(&items).expect("numbers"), [(7,), (8,)]);
         let wanted = [("y".to_owned(), 7), ("x".to_owned(), 12)];
@@ -173,8 +169,7 @@ mod tests {
 
     #[tokio::test]
     async fn statements_after_one_that_fails_do_not_run() {
-        let conn = SqliteConnection::connect("sqlite::memory:").await;
-        let mut conn = conn.expect("a database");
+        let mut conn = Conn::in_memory().await;
         let mut script = Script::default();
         for sql in [
             "CREATE TABLE t (a UNIQUE)",
@@ -185,7 +180,7 @@ mod tests {
             script.execute(sql);
         }
         assert!(script.run(&mut conn).await.is_err());
-        let left = sqlx::query_scalar::<_, i64>("SELECT count(*) FROM t");
+        let left = query_scalar::<i64>("SELECT count(*) FROM t");
         assert_eq!(left.fetch_one(&mut conn).await.expect("the table"), 1);
     }
 }

@@ -5,24 +5,26 @@ use std::path::Path;
 use std::pin::Pin;
 use std::sync::Arc;
 
-use sqlx::{Connection as _, SqliteConnection};
+use sqlx::Connection as _;
 
 use crate::catalog::db::busy_retry::retry_while_busy;
+use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::Result;
 use crate::catalog::db::log_watch::LogWatch;
+use crate::catalog::db::query::query;
 
 /// A future that borrows the write connection.
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 
 /// The write connection, and the log that its commits go to.
 pub(crate) struct WriteConnection {
-    pub(crate) conn: SqliteConnection,
+    pub(crate) conn: Conn,
     pub(crate) path: Arc<Path>,
     log: LogWatch,
 }
 
 impl WriteConnection {
-    pub(crate) fn new(conn: SqliteConnection, path: Arc<Path>) -> Self {
+    pub(crate) fn new(conn: Conn, path: Arc<Path>) -> Self {
         let log = LogWatch::new(&path);
         Self { conn, path, log }
     }
@@ -32,13 +34,14 @@ impl WriteConnection {
     /// # Errors
     /// Returns an error if another program deleted, replaced or cut the log.
     pub(crate) async fn check_log(&mut self) -> Result<()> {
-        self.log.check(&mut self.conn).await
+        let Conn::Sqlite(conn) = &mut self.conn;
+        self.log.check(conn).await
     }
 
     /// Runs `work` in a separate transaction. Rolls it back if `work` or the commit fails.
     pub(crate) async fn run_transaction<T>(
         &mut self,
-        work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
+        work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>>,
     ) -> Result<T> {
         self.check_log().await?;
         let Self { conn, path, .. } = self;
@@ -58,30 +61,33 @@ impl WriteConnection {
 
     /// Checkpoints the log, unless it is lost.
     pub(crate) async fn checkpoint_log(&mut self, pragma: &'static str) {
-        self.log.checkpoint(&mut self.conn, pragma).await;
+        let Conn::Sqlite(conn) = &mut self.conn;
+        self.log.checkpoint(conn, pragma).await;
     }
 
     /// Checkpoints the log and closes the connection.
     pub(crate) async fn close(mut self) {
         self.checkpoint_log("PRAGMA wal_checkpoint(TRUNCATE)").await;
+        let Conn::Sqlite(Held::Owned(conn)) = self.conn else {
+            return;
+        };
         if self.log.is_lost() {
             // Closing would copy pages of the damaged log to the catalog. Exiting without closing does not.
-            std::mem::forget(self.conn);
-        } else if let Err(error) = self.conn.close().await {
+            std::mem::forget(conn);
+        } else if let Err(error) = conn.close().await {
             tracing::warn!(%error, "the catalog did not close cleanly");
         }
     }
 }
 
 /// Rolls the current transaction back.
-pub(crate) async fn rollback(conn: &mut SqliteConnection) {
+pub(crate) async fn rollback(conn: &mut Conn) {
     // SQLite has already rolled back after some errors, such as a full disk.
     if let Err(error) = execute(conn, "ROLLBACK").await {
         tracing::debug!(%error, "nothing to roll back");
     }
 }
 
-async fn execute(conn: &mut SqliteConnection, sql: &'static str) -> Result<()> {
-    sqlx::query(sql).execute(conn).await?;
-    Ok(())
+async fn execute(conn: &mut Conn, sql: &'static str) -> Result<()> {
+    query(sql).execute(conn).await
 }

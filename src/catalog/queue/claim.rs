@@ -94,9 +94,9 @@ pub(crate) fn add_heartbeat(
     heartbeat: Heartbeat,
 ) -> Result<Statement<(i64,)>> {
     let statement = script.add(HEARTBEAT);
-    script.bind(heartbeat.now)?;
-    script.bind(heartbeat.worker.0)?;
-    script.bind(heartbeat.alive_since)?;
+    script.bind(heartbeat.now);
+    script.bind(heartbeat.worker.0);
+    script.bind(heartbeat.alive_since);
     Ok(statement)
 }
 
@@ -111,17 +111,17 @@ pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<S
         Some(_) => script.add(CLAIM_AMONG),
         None => script.add(CLAIM),
     };
-    script.bind(request.worker.0)?;
-    script.bind(request.deadline)?;
+    script.bind(request.worker.0);
+    script.bind(request.deadline);
     if let Some(among) = &request.among {
-        script.bind(among.json.clone())?;
+        script.bind(among.json.clone());
     }
-    script.bind(cursor(request.until))?;
-    script.bind(i64::from(request.exclusive))?;
-    script.bind(slots as i64)?;
-    script.bind(request.worker.0)?;
-    script.bind(request.alive_since)?;
-    script.bind(i64::from(request.exclusive))?;
+    script.bind(cursor(request.until));
+    script.bind(i64::from(request.exclusive));
+    script.bind(slots as i64);
+    script.bind(request.worker.0);
+    script.bind(request.alive_since);
+    script.bind(i64::from(request.exclusive));
     Ok(statement)
 }
 

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use serde_json::json;
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::query_as;
+use crate::catalog::db::row::from_row;
 use crate::catalog::db::script::Script;
 use crate::domain::{JobStatus, Stage};
 
@@ -28,14 +30,15 @@ pub(crate) const fn cursor(stage: Stage) -> Cursor {
 }
 
 /// Key of a counter. Jobs with the same key are counted together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct CounterKey {
-    #[sqlx(rename = "stage")]
     pub(crate) cursor: Cursor,
     pub(crate) status: JobStatus,
     /// Fingerprint of the result before the cursor, or 0 if there is none.
     pub(crate) fingerprint: i64,
 }
+
+from_row! { CounterKey { cursor: "stage", status, fingerprint } }
 
 impl CounterKey {
     /// The key of a new job.
@@ -68,20 +71,22 @@ impl CounterKey {
 }
 
 /// A job with its counter key.
-#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct KeyedJob {
     pub(crate) pair: i64,
-    #[sqlx(flatten)]
     pub(crate) key: CounterKey,
 }
 
+from_row! { KeyedJob { pair, key in row } }
+
 /// A number of jobs that are counted together.
-#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct JobGroup {
-    #[sqlx(flatten)]
     pub(crate) key: CounterKey,
     pub(crate) n: u64,
 }
+
+from_row! { JobGroup { key in row, n } }
 
 /// Changes of the counters, collected over a transaction.
 #[derive(Debug, Default)]
@@ -100,7 +105,7 @@ impl Deltas {
     }
 
     /// Stores the changes.
-    pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<()> {
+    pub(crate) async fn apply(&self, conn: &mut Conn) -> Result<()> {
         let mut script = Script::default();
         self.add_to(&mut script)?;
         script.run(conn).await?;
@@ -120,8 +125,8 @@ impl Deltas {
 pub type JobCounts = BTreeMap<(i64, JobStatus), u64>;
 
 /// Reads the counters that are not 0.
-pub(crate) async fn counters(conn: &mut SqliteConnection) -> Result<BTreeMap<CounterKey, u64>> {
-    let found: Vec<JobGroup> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
+pub(crate) async fn counters(conn: &mut Conn) -> Result<BTreeMap<CounterKey, u64>> {
+    let found: Vec<JobGroup> = query_as(COUNTERS).fetch_all(conn).await?;
     Ok(found
         .into_iter()
         .map(|group| (group.key, group.n))

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::catalog::db::error::Result;
+use crate::catalog::db::row::from_row;
 use crate::catalog::db::script::{Script, Statement};
 use crate::catalog::queue::checkpoint::add_inputs;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
@@ -50,13 +51,13 @@ DELETE FROM attempt WHERE id IN (
     WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?))";
 
 /// A row of [`FAIL`]: a job with its token and new counter key.
-#[derive(sqlx_macros::FromRow)]
 pub(crate) struct FailedRow {
     pub(crate) pair: i64,
     pub(crate) token: i64,
-    #[sqlx(flatten)]
     key: CounterKey,
 }
+
+from_row! { FailedRow { pair, token, key in row } }
 
 /// Returns the row for a lease, or `None` if the lease was lost.
 pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r FailedRow> {
@@ -85,7 +86,7 @@ pub(crate) fn add_failure_records(
     script.execute_over(FAILURE, items())?;
     script.execute_over(ATTEMPT, items())?;
     script.execute_over(PRUNE, items())?;
-    script.bind(ATTEMPTS_KEPT)?;
+    script.bind(ATTEMPTS_KEPT);
     let inputs = failed.iter().map(|(item, _)| (item.0.pair, &item.1.inputs));
     add_inputs(script, inputs)?;
     for ((lease, _), row) in failed {

@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Map, Value, json};
-use sqlx::SqliteConnection;
-use sqlx::types::Json;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::rows::json_array;
+use crate::catalog::db::value::Json;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::catalog::{Catalog, Result};
@@ -97,14 +98,14 @@ impl Catalog {
                 let mut ids = [FingerprintId(0); 4];
                 for stage in Stage::ALL {
                     let fingerprint = fingerprints.of(stage);
-                    let id = sqlx::query_scalar(INSERT)
+                    let id = query_scalar(INSERT)
                         .bind(stage.index() as i64)
                         .bind(&fingerprint.hash.as_bytes()[..])
                         .bind(fingerprint.fields.to_string())
                         .bind(upstream)
                         .fetch_one(&mut *conn)
                         .await?;
-                    let counters = sqlx::query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
+                    let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
                     counters.bind(id).execute(&mut *conn).await?;
                     ids[stage.index()] = id;
                     upstream = Some(id);
@@ -129,8 +130,8 @@ impl Catalog {
         let mut changes = Vec::new();
         for (stage, hash) in Stage::ALL.into_iter().zip(hash_line.split_whitespace()) {
             let sql = "SELECT fields FROM fingerprint WHERE hash = unhex(?1)";
-            let fields = sqlx::query_scalar(sql).bind(hash);
-            if let Some(Json(old)) = fields.fetch_optional(&mut *conn).await? {
+            let fields = query_scalar(sql).bind(hash);
+            if let Some(Json(old)) = fields.fetch_optional(&mut conn).await? {
                 changes.extend(differences(stage, &old, &fingerprints.of(stage).fields));
             }
         }
@@ -140,12 +141,12 @@ impl Catalog {
 
 /// Returns the ids of the fingerprints. `None` marks a fingerprint that is not stored.
 pub(crate) async fn known(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     fingerprints: &Fingerprints,
 ) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        let query = sqlx::query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
+        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
         let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
         *id = query.fetch_optional(&mut *conn).await?;
     }
@@ -154,18 +155,15 @@ pub(crate) async fn known(
 
 /// Returns the ids of the four fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
 /// matches no result.
-pub(crate) async fn current_json(
-    conn: &mut SqliteConnection,
-    fingerprints: &Fingerprints,
-) -> Result<String> {
+pub(crate) async fn current_json(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<String> {
     let ids = known(conn, fingerprints).await?;
     let ids = ids.iter().map(|id| id.map_or(-1, |FingerprintId(id)| id));
     Ok(json_array(ids))
 }
 
 /// Reads the settings of a fingerprint.
-pub(crate) async fn fields_of(conn: &mut SqliteConnection, id: FingerprintId) -> Result<Value> {
-    let query = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1").bind(id);
+pub(crate) async fn fields_of(conn: &mut Conn, id: FingerprintId) -> Result<Value> {
+    let query = query_scalar("SELECT fields FROM fingerprint WHERE id = ?1").bind(id);
     let Json(fields) = query.fetch_one(conn).await?;
     Ok(fields)
 }
@@ -179,12 +177,9 @@ pub(crate) struct FingerprintChains {
 
 impl FingerprintChains {
     /// Reads all fingerprints. Each combination of settings has added at most four.
-    pub(crate) async fn load(
-        conn: &mut SqliteConnection,
-        fingerprints: &Fingerprints,
-    ) -> Result<Self> {
+    pub(crate) async fn load(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<Self> {
         let current = known(conn, fingerprints).await?;
-        let query = sqlx::query_as("SELECT id, stage, upstream FROM fingerprint");
+        let query = query_as("SELECT id, stage, upstream FROM fingerprint");
         let found: Vec<(_, _, _)> = query.fetch_all(conn).await?;
         let stored = found.into_iter();
         Ok(Self {

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 
 /// Pairs counted in one statement.
@@ -18,23 +18,20 @@ GROUP BY stage, status, job.fingerprint";
 pub(crate) const NEXT_PAIR: &str = "SELECT min(pair) FROM job WHERE pair > ?1";
 
 /// Counts all jobs. In a transaction, all counts are of the same moment.
-pub(crate) async fn count_jobs(conn: &mut SqliteConnection) -> Result<BTreeMap<CounterKey, u64>> {
+pub(crate) async fn count_jobs(conn: &mut Conn) -> Result<BTreeMap<CounterKey, u64>> {
     count_in_ranges(conn, RANGE).await
 }
 
-async fn count_in_ranges(
-    conn: &mut SqliteConnection,
-    range: i64,
-) -> Result<BTreeMap<CounterKey, u64>> {
+async fn count_in_ranges(conn: &mut Conn, range: i64) -> Result<BTreeMap<CounterKey, u64>> {
     let mut counts = BTreeMap::new();
     let mut after = i64::MIN;
     loop {
-        let next = sqlx::query_scalar(NEXT_PAIR).bind(after);
+        let next = query_scalar(NEXT_PAIR).bind(after);
         let Some(from) = next.fetch_one(&mut *conn).await? else {
             return Ok(counts);
         };
         let to = i64::saturating_add(from, range - 1);
-        let query = sqlx::query_as(COUNT_RANGE).bind(from).bind(to);
+        let query = query_as(COUNT_RANGE).bind(from).bind(to);
         let found: Vec<JobGroup> = query.fetch_all(&mut *conn).await?;
         for group in found {
             *counts.entry(group.key).or_default() += group.n;
@@ -45,34 +42,27 @@ async fn count_in_ranges(
 
 #[cfg(test)]
 mod tests {
+    use super::{RANGE, count_in_ranges};
+    use crate::catalog::db::conn::Conn;
+    use crate::catalog::db::query::{query, query_as};
     use proptest::collection::btree_map;
     use proptest::prelude::*;
-    use sqlx::{Connection as _, SqliteConnection};
-
-    use super::{RANGE, count_in_ranges};
 
     /// Stage, status, fingerprint, number of jobs.
     type Row = (i64, i64, i64, i64);
 
     async fn at_once_and_by_ranges(jobs: &[(i64, i64)], range: i64) -> (Vec<Row>, Vec<Row>) {
-        let conn = SqliteConnection::connect("sqlite::memory:").await;
-        let mut conn = conn.expect("a database");
+        let mut conn = Conn::in_memory().await;
         let table = "CREATE TABLE job (pair INTEGER PRIMARY KEY, stage, status, fingerprint)";
-        sqlx::query(table)
-            .execute(&mut conn)
-            .await
-            .expect("a table");
+        query(table).execute(&mut conn).await.expect("a table");
         for (pair, kind) in jobs {
             let sql = "INSERT INTO job VALUES (?1, ?2 % 3, ?2 % 2, iif(?2 < 3, NULL, ?2))";
-            let insert = sqlx::query(sql).bind(pair).bind(kind);
+            let insert = query(sql).bind(*pair).bind(*kind);
             insert.execute(&mut conn).await.expect("a row");
         }
         let all = "SELECT stage, status, coalesce(fingerprint, 0), count(*) FROM job
             GROUP BY 1, 2, 3 ORDER BY 1, 2, 3";
-        let at_once = sqlx::query_as(all)
-            .fetch_all(&mut conn)
-            .await
-            .expect("rows");
+        let at_once = query_as(all).fetch_all(&mut conn).await.expect("rows");
         let ranges = count_in_ranges(&mut conn, range).await.expect("counts");
         let ranges = ranges.into_iter().map(|(key, n)| {
             let n = i64::try_from(n).expect("few");

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::catalog::db::row::from_row;
 use crate::catalog::queue::counters::{CounterKey, cursor};
 use crate::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, Stage, UnixMillis,
@@ -13,21 +14,21 @@ use crate::domain::{
 ///
 /// `token` is the fencing token. Each claim, recovery and repair increases the job's token, so a write under
 /// an older lease changes nothing.
-#[derive(Debug, sqlx_macros::FromRow)]
+#[derive(Debug)]
 pub struct Lease {
     pub(crate) pair: PairId,
     pub(crate) worker: WorkerId,
     pub(crate) token: i64,
-    #[sqlx(rename = "stage")]
     pub(crate) cursor: Stage,
     /// Fingerprint of the result before the cursor.
     pub(crate) fingerprint: Option<FingerprintId>,
     pub(crate) attempt: u32,
     pub(crate) exclusive: bool,
     /// Whether a stage was stored under this lease, which removed the pair's failure.
-    #[sqlx(skip)]
     pub(crate) cleared: bool,
 }
+
+from_row! { Lease { pair, worker, token, cursor: "stage", fingerprint, attempt, exclusive, cleared = false } }
 
 impl Lease {
     /// Returns the pair.
@@ -64,11 +65,13 @@ impl Lease {
 }
 
 /// A job that was changed under a lease, with the token of that lease.
-#[derive(Debug, Clone, Copy, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct FencedRow {
     pub(crate) pair: i64,
     pub(crate) token: i64,
 }
+
+from_row! { FencedRow { pair, token } }
 
 /// The state of a lease after a checkpoint.
 #[derive(Debug)]
@@ -188,8 +191,5 @@ pub struct StageFailure {
 }
 
 /// Row id of a fingerprint.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, sqlx_macros::Type,
-)]
-#[sqlx(transparent)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct FingerprintId(pub(crate) i64);

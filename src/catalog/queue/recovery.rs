@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use serde_json::json;
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
 use crate::catalog::queue::checkpoint::UPDATE_INPUTS;
@@ -14,15 +16,16 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LeaseHolder {
     /// The worker.
-    #[sqlx(rename = "id")]
     pub worker: WorkerId,
     /// Last heartbeat of the worker, by its own clock. Compare it only with other heartbeats of the same worker,
     /// because clocks may differ.
     pub heartbeat: UnixMillis,
 }
+
+from_row! { LeaseHolder { worker: "id", heartbeat } }
 
 /// The result of a recovery.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -112,12 +115,12 @@ UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 
 FROM json_each(?) AS item WHERE failure.pair = item.value ->> 0";
 
 /// A row of [`RECOVER`] or [`OVERDUE`].
-#[derive(sqlx_macros::FromRow)]
 struct RecoveredJob {
-    #[sqlx(flatten)]
     job: KeyedJob,
     crashes: i64,
 }
+
+from_row! { RecoveredJob { job in row, crashes } }
 
 impl Catalog {
     /// Returns the workers that hold leases.
@@ -126,7 +129,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
-        Ok(sqlx::query_as(HOLDERS).fetch_all(&mut *conn).await?)
+        Ok(query_as(HOLDERS).fetch_all(&mut conn).await?)
     }
 
     /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused
@@ -143,8 +146,8 @@ impl Catalog {
                 let workers = mark_dead(conn, &dead).await?;
                 let affected = affected_pairs(conn, &workers).await?;
                 let items = left_by(conn, &workers).await?;
-                let deaths: i64 = sqlx::query_scalar(DEATHS).fetch_one(&mut *conn).await?;
-                let query = sqlx::query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
+                let deaths: i64 = query_scalar(DEATHS).fetch_one(&mut *conn).await?;
+                let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
                 let found = query.bind(deaths).fetch_all(&mut *conn).await?;
                 count_recovered(conn, found, &affected, now).await
             })
@@ -188,21 +191,21 @@ impl Catalog {
 }
 
 async fn overdue(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     me: WorkerId,
     margin_ms: i64,
     now: UnixMillis,
 ) -> Result<Recovered> {
     let others = holders_but(conn, me).await?;
     let affected = affected_pairs(conn, &others).await?;
-    let query = sqlx::query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
+    let query = query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
     let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
     count_recovered(conn, found, &affected, now).await
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
-async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
-    let query = sqlx::query_as(LEFT_BY).bind(workers);
+async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
+    let query = query_as(LEFT_BY).bind(workers);
     let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
@@ -212,38 +215,38 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
 }
 
 /// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
-async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
+async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {
             let workers = json_array(workers.iter().map(|worker| worker.0));
-            sqlx::query(DIED).bind(&workers).execute(conn).await?;
+            query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
         }
         DeadWorker::AllExcept(me) => {
-            sqlx::query(ALL_DIED).bind(me.0).execute(&mut *conn).await?;
+            query(ALL_DIED).bind(me.0).execute(&mut *conn).await?;
             holders_but(conn, *me).await
         }
     }
 }
 
 /// Returns the workers with leases except one, as a JSON array.
-async fn holders_but(conn: &mut SqliteConnection, me: WorkerId) -> Result<String> {
-    let holders: Vec<LeaseHolder> = sqlx::query_as(HOLDERS).fetch_all(conn).await?;
+async fn holders_but(conn: &mut Conn, me: WorkerId) -> Result<String> {
+    let holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(conn).await?;
     let others = holders.iter().map(|holder| holder.worker);
     let others = others.filter(|worker| *worker != me);
     Ok(json_array(others.map(|worker| worker.0)))
 }
 
 /// Returns the leased pairs of some workers, each with its worker.
-async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<i64, i64>> {
-    let query = sqlx::query_as(AFFECTED_PAIRS).bind(workers);
+async fn affected_pairs(conn: &mut Conn, workers: &str) -> Result<BTreeMap<i64, i64>> {
+    let query = query_as(AFFECTED_PAIRS).bind(workers);
     let found: Vec<(i64, i64)> = query.fetch_all(conn).await?;
     Ok(found.into_iter().collect())
 }
 
 /// Updates the counters for recovered pairs, and stores a failure for each quarantined pair.
 async fn count_recovered(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     found: Vec<RecoveredJob>,
     affected: &BTreeMap<i64, i64>,
     now: UnixMillis,
@@ -268,7 +271,7 @@ async fn count_recovered(
     if !crashed.is_empty() {
         let items = json_array(crashed);
         for sql in [CRASHED, CRASH_ATTEMPT] {
-            sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
+            query(sql).bind(&items).execute(&mut *conn).await?;
         }
     }
     deltas.apply(conn).await?;

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use serde_json::json;
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::write_connection::Work;
 use crate::catalog::queue::counters::{CounterKey, Deltas, KeyedJob};
@@ -103,7 +104,7 @@ impl Catalog {
     /// pair of the page.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
-        F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>
+        F: for<'c> Fn(&'c mut Conn, i64) -> Work<'c, Result<(u64, Option<i64>)>>
             + Clone
             + Send
             + 'static,
@@ -138,8 +139,8 @@ impl Catalog {
 }
 
 /// Returns an error unless the groups contain all jobs. A wrong counter could hide stale jobs.
-async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]) -> Result<()> {
-    let jobs: i64 = sqlx::query_scalar("SELECT count(*) FROM job")
+async fn assert_complete(conn: &mut Conn, groups: &[(StaleJob, u64)]) -> Result<()> {
+    let jobs: i64 = query_scalar("SELECT count(*) FROM job")
         .fetch_one(conn)
         .await?;
     let (jobs, counted) = (jobs.unsigned_abs(), groups.iter().map(|(_, n)| n).sum());
@@ -162,12 +163,12 @@ fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
 
 /// Requeues one page of a group: jobs whose pairs follow `after`. Returns their number, and the last pair of the page.
 async fn requeue_group(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     key: CounterKey,
     to: Stage,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let pairs: Vec<i64> = sqlx::query_scalar(MEMBERS)
+    let pairs: Vec<i64> = query_scalar(MEMBERS)
         .bind(after)
         .bind(key.cursor)
         .bind(key.status.code())
@@ -184,7 +185,7 @@ async fn requeue_group(
 /// last pair of the page. If `among` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
 /// consistent again.
 async fn requeue_inspected(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     current: String,
     among: Option<PairSelection>,
     policy: RerunPolicy,
@@ -209,32 +210,29 @@ async fn requeue_inspected(
     Ok((moved, last))
 }
 
-async fn failed_jobs(
-    conn: &mut SqliteConnection,
-    selection: &RetrySelection,
-) -> Result<Vec<KeyedJob>> {
+async fn failed_jobs(conn: &mut Conn, selection: &RetrySelection) -> Result<Vec<KeyedJob>> {
     let query = match selection {
-        RetrySelection::All => sqlx::query_as(FAILED_JOBS).bind(None::<&str>),
-        RetrySelection::Class(class) => sqlx::query_as(FAILED_JOBS).bind(class.name()),
+        RetrySelection::All => query_as(FAILED_JOBS).bind(None::<&str>),
+        RetrySelection::Class(class) => query_as(FAILED_JOBS).bind(class.name()),
         RetrySelection::Names(names) => {
             if let Some(unknown) = unknown_names(conn, names).await?.into_iter().next() {
                 return Err(CatalogError::UnknownPair(unknown));
             }
-            sqlx::query_as(FAILED_AMONG).bind(select(conn, names).await?.json)
+            query_as(FAILED_AMONG).bind(select(conn, names).await?.json)
         }
     };
     Ok(query.fetch_all(conn).await?)
 }
 
 /// Resets each job to the given stage, except leased jobs. Returns the number of changed jobs.
-async fn requeue(conn: &mut SqliteConnection, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
+async fn requeue(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
     if jobs.is_empty() {
         return Ok(0);
     }
     let items = json_array(jobs.iter().map(|(job, to)| json!([job.pair, to.index()])));
-    let query = sqlx::query_as(REQUEUE).bind(&items);
-    let moved: Vec<KeyedJob> = query.fetch_all(&mut *conn).await?;
-    let clear = sqlx::query(CLEAR_FAILURES).bind(&items);
+    let moved = query_as(REQUEUE).bind(&items);
+    let moved: Vec<KeyedJob> = moved.fetch_all(&mut *conn).await?;
+    let clear = query(CLEAR_FAILURES).bind(&items);
     clear.execute(&mut *conn).await?;
     let from: BTreeMap<i64, CounterKey> = jobs.iter().map(|(job, _)| (job.pair, job.key)).collect();
     let mut deltas = Deltas::default();

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::queue::fingerprint::{
     FingerprintChains, Fingerprints, current_json, differences, fields_of,
 };
@@ -64,7 +63,7 @@ impl Catalog {
 }
 
 async fn plan(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     fingerprints: &Fingerprints,
     among: Option<&PairSelection>,
     policy: RerunPolicy,

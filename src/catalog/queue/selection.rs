@@ -1,8 +1,8 @@
 //! Selections of pairs.
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::query_scalar;
 use crate::catalog::db::rows::{json_array, names_json};
 use crate::domain::{PairId, PairName};
 
@@ -35,23 +35,17 @@ impl PairSelection {
 }
 
 /// Selects pairs by name; unknown names are left out.
-pub(crate) async fn select(
-    conn: &mut SqliteConnection,
-    names: &[PairName],
-) -> Result<PairSelection> {
+pub(crate) async fn select(conn: &mut Conn, names: &[PairName]) -> Result<PairSelection> {
     let sql = "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id";
-    let query = sqlx::query_scalar(sql).bind(names_json(names));
+    let query = query_scalar(sql).bind(names_json(names));
     let pairs: Vec<PairId> = query.fetch_all(conn).await?;
     Ok(PairSelection::of(&pairs))
 }
 
 /// Returns the names that are not pairs, in the order given.
-pub(crate) async fn unknown_names(
-    conn: &mut SqliteConnection,
-    names: &[PairName],
-) -> Result<Vec<PairName>> {
+pub(crate) async fn unknown_names(conn: &mut Conn, names: &[PairName]) -> Result<Vec<PairName>> {
     let sql = "SELECT value FROM json_each(?1) AS given
         WHERE NOT EXISTS (SELECT 1 FROM pair WHERE name = given.value) ORDER BY given.id";
-    let query = sqlx::query_scalar(sql).bind(names_json(names));
+    let query = query_scalar(sql).bind(names_json(names));
     Ok(query.fetch_all(conn).await?)
 }

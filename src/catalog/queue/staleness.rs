@@ -8,10 +8,10 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::sqlite::SqliteRow;
-use sqlx::{FromRow as _, Row as _, SqliteConnection};
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::row::{FromRow as _, Row};
 use crate::catalog::queue::counters::{CounterKey, Cursor, counters};
 use crate::catalog::queue::fingerprint::FingerprintChains;
 use crate::catalog::queue::fragments::inconsistent;
@@ -121,50 +121,50 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
 
 /// Inspects one page of selected jobs whose pairs follow `after`. Returns each job with its pair.
 pub(crate) async fn inspect(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     current: &str,
     after: i64,
     among: &PairSelection,
 ) -> Result<Vec<(i64, StaleJob)>> {
-    let query = sqlx::query(INSPECT).bind(current).bind(after);
+    let query = query(INSPECT).bind(current).bind(after);
     let query = query.bind(PAGE as i64).bind(&among.json);
     query.fetch_all(conn).await?.iter().map(stale_job).collect()
 }
 
-fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
-    let change = match row.try_get("first")? {
+fn stale_job(row: &Row) -> Result<(i64, StaleJob)> {
+    let change = match row.get("first")? {
         Some(stage) => Some((stage, change(row, stage)?)),
         None => None,
     };
     let job = StaleJob {
         key: CounterKey::from_row(row)?,
         change,
-        failure_is_outdated: row.try_get("failure_is_outdated")?,
+        failure_is_outdated: row.get("failure_is_outdated")?,
     };
-    Ok((row.try_get("pair")?, job))
+    Ok((row.get("pair")?, job))
 }
 
 /// Returns why the first outdated result is outdated. Changed inputs take precedence over changed settings.
-fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
-    Ok(if row.try_get("mesh")? {
+fn change(row: &Row, stage: Stage) -> Result<StaleReason> {
+    Ok(if row.get("mesh")? {
         StaleReason::Mesh
-    } else if row.try_get("print")? {
+    } else if row.get("print")? {
         StaleReason::Print
-    } else if row.try_get("attributes")? {
+    } else if row.get("attributes")? {
         StaleReason::Manifest
     } else {
-        let old = row.try_get("old")?;
+        let old = row.get("old")?;
         StaleReason::Settings { stage, old }
     })
 }
 
 /// Inspects one page of dirty or quarantined jobs after a pair. Also returns the page's last pair, if any.
 pub(crate) async fn inspect_marked(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     current: &str,
     after: i64,
 ) -> Result<(Vec<(i64, StaleJob)>, Option<i64>)> {
-    let query = sqlx::query_scalar(MARKED).bind(after).bind(PAGE as i64);
+    let query = query_scalar(MARKED).bind(after).bind(PAGE as i64);
     let page: Vec<PairId> = query.fetch_all(&mut *conn).await?;
     let Some(last) = page.last() else {
         return Ok((Vec::new(), None));
@@ -179,7 +179,7 @@ pub(crate) async fn inspect_marked(
 /// A requeued job moves to an earlier group, or stays in its group. Therefore a pass over the groups, each in the order
 /// of pairs, handles each job only once.
 pub(crate) async fn groups(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     chains: &FingerprintChains,
 ) -> Result<Vec<(StaleJob, u64)>> {
     let counted = counters(conn).await?;
@@ -203,7 +203,7 @@ fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stag
 
 /// Passes every job to `each` exactly once, as a state and the number of jobs in that state.
 pub(crate) async fn inspect_all(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     current: &str,
     chains: &FingerprintChains,
     mut each: impl FnMut(&StaleJob, u64),
@@ -229,14 +229,14 @@ pub(crate) async fn inspect_all(
 }
 
 /// Counts the pairs that have a result with outdated settings or inputs.
-pub(crate) async fn count_stale(conn: &mut SqliteConnection, current: &str) -> Result<u64> {
-    let query = sqlx::query_scalar(COUNT_STALE).bind(current);
+pub(crate) async fn count_stale(conn: &mut Conn, current: &str) -> Result<u64> {
+    let query = query_scalar(COUNT_STALE).bind(current);
     Ok(query.fetch_one(conn).await?)
 }
 
 /// Unmarks dirty jobs whose results are consistent again, in a range of pairs.
-pub(crate) async fn clear_dirty(conn: &mut SqliteConnection, after: i64, last: i64) -> Result<()> {
-    let query = sqlx::query(CLEAR_DIRTY).bind(after).bind(last);
+pub(crate) async fn clear_dirty(conn: &mut Conn, after: i64, last: i64) -> Result<()> {
+    let query = query(CLEAR_DIRTY).bind(after).bind(last);
     query.execute(conn).await?;
     Ok(())
 }

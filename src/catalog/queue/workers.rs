@@ -1,7 +1,8 @@
 //! Worker registration, due back-offs and open work.
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::from_row;
 use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
@@ -20,7 +21,7 @@ pub struct WorkerInfo {
 }
 
 /// Numbers of pairs that have a stage to run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Outstanding {
     /// Pairs that are ready.
     pub ready: u64,
@@ -31,6 +32,8 @@ pub struct Outstanding {
     /// Time at which the first back-off ends.
     pub next_due: Option<UnixMillis>,
 }
+
+from_row! { Outstanding { ready, leased, backoff, next_due } }
 
 /// Numbers of stages that are still to run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -88,7 +91,7 @@ impl Catalog {
     pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                sqlx::query("UPDATE worker SET ended = ?2 WHERE id = ?1")
+                query("UPDATE worker SET ended = ?2 WHERE id = ?1")
                     .bind(worker.0)
                     .bind(now)
                     .execute(conn)
@@ -107,7 +110,7 @@ impl Catalog {
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let query = sqlx::query_as(DUE).bind(now).bind(now + longest);
+                let query = query_as(DUE).bind(now).bind(now + longest);
                 let due: Vec<CounterKey> = query.fetch_all(&mut *conn).await?;
                 let mut deltas = Deltas::default();
                 for key in &due {
@@ -132,12 +135,10 @@ impl Catalog {
     ) -> Result<Outstanding> {
         let mut conn = self.read_conn().await?;
         let query = match among {
-            None => sqlx::query_as(LEFT_ALL).bind(cursor(until)),
-            Some(among) => sqlx::query_as(LEFT_AMONG)
-                .bind(cursor(until))
-                .bind(&among.json),
+            None => query_as(LEFT_ALL).bind(cursor(until)),
+            Some(among) => query_as(LEFT_AMONG).bind(cursor(until)).bind(&among.json),
         };
-        Ok(query.fetch_one(&mut *conn).await?)
+        Ok(query.fetch_one(&mut conn).await?)
     }
 
     /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
@@ -147,10 +148,10 @@ impl Catalog {
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
         let query = match among {
-            None => sqlx::query_as(COUNT_ALL),
-            Some(among) => sqlx::query_as(COUNT_AMONG).bind(&among.json),
+            None => query_as(COUNT_ALL),
+            Some(among) => query_as(COUNT_AMONG).bind(&among.json),
         };
-        let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut *conn).await?;
+        let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut conn).await?;
         let mut left = WorkLeft::default();
         for (at, status, n) in counted {
             if status == JobStatus::Quarantined {
@@ -167,12 +168,12 @@ impl Catalog {
 }
 
 async fn insert_worker(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     info: WorkerInfo,
     fingerprints: FingerprintIds,
     now: UnixMillis,
 ) -> Result<WorkerId> {
-    let id: i64 = sqlx::query_scalar(
+    let id: i64 = query_scalar(
         "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints)
         VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
     )

@@ -7,11 +7,12 @@
 //! have no such chain.
 
 use serde_json::json;
-use sqlx::error::BoxDynError;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Decode, Row as _, Sqlite, SqliteConnection, TypeInfo as _, ValueRef as _};
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
+use crate::catalog::db::value::Value;
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{ContentHash, enum_names};
 
@@ -197,44 +198,40 @@ const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
 const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
 
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
-pub(crate) async fn store(
-    conn: &mut SqliteConnection,
-    table: ChecksummedTable,
-    rows: &[i64],
-) -> Result<()> {
+pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]) -> Result<()> {
     let Some(first) = rows.iter().min() else {
         return Ok(());
     };
     let statements = table.statements();
     let mut before: Option<i64> = None;
     if statements.is_chained {
-        let last = sqlx::query_scalar(LAST).bind(table.code()).bind(first);
+        let last = query_scalar(LAST).bind(table.code()).bind(*first);
         before = last.fetch_optional(&mut *conn).await?;
     }
-    let listed = sqlx::query(statements.listed).bind(json_array(rows.iter().copied()));
+    let listed = query(statements.listed).bind(json_array(rows.iter().copied()));
     let mut checksums = Vec::new();
     for row in &listed.fetch_all(&mut *conn).await? {
         let value = checksum(table, row, before)?;
-        checksums.push(json!([row.try_get::<i64, _>(0)?, value]));
+        checksums.push(json!([row.get::<i64>(0)?, value]));
         before = statements.is_chained.then_some(value);
     }
-    let store = sqlx::query(STORE).bind(table.code());
+    let store = query(STORE).bind(table.code());
     store.bind(json_array(checksums)).execute(conn).await?;
     Ok(())
 }
 
 /// Returns the first 64 bits of a hash. The hash covers the table, the row's number, the previous checksum, and the
 /// columns from [`COVERED`] on.
-fn checksum(table: ChecksummedTable, row: &SqliteRow, before: Option<i64>) -> Result<i64> {
+fn checksum(table: ChecksummedTable, row: &Row, before: Option<i64>) -> Result<i64> {
     let mut bytes = Vec::with_capacity(512);
     bytes.extend(table.code().to_le_bytes());
-    bytes.extend(row.try_get::<i64, _>(0)?.to_le_bytes());
+    bytes.extend(row.get::<i64>(0)?.to_le_bytes());
     bytes.extend(before.unwrap_or(0).to_le_bytes());
     for column in COVERED..row.len() {
-        add_value(&mut bytes, row, column).map_err(|source| sqlx::Error::ColumnDecode {
-            index: column.to_string(),
-            source,
-        })?;
+        let value = row.value(column);
+        let value =
+            value.map_err(|error| CatalogError::Corrupt(format!("column {column}: {error}")))?;
+        add_value(&mut bytes, &value);
     }
     let hash = ContentHash::of(&bytes);
     let (first, _) = hash.as_bytes().split_at(8);
@@ -242,22 +239,17 @@ fn checksum(table: ChecksummedTable, row: &SqliteRow, before: Option<i64>) -> Re
 }
 
 /// Appends the type, the length and the bytes of a stored value. Text may be invalid UTF-8.
-fn add_value(bytes: &mut Vec<u8>, row: &SqliteRow, column: usize) -> Result<(), BoxDynError> {
-    let value = row.try_get_raw(column)?;
-    let type_info = value.type_info();
-    let name = type_info.name();
-    bytes.extend(name.as_bytes());
-    match name {
-        "NULL" => {}
-        "INTEGER" => bytes.extend(<i64 as Decode<Sqlite>>::decode(value)?.to_le_bytes()),
-        "REAL" => bytes.extend(<f64 as Decode<Sqlite>>::decode(value)?.to_le_bytes()),
-        _ => {
-            let content = <&[u8] as Decode<Sqlite>>::decode(value)?;
+fn add_value(bytes: &mut Vec<u8>, value: &Value<'_>) {
+    bytes.extend(value.type_name().as_bytes());
+    match value {
+        Value::Null => {}
+        Value::Integer(number) => bytes.extend(number.to_le_bytes()),
+        Value::Real(number) => bytes.extend(number.to_le_bytes()),
+        Value::Text(content) | Value::Blob(content) => {
             bytes.extend((content.len() as u64).to_le_bytes());
-            bytes.extend(content);
+            bytes.extend(&**content);
         }
     }
-    Ok(())
 }
 
 impl Catalog {
@@ -288,7 +280,7 @@ impl Catalog {
 }
 
 async fn faulty_rows(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     table: ChecksummedTable,
     faulty: &mut Vec<FaultyRow>,
 ) -> Result<()> {
@@ -301,24 +293,24 @@ async fn faulty_rows(
     };
     let mut after = i64::MIN;
     loop {
-        let page = sqlx::query(statements.page).bind(table.code());
+        let page = query(statements.page).bind(table.code());
         let page = page.bind(after).bind(PAGE).fetch_all(&mut *conn).await?;
         let Some(last) = page.last() else { break };
-        after = last.try_get(0)?;
+        after = last.get(0)?;
         for row in &page {
-            let stored: Option<i64> = row.try_get(1)?;
+            let stored: Option<i64> = row.get(1)?;
             let before = if statements.is_chained {
-                row.try_get(2)?
+                row.get(2)?
             } else {
                 None
             };
             if stored != Some(checksum(table, row, before)?) {
                 let kind = stored.map_or(RowFault::Added, |_| RowFault::Changed);
-                faulty.push(fault(row.try_get(0)?, pair_name(row)?, kind));
+                faulty.push(fault(row.get(0)?, pair_name(row), kind));
             }
         }
     }
-    let removed = sqlx::query_scalar(statements.removed).bind(table.code());
+    let removed = query_scalar(statements.removed).bind(table.code());
     let removed: Vec<i64> = removed.fetch_all(&mut *conn).await?;
     faulty.extend(
         removed
@@ -326,11 +318,11 @@ async fn faulty_rows(
             .map(|row| fault(row, None, RowFault::Removed)),
     );
     if statements.is_chained {
-        let last: Option<i64> = sqlx::query_scalar(LAST_ROW)
+        let last: Option<i64> = query_scalar(LAST_ROW)
             .bind(table.code())
             .fetch_one(&mut *conn)
             .await?;
-        let cut_off = sqlx::query_scalar(CUT_OFF)
+        let cut_off = query_scalar(CUT_OFF)
             .bind(table.name())
             .bind(last.unwrap_or(0));
         let cut_off: Option<i64> = cut_off.fetch_optional(&mut *conn).await?;
@@ -340,11 +332,9 @@ async fn faulty_rows(
 }
 
 /// Returns the name of a row's pair. Invalid UTF-8 is replaced, because the name may be what is damaged.
-fn pair_name(row: &SqliteRow) -> Result<Option<String>> {
-    let value = row.try_get_raw(3)?;
-    if value.is_null() {
-        return Ok(None);
+fn pair_name(row: &Row) -> Option<String> {
+    match row.value(3) {
+        Ok(Value::Text(name)) => Some(String::from_utf8_lossy(&name).into_owned()),
+        _ => None,
     }
-    let name = <&[u8] as Decode<Sqlite>>::decode(value).map_err(sqlx::Error::Decode)?;
-    Ok(Some(String::from_utf8_lossy(name).into_owned()))
 }

@@ -1,8 +1,9 @@
 //! Ground truth: the true alignments that a dataset gives for its pairs, stored unchanged.
 
 use serde_json::{Value, json};
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::query_scalar;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -26,23 +27,23 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
-        let exists = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");
-        Ok(exists.fetch_one(&mut *conn).await?)
+        let exists = query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");
+        Ok(exists.fetch_one(&mut conn).await?)
     }
 }
 
 /// Stores true alignments unchanged, replacing earlier ones. Returns their number. The caller begins the transaction.
-pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
+pub(crate) async fn set(conn: &mut Conn, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {
         let items = chunk.iter();
         let items = items.map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
         let items = json_array(items);
-        let unknown = sqlx::query_scalar(UNKNOWN).bind(&items);
+        let unknown = query_scalar(UNKNOWN).bind(&items);
         if let Some(name) = unknown.fetch_optional(&mut *conn).await? {
             return Err(CatalogError::UnknownPair(name));
         }
-        let set = sqlx::query_scalar(SET).bind(items);
+        let set = query_scalar(SET).bind(items);
         let pairs: Vec<i64> = set.fetch_all(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Truth, &pairs).await?;
         stored += pairs.len() as u64;

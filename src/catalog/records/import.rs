@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use sqlx::{FromRow as _, Row as _, SqliteConnection};
 use tokio::sync::mpsc;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
@@ -117,8 +119,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let names = sqlx::query_scalar("SELECT name FROM pair ORDER BY name");
-        Ok(names.fetch_all(&mut *conn).await?)
+        let names = query_scalar("SELECT name FROM pair ORDER BY name");
+        Ok(names.fetch_all(&mut conn).await?)
     }
 
     /// Returns the unknown names among `names`, in the given order.
@@ -141,17 +143,17 @@ impl Catalog {
 }
 
 async fn import_chunk(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     chunk: &[ImportRow],
     now: UnixMillis,
     summary: &mut ImportSummary,
 ) -> Result<()> {
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
-    let known = sqlx::query(SELECT).bind(&names);
+    let known = query(SELECT).bind(&names);
     let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
     for row in &known.fetch_all(&mut *conn).await? {
         // A row with an invalid value is replaced.
-        stored.insert(row.try_get("name")?, PairAttributes::from_row(row).ok());
+        stored.insert(row.get("name")?, PairAttributes::from_row(row).ok());
     }
     for row in chunk {
         let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
@@ -172,10 +174,10 @@ async fn import_chunk(
         });
     }
     let items = json_array(chunk.iter().map(item));
-    let upsert = sqlx::query_scalar(UPSERT).bind(items).bind(now);
+    let upsert = query_scalar(UPSERT).bind(items).bind(now);
     let rows: Vec<i64> = upsert.fetch_all(&mut *conn).await?;
     checksums::store(conn, ChecksummedTable::Pair, &rows).await?;
-    sqlx::query(NEW_JOBS).bind(names).execute(conn).await?;
+    query(NEW_JOBS).bind(names).execute(conn).await?;
     Ok(())
 }
 

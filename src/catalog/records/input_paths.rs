@@ -1,8 +1,9 @@
 //! Finds and replaces the paths of meshes and prints.
 
 use serde_json::{Value, json};
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
 
@@ -33,9 +34,9 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn inputs_named(&self, file_names: [String; 2]) -> Result<Vec<(String, String)>> {
         let [one, other] = file_names;
-        let query = sqlx::query_as(NAMED).bind(one).bind(other);
+        let query = query_as(NAMED).bind(one).bind(other);
         let mut conn = self.read_conn().await?;
-        Ok(query.fetch_all(&mut *conn).await?)
+        Ok(query.fetch_all(&mut conn).await?)
     }
 
     /// Replaces the paths of meshes and prints in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new
@@ -55,14 +56,14 @@ impl Catalog {
 }
 
 async fn replace(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     mut find: impl FnMut(&str) -> Option<String> + Send,
 ) -> Result<Vec<String>> {
     let mut kept = Vec::new();
     let mut after = 0_i64;
     loop {
-        let query = sqlx::query_as(SELECT).bind(after).bind(PAGE);
-        let rows: Vec<(i64, String, String)> = query.fetch_all(&mut *conn).await?;
+        let rows = query_as(SELECT).bind(after).bind(PAGE);
+        let rows: Vec<(i64, String, String)> = rows.fetch_all(&mut *conn).await?;
         let Some((last, ..)) = rows.last() else {
             return Ok(kept);
         };
@@ -78,7 +79,7 @@ async fn replace(
             .into_iter()
             .map(|(id, mesh, print)| json!([id, new_path(mesh), new_path(print)]));
         let items = items.collect::<Value>().to_string();
-        sqlx::query(UPDATE).bind(items).execute(&mut *conn).await?;
+        query(UPDATE).bind(items).execute(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Pair, &ids).await?;
     }
 }

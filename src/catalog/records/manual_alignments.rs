@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::catalog::db::query::{query_as, query_scalar};
+use crate::catalog::db::row::from_row;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_answers::pair_id;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// A manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ManualAlignment {
     /// Idempotency key of the client: an alignment sent twice is stored once.
     pub event: String,
@@ -38,15 +40,16 @@ pub struct ManualAlignment {
     pub note: Option<String>,
 }
 
+from_row! { ManualAlignment { event, pair, reviewer, print_from_depth, print_from_mesh, mesh_hash, print_hash, depth_hash, seen, iou, dice, note } }
+
 /// A stored manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StoredAlignment {
     /// Number in the log.
     #[serde(skip)]
     pub id: i64,
     /// The alignment.
     #[serde(flatten)]
-    #[sqlx(flatten)]
     pub made: ManualAlignment,
     /// When.
     pub at: UnixMillis,
@@ -57,6 +60,8 @@ pub struct StoredAlignment {
     /// Whether the current depth map has the hash `depth_hash`. Only then is `print_from_depth` valid.
     pub on_current_depth: bool,
 }
+
+from_row! { StoredAlignment { id, made in row, at, undone_at, holds, on_current_depth } }
 
 const INSERT: &str = "
 INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, seen, print_from_depth, print_from_mesh,
@@ -109,7 +114,7 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let pair = pair_id(conn, &made.pair).await?;
-                let stored: Option<i64> = sqlx::query_scalar(INSERT)
+                let stored: Option<i64> = query_scalar(INSERT)
                     .bind(&made.event)
                     .bind(pair)
                     .bind(&made.mesh_hash.as_bytes()[..])
@@ -151,10 +156,10 @@ impl Catalog {
         limit: usize,
     ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(LOG).bind(after);
+        let query = query_as(LOG).bind(after);
         // As SQLite's limit, a negative number means none.
         let query = query.bind(limit as i64);
-        Ok(query.fetch_all(&mut *conn).await?)
+        Ok(query.fetch_all(&mut conn).await?)
     }
 
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
@@ -176,9 +181,9 @@ impl Catalog {
         last: &PairName,
     ) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(OF_NAMES);
+        let query = query_as(OF_NAMES);
         let query = query.bind(first.as_str()).bind(last.as_str());
-        Ok(newest(query.fetch_all(&mut *conn).await?))
+        Ok(newest(query.fetch_all(&mut conn).await?))
     }
 }
 

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
+use crate::catalog::db::row::from_row;
 use crate::catalog::records::verdicts::{ReviewerVerdict, VerdictEvent};
 use crate::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
@@ -68,22 +69,19 @@ pub struct FailedPair {
 }
 
 /// The current result of one stage of one pair.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageRecord {
     /// The stage.
     pub stage: Stage,
     /// Outcome of the stage as JSON; parse it with [`StageRecord::parse`].
-    #[sqlx(json)]
     pub outcome: Value,
     /// Its artifacts by role.
-    #[sqlx(json)]
     pub files: ArtifactSet,
     /// Hash of the outcome and the artifacts. Equal bytes give equal hashes.
     pub result_hash: ContentHash,
     /// Hash of the settings of this stage and of all earlier stages.
     pub fingerprint_hash: ContentHash,
     /// Revision and settings of this stage.
-    #[sqlx(json)]
     pub fingerprint_fields: Value,
     /// Hash of the mesh that the result was computed from.
     pub mesh_hash: ContentHash,
@@ -94,6 +92,8 @@ pub struct StageRecord {
     /// When the result was stored.
     pub at: UnixMillis,
 }
+
+from_row! { StageRecord { stage, outcome as Json, files as Json, result_hash, fingerprint_hash, fingerprint_fields as Json, mesh_hash, print_hash, ms, at } }
 
 impl StageRecord {
     /// Parses the outcome as a type of `domain`, such as `FitOutcome` for the stage `Fit`.
@@ -122,7 +122,7 @@ pub struct MetricRecord {
 }
 
 /// Attributes of a pair as imported.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
@@ -139,9 +139,10 @@ pub struct PairAttributes {
     /// The block, if given.
     pub block: Option<String>,
     /// All other columns of the manifest.
-    #[sqlx(json)]
     pub meta: Map<String, Value>,
 }
+
+from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json } }
 
 /// One pair with its current results, for report and export.
 #[derive(Debug, Clone, PartialEq, Serialize)]

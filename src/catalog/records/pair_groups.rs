@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::Row as _;
-
+use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::{Catalog, Result};
 use crate::domain::PairName;
 
@@ -25,9 +24,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn meta_columns(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
-        Ok(sqlx::query_scalar(META_COLUMNS)
-            .fetch_all(&mut *conn)
-            .await?)
+        Ok(query_scalar(META_COLUMNS).fetch_all(&mut conn).await?)
     }
 
     /// Counts the pairs with equal values of an attribute, which is `block`, `character` or another text for none. A
@@ -37,15 +34,15 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn pair_groups(&self, attribute: &str) -> Result<BTreeMap<(bool, String), u64>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query(GROUPS).bind(attribute);
-        let found = query.fetch_all(&mut *conn).await?;
+        let query = query(GROUPS).bind(attribute);
+        let found = query.fetch_all(&mut conn).await?;
         let groups = found.iter().map(|row| {
-            let shared: Option<String> = row.try_get("shared")?;
+            let shared: Option<String> = row.get("shared")?;
             let key = match shared {
                 Some(value) => (false, value),
-                None => (true, row.try_get("name")?),
+                None => (true, row.get("name")?),
             };
-            Ok((key, row.try_get("pairs")?))
+            Ok((key, row.get("pairs")?))
         });
         groups.collect()
     }
@@ -56,10 +53,10 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn shared_prints(&self) -> Result<BTreeMap<String, PairName>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(SHARED_PRINTS).fetch_all(&mut *conn).await?;
+        let found = query(SHARED_PRINTS).fetch_all(&mut conn).await?;
         let prints = found
             .iter()
-            .map(|row| Ok((row.try_get("print_path")?, row.try_get("first")?)));
+            .map(|row| Ok((row.get("print_path")?, row.get("first")?)));
         prints.collect()
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::sqlite::SqliteRow;
-use sqlx::types::Json;
-use sqlx::{FromRow as _, Row as _, SqliteConnection};
-
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as};
+use crate::catalog::db::row::{FromRow as _, Row};
+use crate::catalog::db::value::Json;
 use crate::catalog::queue::counters::Cursor;
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
@@ -62,10 +62,10 @@ impl Catalog {
     ) -> Result<Vec<PairResults>> {
         // One transaction gives a consistent view of jobs, results and verdicts, even while a run writes.
         let mut conn = self.snapshot().await?;
-        let found = sqlx::query(PAGE)
+        let found = query(PAGE)
             .bind(after.map_or("", PairName::as_str))
             .bind(limit as i64)
-            .fetch_all(&mut *conn)
+            .fetch_all(&mut conn)
             .await?;
         assemble(&mut conn, &found).await
     }
@@ -76,22 +76,19 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
-        let found = sqlx::query(ONE)
-            .bind(name.as_str())
-            .fetch_all(&mut *conn)
-            .await?;
+        let found = query(ONE).bind(name.as_str()).fetch_all(&mut conn).await?;
         let Some(results) = assemble(&mut conn, &found).await?.pop() else {
             return Ok(None);
         };
         let row = &found[0];
         Ok(Some(PairDetail {
             results,
-            mesh_hash: row.try_get("mesh_hash")?,
-            print_hash: row.try_get("print_hash")?,
-            attempt: row.try_get("attempt")?,
-            crashes: row.try_get("crashes")?,
-            run_at: row.try_get("run_at")?,
-            attempts: attempts(&mut conn, row.try_get("id")?).await?,
+            mesh_hash: row.get("mesh_hash")?,
+            print_hash: row.get("print_hash")?,
+            attempt: row.get("attempt")?,
+            crashes: row.get("crashes")?,
+            run_at: row.get("run_at")?,
+            attempts: attempts(&mut conn, row.get("id")?).await?,
             verdict_log: verdicts::log(&mut conn, Some(name)).await?,
         }))
     }
@@ -102,12 +99,12 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query(FAILED).bind(limit as i64);
-        let found = query.fetch_all(&mut *conn).await?;
+        let query = query(FAILED).bind(limit as i64);
+        let found = query.fetch_all(&mut conn).await?;
         let failed = found.iter().map(|row| {
             Ok(FailedPair {
-                name: row.try_get("name")?,
-                status: row.try_get("status")?,
+                name: row.get("name")?,
+                status: row.get("status")?,
                 failure: stored_failure(row)?
                     .ok_or_else(|| CatalogError::Corrupt("a failure without a stage".to_owned()))?,
             })
@@ -121,28 +118,28 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(FAILED_BY_CLASS);
-        let mut counts: Vec<(FailureClass, u64)> = query.fetch_all(&mut *conn).await?;
+        let query = query_as(FAILED_BY_CLASS);
+        let mut counts: Vec<(FailureClass, u64)> = query.fetch_all(&mut conn).await?;
         counts.sort_unstable();
         Ok(counts)
     }
 }
 
 /// Adds results, metrics and verdicts to rows of pairs.
-async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Vec<PairResults>> {
-    let ids = found.iter().map(|row| row.try_get("id"));
+async fn assemble(conn: &mut Conn, found: &[Row]) -> Result<Vec<PairResults>> {
+    let ids = found.iter().map(|row| row.get("id"));
     let ids = ids.collect::<Result<Vec<i64>, _>>()?;
     let mut stages = stage_results::of_pairs(conn, &ids).await?;
     let hashes = stage_results::metric_hashes(conn, &ids).await?;
     let verdicts = verdicts::of_pairs(conn, &ids).await?;
-    let mut assemble_pair = |row: &SqliteRow, id: i64| {
-        let cursor: Cursor = row.try_get("stage")?;
+    let mut assemble_pair = |row: &Row, id: i64| {
+        let cursor: Cursor = row.get("stage")?;
         let mut records = stages.remove(&id).unwrap_or_default();
         records.retain(|record| (record.stage.index() as Cursor) < cursor);
-        let truth: Option<Json<_>> = row.try_get("truth")?;
+        let truth: Option<Json<_>> = row.get("truth")?;
         Ok(PairResults {
             attributes: PairAttributes::from_row(row)?,
-            status: row.try_get("status")?,
+            status: row.get("status")?,
             next_stage: usize::try_from(cursor).ok().and_then(Stage::from_index),
             failure: stored_failure(row)?,
             metrics: metrics(id, &records, &hashes, &verdicts)?,
@@ -156,15 +153,15 @@ async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Ve
     pairs.collect()
 }
 
-fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
-    let Some(stage) = row.try_get("failed_stage")? else {
+fn stored_failure(row: &Row) -> Result<Option<StoredFailure>> {
+    let Some(stage) = row.get("failed_stage")? else {
         return Ok(None);
     };
-    let message: String = row.try_get("message")?;
+    let message: String = row.get("message")?;
     Ok(Some(StoredFailure {
         stage,
-        failure: Failure::new(row.try_get("class")?, message),
-        at: row.try_get("failed_at")?,
+        failure: Failure::new(row.get("class")?, message),
+        at: row.get("failed_at")?,
     }))
 }
 
@@ -209,7 +206,7 @@ fn metrics(
     Ok(found)
 }
 
-async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptRecord>> {
+async fn attempts(conn: &mut Conn, pair: i64) -> Result<Vec<AttemptRecord>> {
     type Attempt = (
         Stage,
         Option<FailureClass>,
@@ -217,7 +214,7 @@ async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptR
         Option<u64>,
         UnixMillis,
     );
-    let query = sqlx::query_as(ATTEMPTS).bind(pair);
+    let query = query_as(ATTEMPTS).bind(pair);
     let found: Vec<Attempt> = query.fetch_all(conn).await?;
     let records = found.into_iter().map(|(stage, class, message, ms, at)| {
         let failure = class.zip(message);

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::sqlite::SqliteRow;
-use sqlx::{FromRow as _, Row as _};
-
+use crate::catalog::db::query::query;
+use crate::catalog::db::row::{FromRow, Row, from_row};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
 use crate::catalog::queue::checkpoint;
@@ -16,18 +15,17 @@ use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairId, Stage};
 
 /// A leased pair with its attributes and results.
-#[derive(Debug, Clone, PartialEq, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PairWork {
     /// Attributes as imported.
-    #[sqlx(flatten)]
     pub attributes: PairAttributes,
     /// Manifest attributes that results depend on. They are stored with each result.
-    #[sqlx(rename = "attributes")]
     pub attributes_json: String,
     /// Results of all completed stages, in order.
-    #[sqlx(skip)]
     pub results: Vec<StageRecord>,
 }
+
+from_row! { PairWork { attributes in row, attributes_json: "attributes", results = Vec::new() } }
 
 /// Input files of a pair as last read, to detect changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,10 +63,7 @@ impl Catalog {
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
-        let leased = sqlx::query(LEASED)
-            .bind(wanted)
-            .fetch_all(&mut *conn)
-            .await?;
+        let leased = query(LEASED).bind(wanted).fetch_all(&mut conn).await?;
         let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
         let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
         let mut results = BTreeMap::new();
@@ -77,7 +72,7 @@ impl Catalog {
         }
         let mut works = BTreeMap::new();
         for row in &leased {
-            works.insert(row.try_get::<PairId, _>("id")?, PairWork::from_row(row)?);
+            works.insert(row.get::<PairId>("id")?, PairWork::from_row(row)?);
         }
         let each = leases.iter().map(|Lease { pair, cursor, .. }| {
             let gone = || CatalogError::Corrupt(format!("a job has no pair {}", pair.0));
@@ -103,13 +98,13 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let after = after.map_or(0, |pair| pair.0);
         let query = match among {
-            None => sqlx::query(INPUTS).bind(after).bind(limit as i64),
-            Some(among) => sqlx::query(INPUTS_AMONG)
+            None => query(INPUTS).bind(after).bind(limit as i64),
+            Some(among) => query(INPUTS_AMONG)
                 .bind(after)
                 .bind(limit as i64)
                 .bind(&among.json),
         };
-        let found = query.fetch_all(&mut *conn).await?;
+        let found = query.fetch_all(&mut conn).await?;
         found.iter().map(known_inputs).collect()
     }
 
@@ -132,17 +127,17 @@ impl Catalog {
 }
 
 /// Reads the input files from a row with the columns of [`INPUTS`].
-pub(crate) fn known_inputs(row: &SqliteRow) -> Result<KnownInputs> {
+pub(crate) fn known_inputs(row: &Row) -> Result<KnownInputs> {
     let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
-        let (hash, stat): (Option<_>, Option<_>) = (row.try_get(hash)?, row.try_get(stat)?);
+        let (hash, stat): (Option<_>, Option<_>) = (row.get(hash)?, row.get(stat)?);
         let both = hash.zip(stat);
         Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
     };
     Ok(KnownInputs {
-        pair: row.try_get("id")?,
-        mesh_path: row.try_get("mesh_path")?,
+        pair: row.get("id")?,
+        mesh_path: row.get("mesh_path")?,
         mesh: version("mesh_hash", "mesh_stat")?,
-        print_path: row.try_get("print_path")?,
+        print_path: row.get("print_path")?,
         print: version("print_hash", "print_stat")?,
     })
 }

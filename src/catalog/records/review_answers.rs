@@ -1,9 +1,10 @@
 //! Answers on the review page: verdicts on results, and answers to attention checks.
 
 use serde::Serialize;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{FromRow, Row as _, SqliteConnection};
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query_as, query_scalar};
+use crate::catalog::db::row::{FromRow, Row, from_row};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
@@ -29,14 +30,13 @@ pub enum Shown {
 }
 
 /// An answer that was not undone.
-#[derive(Debug, Clone, PartialEq, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     /// Id by which it is undone.
     pub event: String,
     /// The pair.
     pub pair: PairName,
     /// The item that it belongs to.
-    #[sqlx(flatten)]
     pub on: AnsweredOn,
     /// The judgement.
     pub verdict: Verdict,
@@ -48,6 +48,8 @@ pub struct Answer {
     pub at: UnixMillis,
 }
 
+from_row! { Answer { event, pair, on in row, verdict, reason, note, at } }
+
 /// Item that an answer belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AnsweredOn {
@@ -57,10 +59,10 @@ pub enum AnsweredOn {
     Check(ContentHash),
 }
 
-impl FromRow<'_, SqliteRow> for AnsweredOn {
-    fn from_row(row: &SqliteRow) -> sqlx::Result<Self> {
-        let hash = row.try_get("hash")?;
-        let is_check = row.try_get("is_check")?;
+impl FromRow for AnsweredOn {
+    fn from_row(row: &Row) -> Result<Self> {
+        let hash = row.get("hash")?;
+        let is_check = row.get("is_check")?;
         Ok(if is_check {
             Self::Check(hash)
         } else {
@@ -70,7 +72,7 @@ impl FromRow<'_, SqliteRow> for AnsweredOn {
 }
 
 /// An answer to an attention check, undone or not.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AttentionCheckAnswer {
     /// Number in the log.
     #[serde(skip)]
@@ -93,13 +95,14 @@ pub struct AttentionCheckAnswer {
     pub note: Option<String>,
     /// Context in which it was given.
     #[serde(flatten)]
-    #[sqlx(flatten)]
     pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
 }
+
+from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, look in row, at, undone_at } }
 
 const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
@@ -162,7 +165,7 @@ impl Catalog {
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let known = sqlx::query_scalar(KNOWN).bind(&given.look.event);
+                let known = query_scalar(KNOWN).bind(&given.look.event);
                 if known.fetch_one(&mut *conn).await? {
                     return Ok(false);
                 }
@@ -205,7 +208,7 @@ impl Catalog {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let exists: bool = sqlx::query_scalar(EXISTS)
+                let exists: bool = query_scalar(EXISTS)
                     .bind(&event)
                     .bind(&reviewer)
                     .fetch_one(&mut *conn)
@@ -214,7 +217,7 @@ impl Catalog {
                     return Err(CatalogError::NothingToUndo(Some(reviewer)));
                 }
                 for (table, undo) in UNDO {
-                    let undo = sqlx::query_scalar(undo).bind(&event).bind(&reviewer);
+                    let undo = query_scalar(undo).bind(&event).bind(&reviewer);
                     let undone: Vec<i64> = undo.bind(now).fetch_all(&mut *conn).await?;
                     checksums::store(conn, table, &undone).await?;
                 }
@@ -231,8 +234,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(ANSWERS).bind(reviewer);
-        Ok(query.fetch_all(&mut *conn).await?)
+        let query = query_as(ANSWERS).bind(reviewer);
+        Ok(query.fetch_all(&mut conn).await?)
     }
 
     /// Returns all answers to attention checks, including undone ones, oldest first.
@@ -253,10 +256,10 @@ impl Catalog {
         limit: usize,
     ) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(CHECK_ANSWERS).bind(after);
+        let query = query_as(CHECK_ANSWERS).bind(after);
         // As SQLite's limit, a negative number means none.
         let query = query.bind(limit as i64);
-        Ok(query.fetch_all(&mut *conn).await?)
+        Ok(query.fetch_all(&mut conn).await?)
     }
 
     /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
@@ -265,14 +268,14 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_scalar("SELECT key FROM review_key");
-        Ok(query.fetch_one(&mut *conn).await?)
+        let query = query_scalar("SELECT key FROM review_key");
+        Ok(query.fetch_one(&mut conn).await?)
     }
 }
 
 /// Returns the row id of a pair.
-pub(crate) async fn pair_id(conn: &mut SqliteConnection, name: &PairName) -> Result<i64> {
-    let id = sqlx::query_scalar("SELECT id FROM pair WHERE name = ?1")
+pub(crate) async fn pair_id(conn: &mut Conn, name: &PairName) -> Result<i64> {
+    let id = query_scalar("SELECT id FROM pair WHERE name = ?1")
         .bind(name.as_str())
         .fetch_optional(conn)
         .await?;
@@ -280,14 +283,14 @@ pub(crate) async fn pair_id(conn: &mut SqliteConnection, name: &PairName) -> Res
 }
 
 async fn insert_check(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     given: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
     check: &AttentionCheck,
     now: UnixMillis,
 ) -> Result<()> {
     let look = &given.look;
-    let row: i64 = sqlx::query_scalar(INSERT_CHECK)
+    let row: i64 = query_scalar(INSERT_CHECK)
         .bind(&look.event)
         .bind(pair)
         .bind(metric.name())

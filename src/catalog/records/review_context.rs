@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::catalog::db::row::from_row;
 use crate::domain::{ContentHash, ReviewOrder};
 
 /// Context of a verdict. All fields are `None` if the context is unknown.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReviewContext {
     /// Idempotency key of the client. A verdict that is sent twice is stored once.
     pub event: Option<String>,
@@ -18,3 +19,5 @@ pub struct ReviewContext {
     /// Order of the review queue.
     pub review_order: Option<ReviewOrder>,
 }
+
+from_row! { ReviewContext { event, seen, shown_ms, angle_read_deg, review_order } }

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::{FromRow as _, Row as _, SqliteConnection};
-
+use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::query::{query, query_as};
+use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::model::StageRecord;
 use crate::domain::{ContentHash, ThresholdMetric};
@@ -22,13 +23,13 @@ FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = wanted.va
 
 /// Returns stage results by pair, in the order of the stages.
 pub(crate) async fn of_pairs(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     pairs: &[i64],
 ) -> Result<BTreeMap<i64, Vec<StageRecord>>> {
-    let query = sqlx::query(STAGE_RESULTS).bind(json_array(pairs.iter().copied()));
+    let query = query(STAGE_RESULTS).bind(json_array(pairs.iter().copied()));
     let mut records: BTreeMap<i64, Vec<StageRecord>> = BTreeMap::new();
     for row in &query.fetch_all(conn).await? {
-        let of_pair = records.entry(row.try_get("pair")?).or_default();
+        let of_pair = records.entry(row.get("pair")?).or_default();
         of_pair.push(StageRecord::from_row(row)?);
     }
     Ok(records)
@@ -36,10 +37,10 @@ pub(crate) async fn of_pairs(
 
 /// Returns the hash of each metric's current result, by pair and metric. A verdict refers to a result by this hash.
 pub(crate) async fn metric_hashes(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     pairs: &[i64],
 ) -> Result<BTreeMap<(i64, ThresholdMetric), ContentHash>> {
-    let query = sqlx::query_as(METRIC_HASHES).bind(json_array(pairs.iter().copied()));
+    let query = query_as(METRIC_HASHES).bind(json_array(pairs.iter().copied()));
     let found: Vec<(i64, ThresholdMetric, ContentHash)> = query.fetch_all(conn).await?;
     let found = found.into_iter();
     Ok(found

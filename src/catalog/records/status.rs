@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::SqliteConnection;
-
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
 use crate::catalog::queue::staleness::count_stale;
@@ -41,9 +41,7 @@ impl Catalog {
             jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
             stale: count_stale(&mut conn, &current).await?,
-            low_confidence: sqlx::query_scalar(LOW_CONFIDENCE)
-                .fetch_one(&mut *conn)
-                .await?,
+            low_confidence: query_scalar(LOW_CONFIDENCE).fetch_one(&mut conn).await?,
             verdicts: verdicts(&mut conn).await?,
         })
     }
@@ -78,9 +76,9 @@ fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
     stages
 }
 
-async fn verdicts(conn: &mut SqliteConnection) -> Result<BTreeMap<Verdict, u64>> {
+async fn verdicts(conn: &mut Conn) -> Result<BTreeMap<Verdict, u64>> {
     let mut counts: BTreeMap<_, _> = Verdict::ALL.map(|verdict| (verdict, 0)).into();
-    let found: Vec<(Verdict, u64)> = sqlx::query_as(VERDICTS).fetch_all(conn).await?;
+    let found: Vec<(Verdict, u64)> = query_as(VERDICTS).fetch_all(conn).await?;
     counts.extend(found);
     Ok(counts)
 }

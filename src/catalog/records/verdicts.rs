@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use sqlx::SqliteConnection;
 
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::review_context::ReviewContext;
@@ -36,7 +38,7 @@ pub struct NewVerdict {
 }
 
 /// One line of the verdict log.
-#[derive(Debug, Clone, PartialEq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
@@ -59,7 +61,6 @@ pub struct VerdictEvent {
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
-    #[sqlx(flatten)]
     pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
@@ -69,8 +70,10 @@ pub struct VerdictEvent {
     pub current: bool,
 }
 
+from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, look in row, at, undone_at, current } }
+
 /// A reviewer's newest verdict on a result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, sqlx_macros::FromRow)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ReviewerVerdict {
     /// Name of the reviewer.
     pub reviewer: String,
@@ -82,15 +85,18 @@ pub struct ReviewerVerdict {
     pub review_order: Option<ReviewOrder>,
 }
 
+from_row! { ReviewerVerdict { reviewer, verdict, reason, review_order } }
+
 /// A verdict that was not undone, with the result that it judges.
-#[derive(Debug, sqlx_macros::FromRow)]
+#[derive(Debug)]
 pub(crate) struct ResultVerdict {
     pair: i64,
     metric: ThresholdMetric,
     pub(crate) result_hash: ContentHash,
-    #[sqlx(flatten)]
     pub(crate) verdict: ReviewerVerdict,
 }
+
+from_row! { ResultVerdict { pair, metric, result_hash, verdict in row } }
 
 /// Selects the current results of a pair. If the pair is not done, selects one row whose metric is NULL.
 const JUDGED: &str = "
@@ -140,7 +146,7 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let newest = "SELECT coalesce(max(id), 0) FROM verdict";
-                let newest: i64 = sqlx::query_scalar(newest).fetch_one(&mut *conn).await?;
+                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
                 let mut stored = 0;
                 for verdict in &verdicts {
                     stored += u64::from(append(conn, verdict, newest, now).await?);
@@ -164,7 +170,7 @@ impl Catalog {
         let reviewer = reviewer.map(str::to_owned);
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let act: Option<i64> = sqlx::query_scalar(
+                let act: Option<i64> = query_scalar(
                     "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
                 )
@@ -174,13 +180,13 @@ impl Catalog {
                 let Some(act) = act else {
                     return Err(CatalogError::NothingToUndo(reviewer));
                 };
-                sqlx::query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
+                query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
                     .bind(act)
                     .bind(now)
                     .execute(&mut *conn)
                     .await?;
                 checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
-                let query = sqlx::query_as(LOG)
+                let query = query_as(LOG)
                     .bind(act)
                     .bind(None::<&str>)
                     .bind(None::<i64>)
@@ -206,21 +212,16 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
-        let query = sqlx::query_as(LOG).bind(None::<i64>).bind(None::<&str>);
+        let query = query_as(LOG).bind(None::<i64>).bind(None::<&str>);
         let query = query.bind(after).bind(limit as i64);
-        Ok(query.fetch_all(&mut *conn).await?)
+        Ok(query.fetch_all(&mut conn).await?)
     }
 }
 
 /// Appends a verdict. Returns `false` if all its rows are already stored. Compares the values only with rows up to the
 /// id `newest`, so that two equal verdicts of one call are both stored.
-async fn append(
-    conn: &mut SqliteConnection,
-    new: &NewVerdict,
-    newest: i64,
-    now: UnixMillis,
-) -> Result<bool> {
-    let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = sqlx::query_as(JUDGED)
+async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis) -> Result<bool> {
+    let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = query_as(JUDGED)
         .bind(new.pair.as_str())
         .fetch_all(&mut *conn)
         .await?;
@@ -250,13 +251,13 @@ async fn append(
 
 /// Returns whether an equal verdict with the same time is among the rows up to `newest`.
 async fn is_stored(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     new: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
     newest: i64,
 ) -> Result<bool> {
     let Some(at) = new.at else { return Ok(false) };
-    let stored = sqlx::query_scalar(IS_STORED)
+    let stored = query_scalar(IS_STORED)
         .bind(newest)
         .bind(pair)
         .bind(metric.name())
@@ -272,14 +273,14 @@ async fn is_stored(
 /// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row
 /// with the same event and metric exists. If `act` is `None`, the row begins a new action.
 pub(crate) async fn insert(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     new: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
     act: Option<i64>,
     now: UnixMillis,
 ) -> Result<Option<i64>> {
     let look = &new.look;
-    let inserted: Option<(i64, i64)> = sqlx::query_as(INSERT)
+    let inserted: Option<(i64, i64)> = query_as(INSERT)
         .bind(act)
         .bind(pair)
         .bind(metric.name())
@@ -304,11 +305,8 @@ pub(crate) async fn insert(
 }
 
 /// Reads the log of one pair or all.
-pub(crate) async fn log(
-    conn: &mut SqliteConnection,
-    pair: Option<&PairName>,
-) -> Result<Vec<VerdictEvent>> {
-    let query = sqlx::query_as(LOG).bind(None::<i64>);
+pub(crate) async fn log(conn: &mut Conn, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
+    let query = query_as(LOG).bind(None::<i64>);
     let query = query.bind(pair.map(PairName::as_str));
     let query = query.bind(None::<i64>).bind(None::<i64>);
     Ok(query.fetch_all(conn).await?)
@@ -317,11 +315,11 @@ pub(crate) async fn log(
 /// Returns each reviewer's newest verdict on each result of the given pairs, sorted by reviewer. Ignores undone
 /// verdicts.
 pub(crate) async fn of_pairs(
-    conn: &mut SqliteConnection,
+    conn: &mut Conn,
     pairs: &[i64],
 ) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<ResultVerdict>>> {
     let pairs = json_array(pairs.iter().copied());
-    let found: Vec<ResultVerdict> = sqlx::query_as(COUNTED).bind(pairs).fetch_all(conn).await?;
+    let found: Vec<ResultVerdict> = query_as(COUNTED).bind(pairs).fetch_all(conn).await?;
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
     for newest in found {
         let of_metric = counted.entry((newest.pair, newest.metric)).or_default();

@@ -1,6 +1,7 @@
 //! Several stages of a pair in one commit.
 
 use super::{World, fingerprints, name};
+use crate::catalog::db::query::query_as;
 use crate::catalog::{CheckpointOutcome, Lease, PairDetail, RerunPolicy};
 use crate::domain::Stage;
 
@@ -19,8 +20,8 @@ async fn detail(world: &World, pair: &str) -> PairDetail {
 /// The job's fingerprint, and whether it is marked dirty.
 async fn fingerprint(world: &World, pair: i64) -> (Option<i64>, bool) {
     let mut conn = world.catalog.read_conn().await.expect("a connection");
-    let job = sqlx::query_as("SELECT fingerprint, dirty FROM job WHERE pair = ?1").bind(pair);
-    job.fetch_one(&mut *conn).await.expect("the job")
+    let job = query_as("SELECT fingerprint, dirty FROM job WHERE pair = ?1").bind(pair);
+    job.fetch_one(&mut conn).await.expect("the job")
 }
 
 #[tokio::test]

@@ -1,0 +1,50 @@
+//! A connection to either database.
+
+use std::ops::{Deref, DerefMut};
+
+use sqlx::pool::PoolConnection;
+use sqlx::{Database, Sqlite, Transaction};
+
+/// A connection to a catalog.
+pub(crate) enum Conn {
+    Sqlite(Held<Sqlite>),
+}
+
+/// A connection that belongs to its holder or to a pool. A snapshot ends when it is dropped.
+pub(crate) enum Held<D: Database> {
+    Owned(D::Connection),
+    Pooled(PoolConnection<D>),
+    Snapshot(Transaction<'static, D>),
+}
+
+impl<D: Database> Deref for Held<D> {
+    type Target = D::Connection;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Owned(conn) => conn,
+            Self::Pooled(conn) => conn,
+            Self::Snapshot(conn) => conn,
+        }
+    }
+}
+
+impl<D: Database> DerefMut for Held<D> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        match self {
+            Self::Owned(conn) => conn,
+            Self::Pooled(conn) => conn,
+            Self::Snapshot(conn) => conn,
+        }
+    }
+}
+
+#[cfg(test)]
+impl Conn {
+    /// Opens an empty SQLite database in memory.
+    pub(crate) async fn in_memory() -> Self {
+        let options = sqlx::sqlite::SqliteConnectOptions::new().in_memory(true);
+        let conn = sqlx::ConnectOptions::connect(&options).await;
+        Self::Sqlite(Held::Owned(conn.expect("a database")))
+    }
+}

@@ -1,0 +1,154 @@
+//! Statements with parameters, run on either database.
+
+use std::marker::PhantomData;
+
+use sqlx::Arguments as _;
+use sqlx::sqlite::SqliteArguments;
+
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::row::{FromRow, Row};
+use crate::catalog::db::value::{Argument, FromValue};
+
+/// A statement with its parameters `?1`, `?2` and so on. `R` says what each row becomes.
+#[derive(Debug)]
+pub(crate) struct Query<R> {
+    sql: &'static str,
+    arguments: Vec<Argument>,
+    rows: PhantomData<fn() -> R>,
+}
+
+/// What rows become.
+pub(crate) trait Rows {
+    /// The value of one row.
+    type Value;
+    fn value(row: Row) -> Result<Self::Value>;
+}
+
+/// Rows as they are.
+#[derive(Debug)]
+pub(crate) struct Raw;
+
+/// Rows read as a `T`.
+#[derive(Debug)]
+pub(crate) struct As<T>(PhantomData<T>);
+
+/// Rows with one column, which is read as a `T`.
+#[derive(Debug)]
+pub(crate) struct Scalar<T>(PhantomData<T>);
+
+impl Rows for Raw {
+    type Value = Row;
+    fn value(row: Row) -> Result<Row> {
+        Ok(row)
+    }
+}
+
+impl<T: FromRow> Rows for As<T> {
+    type Value = T;
+    fn value(row: Row) -> Result<T> {
+        T::from_row(&row)
+    }
+}
+
+impl<T: FromValue> Rows for Scalar<T> {
+    type Value = T;
+    fn value(row: Row) -> Result<T> {
+        row.get(0)
+    }
+}
+
+/// Makes a statement whose rows are read by column, or that returns none.
+pub(crate) const fn query(sql: &'static str) -> Query<Raw> {
+    Query::new(sql)
+}
+
+/// Makes a statement whose rows become values of a type.
+pub(crate) const fn query_as<T: FromRow>(sql: &'static str) -> Query<As<T>> {
+    Query::new(sql)
+}
+
+/// Makes a statement whose rows have one column.
+pub(crate) const fn query_scalar<T: FromValue>(sql: &'static str) -> Query<Scalar<T>> {
+    Query::new(sql)
+}
+
+impl<R> Query<R> {
+    const fn new(sql: &'static str) -> Self {
+        Self {
+            sql,
+            arguments: Vec::new(),
+            rows: PhantomData,
+        }
+    }
+
+    /// Binds the next parameter.
+    pub(crate) fn bind(mut self, argument: impl Into<Argument>) -> Self {
+        self.arguments.push(argument.into());
+        self
+    }
+
+    /// Runs the statement and ignores its rows.
+    pub(crate) async fn execute(self, conn: &mut Conn) -> Result<()> {
+        match conn {
+            Conn::Sqlite(conn) => {
+                let arguments = sqlite_arguments(self.arguments)?;
+                sqlx::query_with(self.sql, arguments)
+                    .execute(&mut **conn)
+                    .await?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<R: Rows> Query<R> {
+    /// Returns all rows.
+    pub(crate) async fn fetch_all(self, conn: &mut Conn) -> Result<Vec<R::Value>> {
+        match conn {
+            Conn::Sqlite(conn) => {
+                let arguments = sqlite_arguments(self.arguments)?;
+                let rows = sqlx::query_with(self.sql, arguments).fetch_all(&mut **conn);
+                let rows = rows.await?.into_iter();
+                rows.map(|row| R::value(Row::Sqlite(row))).collect()
+            }
+        }
+    }
+
+    /// Returns the first row, if there is one.
+    pub(crate) async fn fetch_optional(self, conn: &mut Conn) -> Result<Option<R::Value>> {
+        match conn {
+            Conn::Sqlite(conn) => {
+                let arguments = sqlite_arguments(self.arguments)?;
+                let row = sqlx::query_with(self.sql, arguments).fetch_optional(&mut **conn);
+                row.await?.map(|row| R::value(Row::Sqlite(row))).transpose()
+            }
+        }
+    }
+
+    /// Returns the first row.
+    ///
+    /// # Errors
+    /// Returns an error if there is none.
+    pub(crate) async fn fetch_one(self, conn: &mut Conn) -> Result<R::Value> {
+        let row = self.fetch_optional(conn).await?;
+        row.ok_or(CatalogError::Database(sqlx::Error::RowNotFound))
+    }
+}
+
+/// Converts parameters for SQLite.
+pub(crate) fn sqlite_arguments(
+    arguments: impl IntoIterator<Item = Argument>,
+) -> Result<SqliteArguments> {
+    let mut converted = SqliteArguments::default();
+    for argument in arguments {
+        let added = match argument {
+            Argument::Integer(value) => converted.add(value),
+            Argument::Real(value) => converted.add(value),
+            Argument::Text(value) => converted.add(value),
+            Argument::Blob(value) => converted.add(value),
+        };
+        added.map_err(sqlx::Error::Encode)?;
+    }
+    Ok(converted)
+}
