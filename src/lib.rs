@@ -186,6 +186,8 @@ pub mod local_server;
 pub mod manifest;
 pub mod mesh;
 pub mod page_vec;
+#[cfg(test)]
+mod postgres_server;
 pub mod raster;
 pub mod report;
 pub mod review;

@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sqlx::SqlitePool;
+use sqlx::{PgPool, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
+use crate::catalog::db::postgres::PostgresPlace;
 use crate::catalog::db::request::{Message, Reply};
 use crate::catalog::db::write_connection::{Work, WriteConnection};
 use crate::catalog::db::writer;
@@ -17,13 +18,21 @@ use crate::catalog::db::writer;
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;
 
+/// Read connections.
+#[derive(Debug, Clone)]
+enum Readers {
+    Sqlite(SqlitePool),
+    Postgres(PgPool),
+}
+
 /// An open catalog. Clones share the connections.
 #[derive(Debug, Clone)]
 pub struct Catalog {
-    reader_pool: SqlitePool,
+    readers: Readers,
     /// `None` for a read-only catalog.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
+    /// Path of the file, or the URL of a PostgreSQL catalog without the password.
     pub(crate) path: Arc<Path>,
 }
 
@@ -42,7 +51,7 @@ impl Catalog {
     /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
-            reader_pool: open::reader_pool(path).await?,
+            readers: Readers::Sqlite(open::reader_pool(path).await?),
             inbox: None,
             delay: CommitDelay::new(),
             path: path.into(),
@@ -56,24 +65,67 @@ impl Catalog {
         delay: Arc<CommitDelay>,
     ) -> Result<Self> {
         let conn = open::write_conn(path, allow_empty).await?;
-        let reader_pool = open::reader_pool(path).await?;
+        let readers = Readers::Sqlite(open::reader_pool(path).await?);
+        let conn = Conn::Sqlite(Held::Owned(conn));
+        Ok(Self::start(readers, conn, path, delay))
+    }
+
+    /// Opens the catalog at a URL of PostgreSQL. If `may_create` is set, creates it if it is missing.
+    ///
+    /// # Errors
+    /// Returns an error if the URL is invalid, the server does not answer or refuses the connection, or the database
+    /// fails.
+    pub async fn connect(url: &str, may_create: bool) -> Result<Self> {
+        Self::connect_with(url, may_create, CommitDelay::new()).await
+    }
+
+    pub(crate) async fn connect_with(
+        url: &str,
+        may_create: bool,
+        delay: Arc<CommitDelay>,
+    ) -> Result<Self> {
+        let place = PostgresPlace::parse(url)?;
+        let conn = Conn::Postgres(Held::Owned(place.connect(may_create).await?));
+        let readers = Readers::Postgres(place.reader_pool().await?);
+        Ok(Self::start(readers, conn, Path::new(&place.text()), delay))
+    }
+
+    /// Opens the catalog at a URL of PostgreSQL read-only.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`].
+    pub async fn connect_read_only(url: &str) -> Result<Self> {
+        let place = PostgresPlace::parse(url)?;
+        Ok(Self {
+            readers: Readers::Postgres(place.reader_pool().await?),
+            inbox: None,
+            delay: CommitDelay::new(),
+            path: Path::new(&place.text()).into(),
+        })
+    }
+
+    /// Starts the writer task.
+    fn start(readers: Readers, conn: Conn, path: &Path, delay: Arc<CommitDelay>) -> Self {
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), Arc::clone(&path));
+        let writer = WriteConnection::new(conn, Arc::clone(&path));
         let writer = writer::run(writer, inbox, Arc::clone(&delay));
         tokio::spawn(writer);
-        Ok(Self {
-            reader_pool,
+        Self {
+            readers,
             inbox: Some(sender),
             delay,
             path,
-        })
+        }
     }
 
     /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
     pub async fn close(self) {
         // Readers first: an open reader prevents a complete checkpoint.
-        self.reader_pool.close().await;
+        match self.readers {
+            Readers::Sqlite(pool) => pool.close().await,
+            Readers::Postgres(pool) => pool.close().await,
+        }
         if let Some(inbox) = self.inbox {
             let (sender, receiver) = oneshot::channel();
             if inbox.send(Message::Close(sender)).await.is_ok() {
@@ -98,16 +150,21 @@ impl Catalog {
     }
 
     pub(crate) async fn read_conn(&self) -> Result<Conn> {
-        Ok(Conn::Sqlite(Held::Pooled(
-            self.reader_pool.acquire().await?,
-        )))
+        Ok(match &self.readers {
+            Readers::Sqlite(pool) => Conn::Sqlite(Held::Pooled(pool.acquire().await?)),
+            Readers::Postgres(pool) => Conn::Postgres(Held::Pooled(pool.acquire().await?)),
+        })
     }
 
     /// Begins a read transaction, which sees the catalog as of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Conn> {
-        Ok(Conn::Sqlite(Held::Snapshot(
-            self.reader_pool.begin().await?,
-        )))
+        Ok(match &self.readers {
+            Readers::Sqlite(pool) => Conn::Sqlite(Held::Snapshot(pool.begin().await?)),
+            Readers::Postgres(pool) => {
+                let begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
+                Conn::Postgres(Held::Snapshot(pool.begin_with(begin).await?))
+            }
+        })
     }
 
     /// Runs `work` in a separate write transaction on the writer task.

@@ -8,10 +8,22 @@ mod audit;
 mod db;
 mod handle;
 mod new_catalog;
+#[cfg(test)]
+mod query_plans;
 mod queue;
 mod records;
 #[cfg(test)]
+mod test_helpers;
+#[cfg(test)]
 mod tests;
+// The same tests on PostgreSQL.
+#[cfg(test)]
+#[path = "tests/mod.rs"]
+#[allow(
+    clippy::duplicate_mod,
+    reason = "the module's name selects the database"
+)]
+mod tests_on_postgres;
 
 pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;

@@ -190,6 +190,10 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             "{path}: the disk reported an error ({}), or another program changed the catalog's files; check the disk, then run `check`",
             root_cause(error)
         ),
+        Some(CatalogErrorKind::Away) => format!(
+            "the catalog's database server cannot be reached ({}); check that it runs, then start the command again: nothing stored is lost",
+            root_cause(error)
+        ),
         Some(CatalogErrorKind::Contradiction) => format!(
             "{path} contains rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
         ),

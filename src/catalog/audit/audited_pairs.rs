@@ -63,10 +63,10 @@ WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
 
 pub(crate) const RESULTS: &str = "
 SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
-FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
+FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = CAST(wanted.atom AS bigint)";
 
 const METRICS: &str = "
-SELECT m.* FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = wanted.value";
+SELECT m.* FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = CAST(wanted.atom AS bigint)";
 
 impl Catalog {
     /// Reads up to `limit` pairs with ids above `after`.

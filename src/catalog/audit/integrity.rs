@@ -58,7 +58,7 @@ const FINGERPRINTS: &str =
 
 const WRONG_FINGERPRINTS: &str = "
 SELECT count(*) FROM job AS j JOIN stage_result AS r ON r.pair = j.pair AND r.stage = j.stage - 1
-WHERE r.fingerprint IS NOT j.fingerprint";
+WHERE r.fingerprint IS DISTINCT FROM j.fingerprint";
 
 const UNMARKED: &str = concat!(
     "SELECT count(*) FROM job WHERE dirty = 0 AND EXISTS (",
@@ -73,7 +73,10 @@ impl Catalog {
     /// # Errors
     /// Returns an error if the disk fails to read part of the file, or if SQLite reports an error other than damage.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
-        let Conn::Sqlite(mut conn) = self.read_conn().await?;
+        // The server of PostgreSQL checks its own files.
+        let Conn::Sqlite(mut conn) = self.read_conn().await? else {
+            return Ok(Vec::new());
+        };
         match integrity(&mut conn, quick).await {
             Ok(lines) if lines.iter().any(|line| is_unread(line)) => {
                 Err(CatalogError::Unread(self.path.to_path_buf()))
@@ -105,7 +108,9 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
-        let Conn::Sqlite(mut conn) = self.read_conn().await?;
+        let Conn::Sqlite(mut conn) = self.read_conn().await? else {
+            return Ok(Vec::new());
+        };
         let found = objects(&mut conn).await?;
         let wanted = wanted_objects().await?;
         let gone = wanted.keys().filter(|name| !found.contains_key(*name));

@@ -5,6 +5,7 @@ use sqlx::AssertSqlSafe;
 
 use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
@@ -16,43 +17,52 @@ use crate::domain::{PairId, Stage};
 
 const POSITIONS: &str = "
 SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
-FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = item.value ->> 0";
+FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
-SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
+SELECT CAST(value ->> 0 AS bigint), 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = CAST(value ->> 0 AS bigint))";
 
 /// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
 /// lease fail.
 pub(crate) const RESTORE: &str = concat!(
     "
-UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
+UPDATE job SET stage = min(stage, CAST(item.value ->> 1 AS bigint)), status = 0, run_at = NULL, prio = 0,
     attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
     fingerprint = ",
-    fingerprint_before!("min(job.stage, item.value ->> 1)"),
+    fingerprint_before!("min(job.stage, CAST(item.value ->> 1 AS bigint))"),
     "
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
+FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint)
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
 /// Removes the results of the stages that are to run again, because their values may be invalid.
 const REMOVE_RESULTS: &str = "
 DELETE FROM stage_result WHERE (pair, stage) IN (
-    SELECT item.value ->> 0, later.value FROM json_each(?1) AS item, json_each('[0,1,2,3]') AS later
-    WHERE later.value >= item.value ->> 1)";
+    SELECT CAST(item.value ->> 0 AS bigint), later.stage FROM json_each(?1) AS item,
+        (SELECT 0 AS stage UNION ALL SELECT 1 UNION ALL SELECT 2 UNION ALL SELECT 3) AS later
+    WHERE later.stage >= CAST(item.value ->> 1 AS bigint))";
 
 /// Recreates every counter with the value 0.
-const RESET_COUNTERS: [&str; 3] = [
-    "DELETE FROM counter",
-    "INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]')",
-    "INSERT INTO counter (stage, status, fingerprint, n)
-    SELECT f.stage + 1, s.value, f.id, 0 FROM fingerprint AS f, json_each('[0,1,2,3,4]') AS s",
+const RESET_COUNTERS: [Sql; 3] = [
+    Sql::pair("DELETE FROM counter", "DELETE FROM counter_part"),
+    Sql::pair(
+        "INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]')",
+        "INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+        SELECT 0, 0, status, 0, 0 FROM generate_series(0, 4) AS status",
+    ),
+    Sql::pair(
+        "INSERT INTO counter (stage, status, fingerprint, n)
+        SELECT f.stage + 1, s.value, f.id, 0 FROM fingerprint AS f, json_each('[0,1,2,3,4]') AS s",
+        "INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+        SELECT 0, f.stage + 1, status, f.id, 0 FROM fingerprint AS f, generate_series(0, 4) AS status",
+    ),
 ];
 
 const FIX_FINGERPRINTS: &str = concat!(
     "UPDATE job SET fingerprint = ",
     fingerprint_before!("job.stage"),
-    " WHERE fingerprint IS NOT ",
+    " WHERE fingerprint IS DISTINCT FROM ",
     fingerprint_before!("job.stage")
 );
 
@@ -80,7 +90,8 @@ impl Catalog {
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                for sql in [FIX_FINGERPRINTS, MARK_DIRTY].iter().chain(&RESET_COUNTERS) {
+                let marks = [FIX_FINGERPRINTS, MARK_DIRTY].map(Sql::from);
+                for sql in marks.iter().chain(&RESET_COUNTERS) {
                     query(*sql).execute(&mut *conn).await?;
                 }
                 let mut deltas = Deltas::default();
@@ -101,8 +112,12 @@ impl Catalog {
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                query("REINDEX").execute(&mut *conn).await?;
-                let Conn::Sqlite(conn) = conn;
+                query(Sql::pair("REINDEX", "SELECT 1"))
+                    .execute(&mut *conn)
+                    .await?;
+                let Conn::Sqlite(conn) = conn else {
+                    return Ok(Vec::new());
+                };
                 integrity(conn, false).await
             })
         })
@@ -117,7 +132,9 @@ impl Catalog {
         let wanted = wanted_objects().await?;
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let Conn::Sqlite(conn) = conn;
+                let Conn::Sqlite(conn) = conn else {
+                    return Ok(());
+                };
                 let found = objects(conn).await?;
                 for (name, sql) in wanted {
                     if !name.starts_with("table ") && !found.contains_key(&name) {

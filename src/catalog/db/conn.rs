@@ -3,11 +3,12 @@
 use std::ops::{Deref, DerefMut};
 
 use sqlx::pool::PoolConnection;
-use sqlx::{Database, Sqlite, Transaction};
+use sqlx::{Database, Postgres, Sqlite, Transaction};
 
 /// A connection to a catalog.
 pub(crate) enum Conn {
     Sqlite(Held<Sqlite>),
+    Postgres(Held<Postgres>),
 }
 
 /// A connection that belongs to its holder or to a pool. A snapshot ends when it is dropped.

@@ -32,7 +32,7 @@ impl Catalog {
         // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
         // off, so that the pool keeps only read connections.
         let Conn::Sqlite(Held::Pooled(conn)) = self.read_conn().await? else {
-            return Err(CatalogError::Closed);
+            return Err(CatalogError::FileOnly("be copied to a file; use `pg_dump`"));
         };
         let mut conn = conn.detach();
         sqlx::query("PRAGMA query_only = 0")

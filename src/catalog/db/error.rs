@@ -88,6 +88,23 @@ pub enum CatalogError {
         /// Name of the file system.
         kind: &'static str,
     },
+    /// An address of a PostgreSQL catalog that cannot be used.
+    #[error("{0}")]
+    CatalogUrl(String),
+    /// The PostgreSQL server cannot be reached, or refuses the connection.
+    #[error("cannot connect to {place}: {reason}")]
+    NotConnected {
+        /// The address without the password.
+        place: String,
+        /// Why, with what to do.
+        reason: String,
+    },
+    /// The database has no catalog.
+    #[error("there is no catalog at {0}; `mocban import` creates it")]
+    NoSchema(String),
+    /// An operation that only a catalog in a file has.
+    #[error("a catalog in PostgreSQL cannot {0}")]
+    FileOnly(&'static str),
     /// A path that is not UTF-8.
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),

@@ -1,5 +1,7 @@
 //! Kinds of database errors, by SQLite's result codes.
 
+use sqlx::postgres::PgDatabaseError;
+
 use crate::catalog::db::error::CatalogError;
 
 /// The kind of a database error.
@@ -19,6 +21,8 @@ pub enum CatalogErrorKind {
     Busy,
     /// An I/O error.
     Disk,
+    /// The database server cannot be reached at the moment.
+    Away,
     /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
     /// A statement failed. All statements are tested, so a check concludes that the schema or a stored JSON text is
@@ -45,8 +49,36 @@ impl CatalogErrorKind {
     }
 
     pub(crate) fn of(error: &sqlx::Error) -> Option<Self> {
-        let code = error.as_database_error()?.code()?;
-        Self::of_code(code.parse().ok()?)
+        let database = match error {
+            sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut | sqlx::Error::Protocol(_) => {
+                return Some(Self::Away);
+            }
+            error => error.as_database_error()?,
+        };
+        let code = database.code()?;
+        match database.try_downcast_ref::<PgDatabaseError>() {
+            Some(_) => Self::of_sqlstate(&code),
+            None => Self::of_code(code.parse().ok()?),
+        }
+    }
+
+    /// Returns the kind of an error code of PostgreSQL.
+    fn of_sqlstate(code: &str) -> Option<Self> {
+        Some(match code {
+            // Deadlock, serialization failure, lock not available: the transaction can run again.
+            "40P01" | "40001" | "55P03" => Self::Busy,
+            "25006" | "42501" => Self::ReadOnly,
+            "53100" => Self::Full,
+            "58030" => Self::Disk,
+            "57P01" | "57P02" | "57P03" | "25P03" | "53300" => Self::Away,
+            _ => match &code[..2] {
+                "08" => Self::Away,
+                "23" => Self::Contradiction,
+                "XX" => Self::Damaged,
+                "42" | "22" => Self::Statement,
+                _ => return None,
+            },
+        })
     }
 }
 

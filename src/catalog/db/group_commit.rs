@@ -6,6 +6,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
+use crate::catalog::db::write_connection::BEGIN;
 use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::catalog::queue::claim::{self, ClaimRequest, Heartbeat};
 use crate::catalog::queue::counters::Deltas;
@@ -92,7 +93,7 @@ impl Batch {
     /// the transaction may still be open, so the caller must roll it back.
     pub(crate) async fn apply(&self, conn: &mut Conn) -> Result<BatchReply> {
         let mut script = Script::default();
-        script.execute("BEGIN IMMEDIATE");
+        script.execute(BEGIN);
         let statements = self.add_jobs(&mut script)?;
         let rows = script.run(conn).await?;
         let mut script = Script::default();

@@ -21,11 +21,11 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema. Versions 1 to 7 were never released.
-const SCHEMA_VERSION: i64 = 8;
+pub(crate) const SCHEMA_VERSION: i64 = 8;
 /// Read connections per process.
 const READERS: u32 = 4;
 
-pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx_macros::migrate!("./migrations");
+pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx_macros::migrate!("./migrations/sqlite");
 
 /// Returns the options of every connection.
 fn options(path: &Path) -> SqliteConnectOptions {

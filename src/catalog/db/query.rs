@@ -2,10 +2,12 @@
 
 use std::marker::PhantomData;
 
-use sqlx::Arguments as _;
+use sqlx::postgres::PgArguments;
 use sqlx::sqlite::SqliteArguments;
+use sqlx::{Arguments as _, AssertSqlSafe};
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::{Argument, FromValue};
@@ -13,7 +15,7 @@ use crate::catalog::db::value::{Argument, FromValue};
 /// A statement with its parameters `?1`, `?2` and so on. `R` says what each row becomes.
 #[derive(Debug)]
 pub(crate) struct Query<R> {
-    sql: &'static str,
+    sql: Sql,
     arguments: Vec<Argument>,
     rows: PhantomData<fn() -> R>,
 }
@@ -59,22 +61,22 @@ impl<T: FromValue> Rows for Scalar<T> {
 }
 
 /// Makes a statement whose rows are read by column, or that returns none.
-pub(crate) const fn query(sql: &'static str) -> Query<Raw> {
-    Query::new(sql)
+pub(crate) fn query(sql: impl Into<Sql>) -> Query<Raw> {
+    Query::new(sql.into())
 }
 
 /// Makes a statement whose rows become values of a type.
-pub(crate) const fn query_as<T: FromRow>(sql: &'static str) -> Query<As<T>> {
-    Query::new(sql)
+pub(crate) fn query_as<T: FromRow>(sql: impl Into<Sql>) -> Query<As<T>> {
+    Query::new(sql.into())
 }
 
 /// Makes a statement whose rows have one column.
-pub(crate) const fn query_scalar<T: FromValue>(sql: &'static str) -> Query<Scalar<T>> {
-    Query::new(sql)
+pub(crate) fn query_scalar<T: FromValue>(sql: impl Into<Sql>) -> Query<Scalar<T>> {
+    Query::new(sql.into())
 }
 
 impl<R> Query<R> {
-    const fn new(sql: &'static str) -> Self {
+    const fn new(sql: Sql) -> Self {
         Self {
             sql,
             arguments: Vec::new(),
@@ -93,9 +95,14 @@ impl<R> Query<R> {
         match conn {
             Conn::Sqlite(conn) => {
                 let arguments = sqlite_arguments(self.arguments)?;
-                sqlx::query_with(self.sql, arguments)
-                    .execute(&mut **conn)
-                    .await?;
+                let query = sqlx::query_with(self.sql.sqlite, arguments);
+                query.execute(&mut **conn).await?;
+            }
+            Conn::Postgres(conn) => {
+                let arguments = postgres_arguments(self.arguments)?;
+                let sql = AssertSqlSafe(self.sql.postgres_query());
+                let query = sqlx::query_with(sql, arguments);
+                query.execute(&mut **conn).await?;
             }
         }
         Ok(())
@@ -108,9 +115,16 @@ impl<R: Rows> Query<R> {
         match conn {
             Conn::Sqlite(conn) => {
                 let arguments = sqlite_arguments(self.arguments)?;
-                let rows = sqlx::query_with(self.sql, arguments).fetch_all(&mut **conn);
+                let rows = sqlx::query_with(self.sql.sqlite, arguments).fetch_all(&mut **conn);
                 let rows = rows.await?.into_iter();
                 rows.map(|row| R::value(Row::Sqlite(row))).collect()
+            }
+            Conn::Postgres(conn) => {
+                let arguments = postgres_arguments(self.arguments)?;
+                let sql = AssertSqlSafe(self.sql.postgres_query());
+                let rows = sqlx::query_with(sql, arguments).fetch_all(&mut **conn);
+                let rows = rows.await?.into_iter();
+                rows.map(|row| R::value(Row::Postgres(row))).collect()
             }
         }
     }
@@ -120,8 +134,15 @@ impl<R: Rows> Query<R> {
         match conn {
             Conn::Sqlite(conn) => {
                 let arguments = sqlite_arguments(self.arguments)?;
-                let row = sqlx::query_with(self.sql, arguments).fetch_optional(&mut **conn);
+                let row = sqlx::query_with(self.sql.sqlite, arguments).fetch_optional(&mut **conn);
                 row.await?.map(|row| R::value(Row::Sqlite(row))).transpose()
+            }
+            Conn::Postgres(conn) => {
+                let arguments = postgres_arguments(self.arguments)?;
+                let sql = AssertSqlSafe(self.sql.postgres_query());
+                let row = sqlx::query_with(sql, arguments).fetch_optional(&mut **conn);
+                let row = row.await?.map(Row::Postgres);
+                row.map(R::value).transpose()
             }
         }
     }
@@ -141,6 +162,21 @@ pub(crate) fn sqlite_arguments(
     arguments: impl IntoIterator<Item = Argument>,
 ) -> Result<SqliteArguments> {
     let mut converted = SqliteArguments::default();
+    for argument in arguments {
+        let added = match argument {
+            Argument::Integer(value) => converted.add(value),
+            Argument::Real(value) => converted.add(value),
+            Argument::Text(value) => converted.add(value),
+            Argument::Blob(value) => converted.add(value),
+        };
+        added.map_err(sqlx::Error::Encode)?;
+    }
+    Ok(converted)
+}
+
+/// Converts parameters for PostgreSQL.
+fn postgres_arguments(arguments: Vec<Argument>) -> Result<PgArguments> {
+    let mut converted = PgArguments::default();
     for argument in arguments {
         let added = match argument {
             Argument::Integer(value) => converted.add(value),

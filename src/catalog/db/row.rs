@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::fmt;
 
 use sqlx::error::BoxDynError;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Decode, Row as _, Sqlite, TypeInfo as _, ValueRef as _};
+use sqlx::postgres::{PgRow, PgValueRef};
+use sqlx::sqlite::{SqliteRow, SqliteValueRef};
+use sqlx::{Decode, Postgres, Row as _, Sqlite, TypeInfo as _, ValueRef as _};
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::value::{FromValue, Value};
@@ -13,16 +14,22 @@ use crate::catalog::db::value::{FromValue, Value};
 /// A row of a result.
 pub(crate) enum Row {
     Sqlite(SqliteRow),
+    Postgres(PgRow),
 }
 
 /// A column by name or index.
 pub(crate) trait Column: fmt::Display + Copy {
     fn of_sqlite(self, row: &SqliteRow) -> Result<Value<'_>, BoxDynError>;
+    fn of_postgres(self, row: &PgRow) -> Result<Value<'_>, BoxDynError>;
 }
 
 impl Column for &str {
     fn of_sqlite(self, row: &SqliteRow) -> Result<Value<'_>, BoxDynError> {
         sqlite_value(row.try_get_raw(self)?)
+    }
+
+    fn of_postgres(self, row: &PgRow) -> Result<Value<'_>, BoxDynError> {
+        postgres_value(row.try_get_raw(self)?)
     }
 }
 
@@ -30,9 +37,13 @@ impl Column for usize {
     fn of_sqlite(self, row: &SqliteRow) -> Result<Value<'_>, BoxDynError> {
         sqlite_value(row.try_get_raw(self)?)
     }
+
+    fn of_postgres(self, row: &PgRow) -> Result<Value<'_>, BoxDynError> {
+        postgres_value(row.try_get_raw(self)?)
+    }
 }
 
-fn sqlite_value(value: sqlx::sqlite::SqliteValueRef<'_>) -> Result<Value<'_>, BoxDynError> {
+fn sqlite_value(value: SqliteValueRef<'_>) -> Result<Value<'_>, BoxDynError> {
     if value.is_null() {
         return Ok(Value::Null);
     }
@@ -45,11 +56,28 @@ fn sqlite_value(value: sqlx::sqlite::SqliteValueRef<'_>) -> Result<Value<'_>, Bo
     })
 }
 
+/// Converts a value of PostgreSQL. Truth values become 0 or 1, as in SQLite.
+fn postgres_value(value: PgValueRef<'_>) -> Result<Value<'_>, BoxDynError> {
+    if value.is_null() {
+        return Ok(Value::Null);
+    }
+    let kind = value.type_info().into_owned();
+    Ok(match kind.name() {
+        "INT8" => Value::Integer(<i64 as Decode<Postgres>>::decode(value)?),
+        "INT4" => Value::Integer(<i32 as Decode<Postgres>>::decode(value)?.into()),
+        "BOOL" => Value::Integer(<bool as Decode<Postgres>>::decode(value)?.into()),
+        "FLOAT8" => Value::Real(<f64 as Decode<Postgres>>::decode(value)?),
+        "BYTEA" => Value::Blob(Cow::Owned(<Vec<u8> as Decode<Postgres>>::decode(value)?)),
+        _ => Value::Text(Cow::Borrowed(value.as_bytes()?)),
+    })
+}
+
 impl Row {
     /// Returns the number of columns.
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::Sqlite(row) => row.len(),
+            Self::Postgres(row) => row.len(),
         }
     }
 
@@ -57,6 +85,7 @@ impl Row {
     pub(crate) fn value(&self, column: impl Column) -> Result<Value<'_>, BoxDynError> {
         match self {
             Self::Sqlite(row) => column.of_sqlite(row),
+            Self::Postgres(row) => column.of_postgres(row),
         }
     }
 

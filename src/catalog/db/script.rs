@@ -1,14 +1,15 @@
-//! Runs several statements in one round trip to SQLite's thread. A round trip takes about 30 us, longer than most
-//! statements.
+//! Runs several statements in one round trip. A round trip to SQLite's thread takes about 30 us, longer than most
+//! statements; a round trip to PostgreSQL takes as long as the network.
 
 use std::fmt;
 use std::marker::PhantomData;
 
-use futures_util::TryStreamExt as _;
+use futures_util::{Stream, TryStreamExt as _};
 use serde::Serialize;
 use sqlx::{AssertSqlSafe, Either, Executor as _};
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::query::sqlite_arguments;
 use crate::catalog::db::row::{FromRow, Row};
@@ -19,9 +20,7 @@ use crate::catalog::db::value::Argument;
 /// Parameters are written as plain `?`. sqlx binds them in order across all statements.
 #[derive(Debug, Default)]
 pub(crate) struct Script {
-    sql: String,
-    parameters: Vec<Argument>,
-    statements: usize,
+    statements: Vec<(Sql, Vec<Argument>)>,
 }
 
 /// A statement of a [`Script`] whose rows are of type `T`.
@@ -36,31 +35,31 @@ pub(crate) struct ScriptRows(Vec<Vec<Row>>);
 
 impl Script {
     /// Adds a statement; its parameters are bound next.
-    pub(crate) fn add<T>(&mut self, sql: &'static str) -> Statement<T> {
-        self.sql.push_str(sql);
-        self.sql.push_str(";\n");
-        self.statements += 1;
+    pub(crate) fn add<T>(&mut self, sql: impl Into<Sql>) -> Statement<T> {
+        self.statements.push((sql.into(), Vec::new()));
         Statement {
-            index: self.statements - 1,
+            index: self.statements.len() - 1,
             row: PhantomData,
         }
     }
 
     /// Adds a statement that returns no rows.
-    pub(crate) fn execute(&mut self, sql: &'static str) {
+    pub(crate) fn execute(&mut self, sql: impl Into<Sql>) {
         self.add::<()>(sql);
     }
 
     /// Binds the next parameter.
     pub(crate) fn bind(&mut self, value: impl Into<Argument>) {
-        self.parameters.push(value.into());
+        if let Some((_, arguments)) = self.statements.last_mut() {
+            arguments.push(value.into());
+        }
     }
 
     /// Adds a statement whose parameter is a JSON array of the items. Returns `None`, and adds nothing, if there are no
     /// items.
     pub(crate) fn add_over<T>(
         &mut self,
-        sql: &'static str,
+        sql: impl Into<Sql>,
         items: impl Iterator<Item = impl Serialize>,
     ) -> Result<Option<Statement<T>>> {
         let mut array = String::new();
@@ -80,7 +79,7 @@ impl Script {
     /// Like [`Script::add_over`], for a statement that returns no rows.
     pub(crate) fn execute_over(
         &mut self,
-        sql: &'static str,
+        sql: impl Into<Sql>,
         items: impl Iterator<Item = impl Serialize>,
     ) -> Result<()> {
         self.add_over::<()>(sql, items).map(drop)
@@ -90,26 +89,54 @@ impl Script {
     pub(crate) async fn run(self, conn: &mut Conn) -> Result<ScriptRows> {
         match conn {
             Conn::Sqlite(conn) => {
-                let parameters = sqlite_arguments(self.parameters)?;
-                // Concatenated constants only.
-                let query = sqlx::query_with(AssertSqlSafe(self.sql), parameters);
-                let mut results = conn.fetch_many(query);
-                let mut rows = vec![Vec::new()];
-                while let Some(result) = results.try_next().await? {
-                    match result {
-                        Either::Right(row) => {
-                            if let Some(rows) = rows.last_mut() {
-                                rows.push(Row::Sqlite(row));
-                            }
-                        }
-                        // The end of a statement.
-                        Either::Left(_) => rows.push(Vec::new()),
-                    }
+                let mut sql = String::new();
+                for (statement, _) in &self.statements {
+                    sql.push_str(statement.sqlite);
+                    sql.push_str(";\n");
                 }
-                Ok(ScriptRows(rows))
+                let arguments = self.statements.into_iter();
+                let arguments = sqlite_arguments(arguments.flat_map(|(_, arguments)| arguments))?;
+                // Concatenated constants only.
+                let query = sqlx::query_with(AssertSqlSafe(sql), arguments);
+                rows_of(
+                    conn.fetch_many(query)
+                        .map_ok(|one| one.map_right(Row::Sqlite)),
+                )
+                .await
+            }
+            Conn::Postgres(conn) => {
+                let mut sql = String::new();
+                for (statement, arguments) in &self.statements {
+                    statement.add_postgres(&mut sql, arguments)?;
+                }
+                // Constants, and values that `add_postgres` quotes.
+                let query = sqlx::raw_sql(AssertSqlSafe(sql));
+                rows_of(
+                    conn.fetch_many(query)
+                        .map_ok(|one| one.map_right(Row::Postgres)),
+                )
+                .await
             }
         }
     }
+}
+
+/// Collects the rows of each statement of a stream. The left value marks the end of a statement.
+async fn rows_of<E>(
+    mut results: impl Stream<Item = sqlx::Result<Either<E, Row>>> + Unpin,
+) -> Result<ScriptRows> {
+    let mut rows = vec![Vec::new()];
+    while let Some(result) = results.try_next().await? {
+        match result {
+            Either::Right(row) => {
+                if let Some(rows) = rows.last_mut() {
+                    rows.push(row);
+                }
+            }
+            Either::Left(_) => rows.push(Vec::new()),
+        }
+    }
+    Ok(ScriptRows(rows))
 }
 
 impl ScriptRows {

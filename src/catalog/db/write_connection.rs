@@ -9,23 +9,31 @@ use sqlx::Connection as _;
 
 use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::conn::{Conn, Held};
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::log_watch::LogWatch;
+use crate::catalog::db::postgres::LOCK;
 use crate::catalog::db::query::query;
+
+/// Begins a transaction.
+pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
 
 /// A future that borrows the write connection.
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 
-/// The write connection, and the log that its commits go to.
+/// The write connection, and for SQLite the log that its commits go to.
 pub(crate) struct WriteConnection {
     pub(crate) conn: Conn,
     pub(crate) path: Arc<Path>,
-    log: LogWatch,
+    log: Option<LogWatch>,
 }
 
 impl WriteConnection {
     pub(crate) fn new(conn: Conn, path: Arc<Path>) -> Self {
-        let log = LogWatch::new(&path);
+        let log = match &conn {
+            Conn::Sqlite(_) => Some(LogWatch::new(&path)),
+            Conn::Postgres(_) => None,
+        };
         Self { conn, path, log }
     }
 
@@ -34,8 +42,10 @@ impl WriteConnection {
     /// # Errors
     /// Returns an error if another program deleted, replaced or cut the log.
     pub(crate) async fn check_log(&mut self) -> Result<()> {
-        let Conn::Sqlite(conn) = &mut self.conn;
-        self.log.check(conn).await
+        match (&mut self.conn, &mut self.log) {
+            (Conn::Sqlite(conn), Some(log)) => log.check(conn).await,
+            _ => Ok(()),
+        }
     }
 
     /// Runs `work` in a separate transaction. Rolls it back if `work` or the commit fails.
@@ -45,7 +55,7 @@ impl WriteConnection {
     ) -> Result<T> {
         self.check_log().await?;
         let Self { conn, path, .. } = self;
-        retry_while_busy!(path, execute(conn, "BEGIN IMMEDIATE").await)?;
+        retry_while_busy!(path, begin(conn).await)?;
         let mut outcome = work(&mut *conn).await;
         if outcome.is_ok()
             && let Err(error) = execute(conn, "COMMIT").await
@@ -61,23 +71,39 @@ impl WriteConnection {
 
     /// Checkpoints the log, unless it is lost.
     pub(crate) async fn checkpoint_log(&mut self, pragma: &'static str) {
-        let Conn::Sqlite(conn) = &mut self.conn;
-        self.log.checkpoint(conn, pragma).await;
+        if let (Conn::Sqlite(conn), Some(log)) = (&mut self.conn, &mut self.log) {
+            log.checkpoint(conn, pragma).await;
+        }
     }
 
     /// Checkpoints the log and closes the connection.
     pub(crate) async fn close(mut self) {
         self.checkpoint_log("PRAGMA wal_checkpoint(TRUNCATE)").await;
-        let Conn::Sqlite(Held::Owned(conn)) = self.conn else {
-            return;
-        };
-        if self.log.is_lost() {
+        let is_lost = self.log.as_ref().is_some_and(LogWatch::is_lost);
+        let closed = match self.conn {
             // Closing would copy pages of the damaged log to the catalog. Exiting without closing does not.
-            std::mem::forget(conn);
-        } else if let Err(error) = conn.close().await {
+            Conn::Sqlite(Held::Owned(conn)) if is_lost => {
+                std::mem::forget(conn);
+                return;
+            }
+            Conn::Sqlite(Held::Owned(conn)) => conn.close().await,
+            Conn::Postgres(Held::Owned(conn)) => conn.close().await,
+            Conn::Sqlite(_) | Conn::Postgres(_) => return,
+        };
+        if let Err(error) = closed {
             tracing::warn!(%error, "the catalog did not close cleanly");
         }
     }
+}
+
+/// Begins a transaction that no other such transaction runs beside.
+async fn begin(conn: &mut Conn) -> Result<()> {
+    let is_sqlite = matches!(conn, Conn::Sqlite(_));
+    execute(conn, BEGIN).await?;
+    if is_sqlite {
+        return Ok(());
+    }
+    execute(conn, LOCK).await
 }
 
 /// Rolls the current transaction back.
@@ -88,6 +114,6 @@ pub(crate) async fn rollback(conn: &mut Conn) {
     }
 }
 
-async fn execute(conn: &mut Conn, sql: &'static str) -> Result<()> {
+async fn execute(conn: &mut Conn, sql: impl Into<Sql>) -> Result<()> {
     query(sql).execute(conn).await
 }

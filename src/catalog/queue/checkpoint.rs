@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::script::{Script, Statement};
 use crate::catalog::queue::counters::{CounterKey, DONE, Deltas, cursor};
@@ -16,7 +17,8 @@ pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
 
 /// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the pair's crash count. Marks
 /// a job dirty if the new results do not build on the stored ones: see `advanced_job`.
-pub(crate) const ADVANCE: &str = "
+pub(crate) const ADVANCE: Sql = Sql::pair(
+    "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
     attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.value ->> 'low_confidence',
@@ -28,10 +30,23 @@ WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
-RETURNING pair, token";
+RETURNING pair, token",
+    "
+UPDATE job SET stage = item.next, status = item.status,
+    worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
+    attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
+    dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
+        SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
+FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, worker bigint, token bigint, next bigint, status bigint,
+    fingerprint bigint, first bigint, mixed bigint, low_confidence bigint, deadline bigint, alive_since bigint)
+WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status = 1 AND EXISTS (
+    SELECT 1 FROM worker AS w WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
+RETURNING job.pair, job.token",
+);
 
 /// Items: pair, index of the stage, worker, [`StageCheckpoint`].
-const RESULT: &str = "
+const RESULT: Sql = Sql::pair(
+    "
 INSERT INTO stage_result
     (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
 SELECT value ->> 0, value ->> 1, value ->> 2, value ->> '$[3].fingerprint', unhex(value ->> '$[3].mesh_hash'),
@@ -40,14 +55,33 @@ SELECT value ->> 0, value ->> 1, value ->> 2, value ->> '$[3].fingerprint', unhe
 FROM jsonb_each(?) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
-    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
+    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
+    "
+INSERT INTO stage_result
+    (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
+SELECT DISTINCT ON (1, 2) CAST(item.value ->> 0 AS bigint), CAST(item.value ->> 1 AS bigint),
+    CAST(item.value ->> 2 AS bigint), r.fingerprint, decode(r.mesh_hash, 'hex'), decode(r.print_hash, 'hex'),
+    r.attributes, r.outcome, CAST(r.files AS text), decode(r.result_hash, 'hex'), r.ms, r.at
+FROM json_array_elements(CAST(? AS json)) WITH ORDINALITY AS item (value, position),
+    json_to_record(item.value -> 3) AS r (fingerprint bigint, mesh_hash text, print_hash text, attributes text,
+        outcome text, files json, result_hash text, ms bigint, at bigint)
+ORDER BY 1, 2, item.position DESC
+ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
+    print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
+    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
+);
 
 /// Removes the old metrics, because the new method may compute fewer.
-const CLEAR_METRICS: &str = "
-DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
+const CLEAR_METRICS: Sql = Sql::pair(
+    "
+DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
+    "
+DELETE FROM metric_result WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json)))",
+);
 
 /// Items: pair, outcome of the metric, hash of its result.
-const METRICS: &str = "
+const METRICS: Sql = Sql::pair(
+    "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
@@ -60,29 +94,66 @@ SELECT value ->> 0, value ->> '$[1].metric', value ->> '$[1].threshold_level',
     value ->> '$[1].scores.density_depth', value ->> '$[1].disagreement.pieces',
     value ->> '$[1].disagreement.missing_ink', value ->> '$[1].disagreement.missing_wood',
     value ->> '$[1].margin', value ->> '$[1].confidence', value ->> '$[1].at_bound', unhex(value ->> 2)
-FROM jsonb_each(?)";
+FROM jsonb_each(?)",
+    "
+INSERT INTO metric_result
+    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
+     missing_wood, margin, confidence, at_bound, result_hash)
+SELECT CAST(item.value ->> 0 AS bigint), m.metric, m.threshold_level, m.threshold_depth,
+    CAST(m.print_from_depth AS text), m.angle_deg, m.scale,
+    CAST(m.shift_px ->> 0 AS double precision), CAST(m.shift_px ->> 1 AS double precision),
+    s.ssim, s.nl_ssim, s.iou, s.iou_box, s.dice, s.density_print, s.density_depth,
+    d.pieces, d.missing_ink, d.missing_wood, m.margin, m.confidence, CAST(m.at_bound AS int), decode(item.value ->> 2, 'hex')
+FROM json_array_elements(CAST(? AS json)) AS item (value),
+    json_to_record(item.value -> 1) AS m (metric text, threshold_level bigint, threshold_depth double precision,
+        print_from_depth json, angle_deg double precision, scale double precision, shift_px json, scores json,
+        disagreement json, margin double precision, confidence double precision, at_bound boolean),
+    json_to_record(m.scores) AS s (ssim double precision, nl_ssim double precision, iou double precision,
+        iou_box double precision, dice double precision, density_print double precision, density_depth double precision),
+    json_to_record(m.disagreement) AS d (pieces bigint, missing_ink double precision, missing_wood double precision)",
+);
 
 /// Items: pair, index of the stage, worker, milliseconds, time.
-const ATTEMPT: &str = "
+const ATTEMPT: Sql = Sql::pair(
+    "
 INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
+SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)",
+    "
+INSERT INTO attempt (pair, stage, worker, ms, at)
+SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint),
+    CAST(value ->> 3 AS bigint), CAST(value ->> 4 AS bigint) FROM json_array_elements(CAST(? AS json))",
+);
 
 /// Updates the input files of pairs. Items: pair, [`InputVersions`].
-pub(crate) const UPDATE_INPUTS: &str = "
+pub(crate) const UPDATE_INPUTS: Sql = Sql::pair(
+    "
 UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
     print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
 FROM (
     SELECT value ->> 0 AS id, unhex(value ->> '$[1].mesh.hash') AS mesh_hash, value ->> '$[1].mesh.stat' AS mesh_stat,
         unhex(value ->> '$[1].print.hash') AS print_hash, value ->> '$[1].print.stat' AS print_stat FROM jsonb_each(?)) AS new
 WHERE pair.id = new.id AND (pair.mesh_hash IS NOT new.mesh_hash OR pair.mesh_stat IS NOT new.mesh_stat
-    OR pair.print_hash IS NOT new.print_hash OR pair.print_stat IS NOT new.print_stat)";
+    OR pair.print_hash IS NOT new.print_hash OR pair.print_stat IS NOT new.print_stat)",
+    "
+UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
+    print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
+FROM (
+    SELECT CAST(value ->> 0 AS bigint) AS id, decode(value -> 1 -> 'mesh' ->> 'hash', 'hex') AS mesh_hash,
+        value -> 1 -> 'mesh' ->> 'stat' AS mesh_stat, decode(value -> 1 -> 'print' ->> 'hash', 'hex') AS print_hash,
+        value -> 1 -> 'print' ->> 'stat' AS print_stat FROM json_array_elements(CAST(? AS json))) AS new
+WHERE pair.id = new.id AND (pair.mesh_hash IS DISTINCT FROM new.mesh_hash OR pair.mesh_stat IS DISTINCT FROM new.mesh_stat
+    OR pair.print_hash IS DISTINCT FROM new.print_hash OR pair.print_stat IS DISTINCT FROM new.print_stat)",
+);
 
-const CLEAR_FAILURE: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
+const CLEAR_FAILURE: Sql = Sql::pair(
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
+    "DELETE FROM failure WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json)))",
+);
 
 /// The statements of [`add_results`].
 #[cfg(test)]
-pub(crate) const ROWS: [&str; 6] = [
+pub(crate) const ROWS: [Sql; 6] = [
     RESULT,
     CLEAR_METRICS,
     METRICS,

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::script::{Script, Statement};
 use crate::catalog::queue::counters::{Deltas, cursor};
@@ -56,17 +57,33 @@ pub(crate) struct Heartbeat {
 /// Leases the first ready jobs in the order of the index `job_ready`. While an exclusive job is leased, no worker holds
 /// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
 /// prepare the statement again each time.
-pub(crate) const CLAIM: &str = "
+///
+/// PostgreSQL skips jobs that another process is about to lease. An exclusive job excludes only leases on the same host.
+pub(crate) const CLAIM: Sql = Sql::pair(
+    "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
     ORDER BY prio, stage DESC, pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
+    "
+UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
+FROM worker AS me
+WHERE job.pair = ANY (ARRAY(
+        SELECT j.pair FROM job AS j WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
+        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
+    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
+    AND NOT EXISTS (
+        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
+        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
+RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive",
+);
 
 /// Like [`CLAIM`], but leases only selected pairs.
-pub(crate) const CLAIM_AMONG: &str = "
+pub(crate) const CLAIM_AMONG: Sql = Sql::pair(
+    "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT j.pair FROM json_each(?) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
@@ -74,15 +91,36 @@ WHERE pair IN (
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
+    "
+UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
+FROM worker AS me
+WHERE job.pair = ANY (ARRAY(
+        SELECT j.pair FROM json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
+    WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
+        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
+    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
+    AND NOT EXISTS (
+        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
+        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
+RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive",
+);
 
 /// Gives leases back. Their attempts do not count.
-pub(crate) const RELEASE: &str = "
+pub(crate) const RELEASE: Sql = Sql::pair(
+    "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
 FROM jsonb_each(?) AS item
 WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.token = item.value ->> 2
     AND job.status = 1
-RETURNING pair, token";
+RETURNING pair, token",
+    "
+UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = greatest(job.attempt - 1, 0)
+FROM json_array_elements(CAST(? AS json)) AS item (value)
+WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.worker = CAST(item.value ->> 1 AS bigint)
+    AND job.token = CAST(item.value ->> 2 AS bigint) AND job.status = 1
+RETURNING job.pair, job.token",
+);
 
 /// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead.
 pub(crate) const HEARTBEAT: &str = "

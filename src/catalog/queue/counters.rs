@@ -5,15 +5,23 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::query::query_as;
 use crate::catalog::db::row::from_row;
 use crate::catalog::db::script::Script;
 use crate::domain::{JobStatus, Stage};
 
-const CHANGE: &str = "
-UPDATE counter SET n = n + (d.value ->> 3) FROM jsonb_each(?) AS d
-WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1 AND counter.fingerprint = d.value ->> 2";
+const CHANGE: Sql = Sql::pair(
+    "
+UPDATE counter SET n = n + CAST(d.value ->> 3 AS bigint) FROM jsonb_each(?) AS d
+WHERE counter.stage = CAST(d.value ->> 0 AS bigint) AND counter.status = CAST(d.value ->> 1 AS bigint) AND counter.fingerprint = CAST(d.value ->> 2 AS bigint)",
+    "
+INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+SELECT pg_backend_pid() % 256, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint),
+    CAST(value ->> 3 AS bigint) FROM json_array_elements(CAST(? AS json))
+ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n",
+);
 
 /// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";

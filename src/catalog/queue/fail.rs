@@ -17,38 +17,38 @@ const ATTEMPTS_KEPT: i64 = 64;
 /// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead.
 pub(crate) const FAIL: &str = concat!(
     "
-UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
-    run_at = item.value ->> 'run_at', exclusive = max(exclusive, item.value ->> 'exclusive'),
+UPDATE job SET stage = min(job.stage, CAST(item.value ->> 'stage' AS bigint)), status = CAST(item.value ->> 'status' AS bigint),
+    run_at = CAST(item.value ->> 'run_at' AS bigint), exclusive = max(exclusive, CAST(item.value ->> 'exclusive' AS bigint)),
     worker = NULL, deadline = NULL, fingerprint = ",
-    fingerprint_before!("min(job.stage, item.value ->> 'stage')"),
+    fingerprint_before!("min(job.stage, CAST(item.value ->> 'stage' AS bigint))"),
     "
 FROM jsonb_each(?) AS item
-WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
+WHERE job.pair = CAST(item.value ->> 'pair' AS bigint) AND job.worker = CAST(item.value ->> 'worker' AS bigint)
+    AND job.token = CAST(item.value ->> 'token' AS bigint) AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
-        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
+        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= CAST(item.value ->> 'alive_since' AS bigint))
 RETURNING pair, token, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
 const FAILURE: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'fingerprint',
-    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'at'
-FROM jsonb_each(?) WHERE value ->> 'status' <> 0
+SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), value ->> 'class', value ->> 'message', CAST(value ->> 'fingerprint' AS bigint),
+    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'attributes', CAST(value ->> 'at' AS bigint)
+FROM jsonb_each(?) WHERE CAST(value ->> 'status' AS bigint) <> 0
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
     fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
     attributes = excluded.attributes, at = excluded.at";
 
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message',
-    value ->> 'ms', value ->> 'at'
+SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), CAST(value ->> 'worker' AS bigint), value ->> 'class', value ->> 'message',
+    CAST(value ->> 'ms' AS bigint), CAST(value ->> 'at' AS bigint)
 FROM jsonb_each(?)";
 
 const PRUNE: &str = "
 DELETE FROM attempt WHERE id IN (
-    SELECT old.id FROM jsonb_each(?) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
-    WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?))";
+    SELECT old.id FROM jsonb_each(?) AS item JOIN attempt AS old ON old.pair = CAST(item.value ->> 'pair' AS bigint)
+    WHERE old.id <= (SELECT id FROM attempt WHERE pair = CAST(item.value ->> 'pair' AS bigint) ORDER BY id DESC LIMIT 1 OFFSET ?))";
 
 /// A row of [`FAIL`]: a job with its token and new counter key.
 pub(crate) struct FailedRow {

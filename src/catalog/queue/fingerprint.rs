@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value, json};
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::value::Json;
@@ -78,9 +79,14 @@ INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
 /// Adds the counters of a fingerprint, one for each job status, if they do not exist.
-pub(crate) const ADD_COUNTERS: &str = "
+pub(crate) const ADD_COUNTERS: Sql = Sql::pair(
+    "
 INSERT INTO counter (stage, status, fingerprint, n) SELECT ?1, value, ?2, 0 FROM json_each('[0,1,2,3,4]') WHERE true
-ON CONFLICT DO NOTHING";
+ON CONFLICT DO NOTHING",
+    "
+INSERT INTO counter_part (slot, stage, status, fingerprint, n) SELECT 0, ?1, status, ?2, 0 FROM generate_series(0, 4) AS status
+ON CONFLICT DO NOTHING",
+);
 
 impl Catalog {
     /// Stores the fingerprints that are not stored yet. Returns the ids of all four.

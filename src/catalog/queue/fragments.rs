@@ -17,7 +17,7 @@ macro_rules! inconsistent {
     () => {
         "SELECT 1 FROM stage_result AS r JOIN pair AS p ON p.id = r.pair JOIN fingerprint AS f ON f.id = r.fingerprint
     WHERE r.pair = job.pair AND r.stage < job.stage AND (
-        r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes OR f.upstream IS NOT (
+        r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes OR f.upstream IS DISTINCT FROM (
             SELECT b.fingerprint FROM stage_result AS b WHERE b.pair = r.pair AND b.stage = r.stage - 1))"
     };
 }

@@ -54,23 +54,22 @@ ORDER BY w.id";
 pub(crate) const LEFT_BY: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
-WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
+WHERE j.status = 1 AND j.worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) GROUP BY w.id";
 
 /// Recovers the leases of the workers in `?1`, a list of `[worker, died, blamed]`. `blamed` is 1 if the worker died with
 /// only one lease, so that this pair is blamed. The interrupted attempt is not counted. Pairs of a worker that died must
 /// run exclusively from now on. The condition for status 4 (quarantined) is that of `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
-    status = iif((item.value ->> 2)
-        AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2), 4, 0),
-    worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + (item.value ->> 2),
-    attempt = max(attempt - 1, 0), exclusive = max(exclusive, item.value ->> 1)
-FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
+    status = CASE WHEN CAST(item.value ->> 2 AS bigint) = 1
+        AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2) THEN 4 ELSE 0 END,
+    worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + CAST(item.value ->> 2 AS bigint),
+    attempt = max(attempt - 1, 0), exclusive = max(exclusive, CAST(item.value ->> 1 AS bigint))
+FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = CAST(item.value ->> 0 AS bigint)
 RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
 /// Marks workers as dead, unless they ended properly.
-const DIED: &str =
-    "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT value FROM json_each(?1))";
+const DIED: &str = "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 /// Marks recent workers except one as dead. Only [`DEATHS`] reads the mark, and it ignores older workers.
 const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
@@ -78,28 +77,29 @@ UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
 
 /// Counts the workers that died among the newest 32.
 const DEATHS: &str = "
-SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) WHERE died AND ended IS NULL";
+SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) AS newest
+WHERE died = 1 AND ended IS NULL";
 
 /// Selects the leased pairs of the given workers.
 pub(crate) const AFFECTED_PAIRS: &str = "
-SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
+SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
 /// Recovers overdue leases of workers that are not known to be dead. A lease is overdue if the worker's last heartbeat
 /// is more than `?3` after the deadline. Both times are by the worker's own clock.
 pub(crate) const OVERDUE: &str = "
-UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
+UPDATE job SET status = CASE WHEN crashes + 1 >= ?2 THEN 4 ELSE 0 END, worker = NULL, deadline = NULL,
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
-WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
+WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
 /// Stores the failure of a quarantined pair, with its worker's settings and the inputs as last read.
 const CRASHED: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
-SELECT p.id, item.value ->> 'stage', item.value ->> 'class', item.value ->> 'message',
-    w.fingerprints ->> (item.value ->> 'stage'), p.mesh_hash, p.print_hash, p.attributes, item.value ->> 'at'
-FROM json_each(?1) AS item CROSS JOIN pair AS p ON p.id = item.value ->> 'pair'
-    LEFT JOIN worker AS w ON w.id = item.value ->> 'worker'
+SELECT p.id, CAST(item.value ->> 'stage' AS bigint), item.value ->> 'class', item.value ->> 'message',
+    CAST(w.fingerprints ->> CAST(item.value ->> 'stage' AS bigint) AS bigint), p.mesh_hash, p.print_hash, p.attributes, CAST(item.value ->> 'at' AS bigint)
+FROM json_each(?1) AS item CROSS JOIN pair AS p ON p.id = CAST(item.value ->> 'pair' AS bigint)
+    LEFT JOIN worker AS w ON w.id = CAST(item.value ->> 'worker' AS bigint)
 WHERE true
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
     fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
@@ -107,12 +107,12 @@ ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class,
 
 const CRASH_ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message', value ->> 'at' FROM json_each(?1)";
+SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), CAST(value ->> 'worker' AS bigint), value ->> 'class', value ->> 'message', CAST(value ->> 'at' AS bigint) FROM json_each(?1)";
 
 const FATAL_INPUTS: &str = "
-UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> '$[1].mesh.hash')),
-    print_hash = coalesce(failure.print_hash, unhex(item.value ->> '$[1].print.hash'))
-FROM json_each(?) AS item WHERE failure.pair = item.value ->> 0";
+UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value -> 1 -> 'mesh' ->> 'hash')),
+    print_hash = coalesce(failure.print_hash, unhex(item.value -> 1 -> 'print' ->> 'hash'))
+FROM json_each(?) AS item WHERE failure.pair = CAST(item.value ->> 0 AS bigint)";
 
 /// A row of [`RECOVER`] or [`OVERDUE`].
 struct RecoveredJob {

@@ -33,21 +33,21 @@ pub enum RetrySelection {
 /// Resets jobs to a stage, with no attempts or crashes. Skips leased jobs.
 pub(crate) const REQUEUE: &str = concat!(
     "
-UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
+UPDATE job SET stage = CAST(item.value ->> 1 AS bigint), status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
     exclusive = 0, fingerprint = ",
-    fingerprint_before!("(item.value ->> 1)"),
+    fingerprint_before!("(CAST(item.value ->> 1 AS bigint))"),
     "
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1
+FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.status <> 1
 RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
 /// Selects one page of the clean jobs with one stage, status and fingerprint, sorted by pair.
 pub(crate) const MEMBERS: &str = "
-SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS ?4 AND dirty = 0
+SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
 
 pub(crate) const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
+    "DELETE FROM failure WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1))";
 
 /// Selects the jobs that failed or back off, of one failure class or of all.
 const FAILED_JOBS: &str = "
@@ -56,7 +56,7 @@ WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
 
 const FAILED_AMONG: &str = "
 SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
-FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.status IN (2, 4)";
+FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint) WHERE j.status IN (2, 4)";
 
 impl Catalog {
     /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers

@@ -36,7 +36,7 @@ impl PairSelection {
 
 /// Selects pairs by name; unknown names are left out.
 pub(crate) async fn select(conn: &mut Conn, names: &[PairName]) -> Result<PairSelection> {
-    let sql = "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id";
+    let sql = "SELECT id FROM pair WHERE name IN (SELECT atom FROM json_each(?1)) ORDER BY id";
     let query = query_scalar(sql).bind(names_json(names));
     let pairs: Vec<PairId> = query.fetch_all(conn).await?;
     Ok(PairSelection::of(&pairs))
@@ -44,8 +44,8 @@ pub(crate) async fn select(conn: &mut Conn, names: &[PairName]) -> Result<PairSe
 
 /// Returns the names that are not pairs, in the order given.
 pub(crate) async fn unknown_names(conn: &mut Conn, names: &[PairName]) -> Result<Vec<PairName>> {
-    let sql = "SELECT value FROM json_each(?1) AS given
-        WHERE NOT EXISTS (SELECT 1 FROM pair WHERE name = given.value) ORDER BY given.id";
+    let sql = "SELECT atom FROM json_each(?1) AS given
+        WHERE NOT EXISTS (SELECT 1 FROM pair WHERE name = given.atom) ORDER BY given.key";
     let query = query_scalar(sql).bind(names_json(names));
     Ok(query.fetch_all(conn).await?)
 }

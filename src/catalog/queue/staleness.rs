@@ -38,15 +38,15 @@ pub(crate) const INSPECT: &str = "
 WITH found AS (
     SELECT j.pair, j.stage, j.status, j.fingerprint, p.mesh_hash, p.print_hash, p.attributes, (
         SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
+            r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)) AS first
-    FROM (SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+    FROM (SELECT atom FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
         JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
 SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS fingerprint, found.first, r.fingerprint AS old,
-    coalesce(r.mesh_hash <> found.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> found.print_hash, 0) AS print,
-    coalesce(r.attributes <> found.attributes, 0) AS attributes,
-    coalesce(f.fingerprint <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> found.mesh_hash, 0)
-        OR coalesce(f.print_hash <> found.print_hash, 0) OR coalesce(f.attributes <> found.attributes, 0)
+    coalesce(r.mesh_hash <> found.mesh_hash, false) AS mesh, coalesce(r.print_hash <> found.print_hash, false) AS print,
+    coalesce(r.attributes <> found.attributes, false) AS attributes,
+    coalesce(f.fingerprint <> CAST(?1 ->> f.stage AS bigint), false) OR coalesce(f.mesh_hash <> found.mesh_hash, false)
+        OR coalesce(f.print_hash <> found.print_hash, false) OR coalesce(f.attributes <> found.attributes, false)
         AS failure_is_outdated
 FROM found LEFT JOIN stage_result AS r ON r.pair = found.pair AND r.stage = found.first
     LEFT JOIN failure AS f ON f.pair = found.pair ORDER BY found.pair";
@@ -58,12 +58,12 @@ ORDER BY 1 LIMIT ?2";
 
 /// Counts the pairs that have a result with outdated settings or inputs.
 pub(crate) const COUNT_STALE: &str = "
-SELECT (SELECT coalesce(sum(n), 0) FROM counter
-        WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT value FROM json_each(?1))) + (
+SELECT (SELECT coalesce(CAST(sum(n) AS bigint), 0) FROM counter
+        WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT CAST(atom AS bigint) FROM json_each(?1))) + (
     SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
-    WHERE j.dirty = 1 AND (j.fingerprint IS NULL OR j.fingerprint IN (SELECT value FROM json_each(?1))) AND EXISTS (
+    WHERE j.dirty = 1 AND (j.fingerprint IS NULL OR j.fingerprint IN (SELECT CAST(atom AS bigint) FROM json_each(?1))) AND EXISTS (
         SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
+            r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)))";
 
 /// Unmarks dirty jobs whose results are consistent again. Skips leased jobs, which may still get inconsistent results.

@@ -53,7 +53,7 @@ RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
 
 pub(crate) const LEFT_ALL: &str = "
 SELECT
-    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)) AS ready,
+    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000) AS first) AS ready,
     (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1) AS leased,
     (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1) AS backoff,
     (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1) AS next_due";
@@ -61,12 +61,13 @@ SELECT
 const LEFT_AMONG: &str = "
 SELECT count(*) FILTER (WHERE j.status = 0) AS ready, count(*) FILTER (WHERE j.status = 1) AS leased,
     count(*) FILTER (WHERE j.status = 2) AS backoff, min(j.run_at) AS next_due
-FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.stage <= ?1";
+FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint) WHERE j.stage <= ?1";
 
-const COUNT_ALL: &str = "SELECT stage, status, sum(n) FROM counter GROUP BY stage, status";
+const COUNT_ALL: &str =
+    "SELECT stage, status, CAST(sum(n) AS bigint) FROM counter GROUP BY stage, status";
 
 const COUNT_AMONG: &str = "
-SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
 GROUP BY j.stage, j.status";
 
 impl Catalog {

@@ -9,6 +9,7 @@
 use serde_json::json;
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
@@ -124,7 +125,7 @@ macro_rules! statements {
                 $table,
                 " AS t ON t.",
                 $key,
-                " = wanted.value ORDER BY 1"
+                " = CAST(wanted.atom AS bigint) ORDER BY 1"
             ),
             page: concat!(
                 "SELECT t.",
@@ -189,13 +190,18 @@ const LAST: &str =
     "SELECT value FROM checksum WHERE record = ?1 AND row < ?2 ORDER BY row DESC LIMIT 1";
 
 const STORE: &str = "
-INSERT INTO checksum (record, row, value) SELECT ?1, value ->> 0, value ->> 1 FROM json_each(?2) WHERE true
+INSERT INTO checksum (record, row, value) SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint) FROM json_each(?2) WHERE true
 ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
 
 const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
 
 /// Selects the largest row number that a log has ever had, if it exceeds ?2.
-const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
+///
+/// A sequence of PostgreSQL also counts rows that were rolled back, so nothing is known there.
+const CUT_OFF: Sql = Sql::pair(
+    "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2",
+    "SELECT ?2 FROM pair WHERE ?1 = ''",
+);
 
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
 pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]) -> Result<()> {

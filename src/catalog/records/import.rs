@@ -54,25 +54,25 @@ pub struct PairChange {
 
 const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
-FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
+FROM pair WHERE name IN (SELECT atom FROM json_each(?1))";
 
 /// Adds new pairs and updates existing ones. If a path changed, clears the `stat` of that file, so that the next run
 /// reads the file again.
 const UPSERT: &str = "
 INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
-SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
+SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', CAST(value ->> 'face_down' AS bigint),
     value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'attributes', ?2
 FROM json_each(?1) WHERE true
 ON CONFLICT (name) DO UPDATE SET
-    mesh_stat = iif(mesh_path = excluded.mesh_path, mesh_stat, ''), mesh_path = excluded.mesh_path,
-    print_stat = iif(print_path = excluded.print_path, print_stat, ''), print_path = excluded.print_path,
+    mesh_stat = CASE WHEN pair.mesh_path = excluded.mesh_path THEN pair.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
+    print_stat = CASE WHEN pair.print_path = excluded.print_path THEN pair.print_stat ELSE '' END, print_path = excluded.print_path,
     unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
     block = excluded.block, meta = excluded.meta, attributes = excluded.attributes
 RETURNING id";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
-SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
+SELECT id, 0, 0 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))
     AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
 
 impl Catalog {
@@ -173,7 +173,17 @@ async fn import_chunk(
             fields,
         });
     }
-    let items = json_array(chunk.iter().map(item));
+    // Of rows with the same name, only the last: PostgreSQL changes a row only once in a statement.
+    let last: BTreeMap<_, _> = chunk
+        .iter()
+        .enumerate()
+        .map(|(at, row)| (&row.name, at))
+        .collect();
+    let rows = chunk
+        .iter()
+        .enumerate()
+        .filter(|(at, row)| last[&row.name] == *at);
+    let items = json_array(rows.map(|(_, row)| item(row)));
     let upsert = query_scalar(UPSERT).bind(items).bind(now);
     let rows: Vec<i64> = upsert.fetch_all(&mut *conn).await?;
     checksums::store(conn, ChecksummedTable::Pair, &rows).await?;

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
@@ -16,15 +17,23 @@ const SELECT: &str =
 /// Clears the `stat` of the files, so that the next run reads them again.
 const UPDATE: &str = "
 UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = '', print_path = item.value ->> 2, print_stat = ''
-FROM json_each(?1) AS item WHERE pair.id = item.value ->> 0";
+FROM json_each(?1) AS item WHERE pair.id = CAST(item.value ->> 0 AS bigint)";
 
 /// Selects the input files whose paths end with one of two texts.
-const NAMED: &str = "
+const NAMED: Sql = Sql::pair(
+    "
 SELECT name, path FROM (
     SELECT id, name, mesh_path AS path FROM pair
     UNION ALL SELECT id, name, print_path FROM pair
     UNION ALL SELECT id, name, body ->> 'tops_mask' FROM pair JOIN truth ON truth.pair = pair.id
-) WHERE substr(path, -length(?1)) = ?1 OR substr(path, -length(?2)) = ?2 ORDER BY id";
+) WHERE substr(path, -length(?1)) = ?1 OR substr(path, -length(?2)) = ?2 ORDER BY id",
+    "
+SELECT name, path FROM (
+    SELECT id, name, mesh_path AS path FROM pair
+    UNION ALL SELECT id, name, print_path FROM pair
+    UNION ALL SELECT id, name, body ->> 'tops_mask' FROM pair JOIN truth ON truth.pair = pair.id
+) AS inputs WHERE right(path, length(?1)) = ?1 OR right(path, length(?2)) = ?2 ORDER BY id",
+);
 
 impl Catalog {
     /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name of

@@ -77,8 +77,8 @@ macro_rules! select_alignments {
             "
 SELECT a.id, a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash,
     a.depth_hash, a.seen, a.iou, a.dice, a.note, a.at, u.at AS undone_at,
-    coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, 0) AS holds,
-    coalesce(d.result_hash = a.depth_hash, 0) AS on_current_depth
+    coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, false) AS holds,
+    coalesce(d.result_hash = a.depth_hash, false) AS on_current_depth
 FROM ",
             $from,
             "
@@ -143,7 +143,7 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
-        self.manual_alignment_page(0, usize::MAX).await
+        self.manual_alignment_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` manual alignments with ids above `after`, including undone ones, oldest first.
@@ -157,7 +157,6 @@ impl Catalog {
     ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(LOG).bind(after);
-        // As SQLite's limit, a negative number means none.
         let query = query.bind(limit as i64);
         Ok(query.fetch_all(&mut conn).await?)
     }

@@ -2,17 +2,21 @@
 
 use std::collections::BTreeMap;
 
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::{Catalog, Result};
 use crate::domain::PairName;
 
-const META_COLUMNS: &str = "
-SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m ORDER BY m.key";
+const META_COLUMNS: Sql = Sql::pair(
+    "SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m ORDER BY m.key",
+    "SELECT DISTINCT m.key COLLATE \"C\" AS key FROM pair AS p, json_object_keys(CAST(p.meta AS json)) AS m (key) ORDER BY 1",
+);
 
 const GROUPS: &str = "
-SELECT CASE ?1 WHEN 'block' THEN nullif(p.block, '') WHEN 'character' THEN nullif(p.character, '') END AS shared,
-    p.name, count(*) AS pairs
-FROM pair AS p GROUP BY shared, CASE WHEN shared IS NULL THEN p.name END";
+SELECT p.shared, min(p.name) AS name, count(*) AS pairs FROM (
+    SELECT CASE ?1 WHEN 'block' THEN nullif(block, '') WHEN 'character' THEN nullif(character, '') END AS shared, name
+    FROM pair) AS p
+GROUP BY p.shared, CASE WHEN p.shared IS NULL THEN p.name END";
 
 const SHARED_PRINTS: &str = "
 SELECT p.print_path, min(p.name) AS first FROM pair AS p GROUP BY p.print_path HAVING count(*) > 1";

@@ -44,7 +44,7 @@ pub struct KnownInputs {
 
 pub(crate) const LEASED: &str = "
 SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.attributes
-FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
+FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = CAST(wanted.atom AS bigint)";
 
 /// Selects pairs with their input files as last read, in pages by id.
 pub(crate) const INPUTS: &str = "
@@ -53,7 +53,7 @@ WHERE id > ?1 ORDER BY id LIMIT ?2";
 
 const INPUTS_AMONG: &str = "
 SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
-FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
+FROM pair WHERE id > ?1 AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?3)) ORDER BY id LIMIT ?2";
 
 impl Catalog {
     /// Returns the leased pairs with their results, in the same order as the leases.

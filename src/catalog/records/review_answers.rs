@@ -116,14 +116,14 @@ SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM 
 
 const ANSWERS: &str = "
 SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name AS pair, v.result_hash AS hash, 0 AS is_check,
-    v.verdict, v.reason, v.note, v.at, v.id
+    v.verdict, v.reason, v.note, v.at AS at, v.id AS id
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair
 WHERE v.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 UNION ALL
 SELECT c.event, p.name, c.seen, 1, c.verdict, c.reason, c.note, c.at, c.id
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair
 WHERE c.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id)
-ORDER BY v.at, is_check, v.id";
+ORDER BY at, is_check, id";
 
 const CHECK_ANSWERS: &str = r#"
 SELECT c.id, c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "check", c.seen, c.shown_ms, c.angle_read_deg,
@@ -243,7 +243,7 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
-        self.attention_check_page(0, usize::MAX).await
+        self.attention_check_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` answers to attention checks with ids above `after`, including undone ones, oldest first.
@@ -257,7 +257,6 @@ impl Catalog {
     ) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(CHECK_ANSWERS).bind(after);
-        // As SQLite's limit, a negative number means none.
         let query = query.bind(limit as i64);
         Ok(query.fetch_all(&mut conn).await?)
     }

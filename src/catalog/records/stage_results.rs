@@ -13,13 +13,13 @@ use crate::domain::{ContentHash, ThresholdMetric};
 pub(crate) const STAGE_RESULTS: &str = "
 SELECT r.pair, r.stage, r.mesh_hash, r.print_hash, r.outcome, r.files, r.result_hash, r.ms, r.at,
     fingerprint.hash AS fingerprint_hash, fingerprint.fields AS fingerprint_fields
-FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value
+FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = CAST(wanted.atom AS bigint)
     CROSS JOIN fingerprint ON fingerprint.id = r.fingerprint
 ORDER BY r.pair, r.stage";
 
 pub(crate) const METRIC_HASHES: &str = "
 SELECT m.pair, m.metric, m.result_hash
-FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = wanted.value";
+FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = CAST(wanted.atom AS bigint)";
 
 /// Returns stage results by pair, in the order of the stages.
 pub(crate) async fn of_pairs(

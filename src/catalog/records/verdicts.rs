@@ -115,22 +115,22 @@ RETURNING id, act";
 const IS_STORED: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict AS v
     WHERE v.pair = ?2 AND v.metric = ?3 AND v.reviewer = ?4 AND v.id <= ?1 AND v.at = ?5 AND v.result_hash = ?6
-    AND v.verdict = ?7 AND v.reason IS ?8 AND v.note IS ?9
+    AND v.verdict = ?7 AND v.reason IS NOT DISTINCT FROM ?8 AND v.note IS NOT DISTINCT FROM ?9
     AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act))";
 
 /// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
 /// that many rows.
 const LOG: &str = "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
-    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
+    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, false) AS current
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
 WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0)
-ORDER BY v.id LIMIT coalesce(?4, -1)";
+ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)";
 
 pub(crate) const COUNTED: &str = "
 SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
-FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = wanted.value
+FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = CAST(wanted.atom AS bigint)
 WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 

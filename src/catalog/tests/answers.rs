@@ -1,7 +1,7 @@
 //! Answers on the review page: bound to what was shown, stored once, and undone by event id.
 
 use super::{World, name};
-use crate::catalog::db::open;
+use crate::catalog::db::query::query;
 use crate::catalog::{
     AnsweredOn, Catalog, CatalogError, ManualAlignment, NewVerdict, ReviewContext, Shown,
 };
@@ -285,8 +285,7 @@ async fn triggers_reject_changes_of_answers_and_alignments() {
             .await
             .expect("undone");
     }
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::write_conn(&path, false).await.expect("a connection");
+    let mut conn = world.place.conn().await;
     for sql in [
         "UPDATE attention_check_answer SET reviewer = 'bo'",
         "DELETE FROM attention_check_answer",
@@ -297,7 +296,7 @@ async fn triggers_reject_changes_of_answers_and_alignments() {
         "UPDATE manual_alignment_undo SET at = 9",
         "DELETE FROM manual_alignment_undo",
     ] {
-        let refused = sqlx::query(sql).execute(&mut conn).await;
+        let refused = query(sql).execute(&mut conn).await;
         let refused = refused.expect_err(sql).to_string();
         assert!(refused.contains("append-only"), "{sql}: {refused}");
     }
@@ -307,8 +306,7 @@ async fn triggers_reject_changes_of_answers_and_alignments() {
 async fn the_review_key_is_the_same_after_reopening() {
     let world = World::new(0).await;
     let key = world.catalog.review_key().await.expect("a key");
-    let path = world.dir.path().join("catalog.sqlite");
-    let again = Catalog::open(&path).await.expect("a catalog");
+    let again = world.place.open().await.expect("a catalog");
     assert_eq!(again.review_key().await.expect("a key"), key);
     let other = World::new(0).await;
     assert_ne!(other.catalog.review_key().await.expect("a key"), key);

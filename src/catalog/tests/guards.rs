@@ -1,7 +1,7 @@
 //! Failure modes of job queues: late workers, reused ids, busy databases, clock jumps.
 
 use super::{World, done, enter, fingerprints, inputs, name, register, row};
-use crate::catalog::db::open;
+use crate::catalog::db::query::query;
 use crate::catalog::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds, Lease,
     RerunPolicy, StageFailure,
@@ -36,9 +36,8 @@ async fn worker_ids_are_not_reused() {
     let me = world.worker;
     let recovered = world.catalog.recover(DeadWorker::AllExcept(me), 60).await;
     assert_eq!(recovered.expect("a recovery").ready, 1);
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::write_conn(&path, false).await.expect("a connection");
-    let removed = sqlx::query("DELETE FROM worker WHERE id = ?1").bind(first.0);
+    let mut conn = world.place.conn().await;
+    let removed = query("DELETE FROM worker WHERE id = ?1").bind(first.0);
     removed.execute(&mut conn).await.expect("removed");
 
     let second = register(&world.catalog).await;
@@ -92,9 +91,8 @@ async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
     let world = World::new(2).await;
     let late = world.claim(1).await.remove(0);
     let other = world.recovered_by_another(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::write_conn(&path, false).await.expect("a connection");
-    let shared = sqlx::query("UPDATE job SET exclusive = 0");
+    let mut conn = world.place.conn().await;
+    let shared = query("UPDATE job SET exclusive = 0");
     shared.execute(&mut conn).await.expect("stored");
     let lease = world.claim_as(other, 2).await.remove(0);
     let mut lost = world.done(Stage::Fit);
@@ -199,7 +197,6 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn busy_errors_do_not_reach_callers() {
     let world = World::new(80).await;
-    let path = world.dir.path().join("catalog.sqlite");
     let fingerprints = world.fingerprints;
     let worker = |catalog: Catalog| async move {
         let worker = register(&catalog).await;
@@ -223,10 +220,10 @@ async fn busy_errors_do_not_reach_callers() {
     };
     let mut tasks = Vec::new();
     for _ in 0..2 {
-        let catalog = Catalog::open(&path).await.expect("a catalog");
+        let catalog = world.place.open().await.expect("a catalog");
         tasks.push(tokio::spawn(worker(catalog)));
     }
-    let importer = Catalog::open(&path).await.expect("a catalog");
+    let importer = world.place.open().await.expect("a catalog");
     for count in 80..100 {
         let rows = vec![row(&format!("p{count}"))];
         importer.import(rows, 1).await.expect("imported");

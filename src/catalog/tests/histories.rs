@@ -3,13 +3,12 @@
 mod compare;
 mod upkeep;
 
+use crate::catalog::db::conn::Conn;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use sqlx::SqliteConnection;
 
 use super::model::{LEASE, Process, Queue};
 use super::{World, done, enter, fingerprints, inputs};
-use crate::catalog::db::open;
 use crate::catalog::{
     CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
     StageFailure,
@@ -24,7 +23,7 @@ const MOST_PAIRS: usize = 8;
 const LONGEST: i64 = 200;
 struct Game {
     world: World,
-    conn: SqliteConnection,
+    conn: Conn,
     dice: ChaCha8Rng,
     model: Queue,
     /// Leases that processes hold or believe to hold.
@@ -51,8 +50,7 @@ struct Seen {
 impl Game {
     async fn new(seed: u64) -> Self {
         let world = World::new(PAIRS).await;
-        let path = world.dir.path().join("catalog.sqlite");
-        let conn = open::write_conn(&path, false).await.expect("a connection");
+        let conn = world.place.conn().await;
         let mut game = Self {
             settings: (fingerprints([1; 4]), world.fingerprints),
             conn,

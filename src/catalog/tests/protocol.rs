@@ -349,8 +349,7 @@ async fn pages_come_in_the_order_of_names_and_end() {
 #[tokio::test]
 async fn a_read_only_catalog_reads_during_writes_and_cannot_write() {
     let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let reader = Catalog::open_read_only(&path).await.expect("a reader");
+    let reader = world.place.open_read_only().await.expect("a reader");
     world.finish_one().await;
     let status = reader.status(&super::fingerprints([1; 4])).await;
     assert_eq!(status.expect("a read").jobs[&JobStatus::Done], 1);
@@ -389,7 +388,6 @@ async fn one_failing_request_does_not_fail_its_batch() {
 #[tokio::test]
 async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
     let lease = world.claim(1).await.remove(0);
     let (kept, ()) = tokio::join!(
         world
@@ -398,8 +396,7 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
         world.catalog.clone().close(),
     );
     assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
-    assert!(!path.with_extension("sqlite-wal").exists());
-    let again = Catalog::open(&path).await.expect("a catalog");
+    let again = world.place.open().await.expect("a catalog");
     let detail = again.pair(&name("p0")).await.expect("a read");
     assert_eq!(detail.expect("the pair").results.stages.len(), 1);
 }

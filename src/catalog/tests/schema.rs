@@ -1,6 +1,6 @@
 //! The CHECK constraints of the schema agree with the enums.
 
-use sqlx::Connection as _;
+use crate::catalog::db::query::query;
 
 use super::World;
 use crate::domain::{
@@ -11,33 +11,31 @@ use crate::domain::{
 #[tokio::test]
 async fn check_constraints_and_enums_agree() {
     let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::write_conn(&path, false)
-        .await
-        .expect("a connection");
+    let mut conn = world.place.conn().await;
     let mut accepts = async |sql: &'static str, value: &str| {
-        let mut transaction = conn.begin().await.expect("a transaction");
-        let outcome = sqlx::query(sql)
-            .bind(value)
-            .execute(&mut *transaction)
-            .await;
+        query("BEGIN").execute(&mut conn).await.expect("begun");
+        let outcome = query(sql).bind(value).execute(&mut conn).await;
+        query("ROLLBACK")
+            .execute(&mut conn)
+            .await
+            .expect("rolled back");
         outcome.is_ok()
     };
     let verdict = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
-        VALUES (1, 1, 'density', zeroblob(32), ?1, 'me', 1)";
+        VALUES (1, 1, 'density', unhex('0000000000000000000000000000000000000000000000000000000000000000'), ?1, 'me', 1)";
     let reason =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, at)
-        VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
+        VALUES (1, 1, 'density', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', ?1, 1)";
     let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
-        VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
+        VALUES (1, 1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1)";
     let answered_metric = "INSERT INTO attention_check_answer
         (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
-        VALUES ('1', 1, ?1, zeroblob(32), 'mirrored', '{}', zeroblob(32), 'fail', 'me', 1)";
+        VALUES ('1', 1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'mirrored', '{}', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1)";
     let scored_metric = "INSERT INTO metric_result VALUES
-        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, zeroblob(32))";
+        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, unhex('0000000000000000000000000000000000000000000000000000000000000000'))";
     let queue =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)
-        VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', 1, ?1)";
+        VALUES (1, 1, 'density', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1, ?1)";
     let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
     let unit = "UPDATE pair SET unit = ?1";
     let metrics = ThresholdMetric::ALL.map(ThresholdMetric::name);
@@ -62,16 +60,14 @@ async fn check_constraints_and_enums_agree() {
 #[tokio::test]
 async fn an_inconsistent_job_row_is_rejected() {
     let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::write_conn(&path, false)
-        .await
-        .expect("a connection");
+    let mut conn = world.place.conn().await;
     for status in 0..=5 {
         for bits in 0..16 {
-            let stage = if bits & 1 == 0 { 2 } else { 4 };
-            let [worker, deadline, run_at] = [2, 4, 8].map(|bit| (bits & bit != 0).then_some(1));
-            let mut transaction = conn.begin().await.expect("a transaction");
-            let outcome = sqlx::query(
+            let stage = if bits & 1 == 0 { 2_i64 } else { 4 };
+            let [worker, deadline, run_at] =
+                [2, 4, 8].map(|bit| (bits & bit != 0).then_some(1_i64));
+            query("BEGIN").execute(&mut conn).await.expect("begun");
+            let outcome = query(
                 "UPDATE job SET status = ?1, stage = ?2, worker = ?3, deadline = ?4, run_at = ?5",
             )
             .bind(status)
@@ -79,8 +75,12 @@ async fn an_inconsistent_job_row_is_rejected() {
             .bind(worker)
             .bind(deadline)
             .bind(run_at)
-            .execute(&mut *transaction)
+            .execute(&mut conn)
             .await;
+            query("ROLLBACK")
+                .execute(&mut conn)
+                .await
+                .expect("rolled back");
             let is = JobStatus::from_code(status);
             let allowed = is.is_some_and(|is| {
                 (is == JobStatus::Done) == (stage == 4)

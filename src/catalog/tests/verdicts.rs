@@ -1,6 +1,7 @@
 //! Verdicts: bound to results, appended, undone.
 
 use super::{World, name};
+use crate::catalog::db::query::query;
 use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
@@ -174,12 +175,9 @@ async fn triggers_reject_changes_of_a_verdict() {
     world.finish_one().await;
     let given = vec![verdict("ana", Verdict::Pass)];
     world.catalog.verdict_set(given, 5).await.expect("stored");
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::write_conn(&path, false)
-        .await
-        .expect("a connection");
+    let mut conn = world.place.conn().await;
     for sql in ["UPDATE verdict SET reviewer = 'bo'", "DELETE FROM verdict"] {
-        assert!(sqlx::query(sql).execute(&mut conn).await.is_err());
+        assert!(query(sql).execute(&mut conn).await.is_err());
     }
 }
 

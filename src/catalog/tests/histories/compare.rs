@@ -1,45 +1,38 @@
 //! Compares the catalog with the model, and compares its rows before and after refused writes.
 
-use sqlx::{AssertSqlSafe, Row as _};
+use crate::catalog::db::query::query;
 
 use super::super::state_machine::JobState;
 use super::Game;
 
-/// Tables that a refused write must not change.
-const TABLES: [&str; 8] = [
-    "job",
-    "stage_result",
-    "metric_result",
-    "attempt",
-    "failure",
-    "verdict",
-    "counter",
-    "pair",
+/// Tables that a refused write must not change, and statements that read them.
+const TABLES: [(&str, &str); 8] = [
+    ("job", "SELECT * FROM job"),
+    ("stage_result", "SELECT * FROM stage_result"),
+    ("metric_result", "SELECT * FROM metric_result"),
+    ("attempt", "SELECT * FROM attempt"),
+    ("failure", "SELECT * FROM failure"),
+    ("verdict", "SELECT * FROM verdict"),
+    ("counter", "SELECT * FROM counter"),
+    ("pair", "SELECT * FROM pair"),
 ];
 
 impl Game {
     /// Returns the rows of all `TABLES`, which a refused write must not change. Returns none if `allowed` is true.
     pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
         let mut lines = Vec::new();
-        for table in TABLES.iter().filter(|_| !allowed) {
-            let columns: String = sqlx::query_scalar(
-                "SELECT group_concat('quote(' || name || ')', ' || '' '' || ') FROM pragma_table_info(?1)",
-            )
-            .bind(table)
-            .fetch_one(&mut self.conn)
-            .await
-            .expect("columns");
-            let rows = sqlx::query_scalar(AssertSqlSafe(format!(
-                "SELECT {columns} FROM {table} ORDER BY 1"
-            )));
-            lines.extend(rows.fetch_all(&mut self.conn).await.expect("rows"));
+        for (table, sql) in TABLES.iter().filter(|_| !allowed) {
+            let rows = query(*sql);
+            let rows = rows.fetch_all(&mut self.conn).await.expect("rows");
+            lines.extend(rows.iter().map(|row| format!("{table} {row:?}")));
         }
+        lines.sort();
         lines
     }
 
     /// Asserts that all jobs equal the model, no token decreased, the counters are right and no verdict was lost.
     pub(super) async fn agrees(&mut self) {
-        let rows = sqlx::query(
+        let rows = query(
             "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j
                 LEFT JOIN failure AS f ON f.pair = j.pair ORDER BY j.pair",
         );
@@ -56,7 +49,7 @@ impl Game {
                 JobState::Backoff { run_at: at, .. } => run_at = Some(at),
                 JobState::Ready { .. } | JobState::Done | JobState::Quarantined { .. } => {}
             }
-            let number = |column: &str| row.get::<i64, _>(column);
+            let number = |column: &str| row.get::<i64>(column).expect("a number");
             let stage = job.state.stage().map_or(4, |stage| stage.index() as i64);
             assert_eq!(
                 (number("pair"), number("stage"), number("status")),
@@ -78,17 +71,19 @@ impl Game {
                 "pair {pair}"
             );
             assert_eq!(
-                (row.get("worker"), row.get("deadline"), row.get("run_at")),
-                (holder, when, run_at),
+                ["worker", "deadline", "run_at"]
+                    .map(|column| row.get::<Option<i64>>(column).expect("a column")),
+                [holder, when, run_at],
                 "pair {pair}"
             );
             let failed = job.failure.map(|(stage, then)| (stage, then.of(stage)));
             assert_eq!(
-                (row.get("failed_at"), row.get("failed_with")),
-                (
+                ["failed_at", "failed_with"]
+                    .map(|column| row.get::<Option<i64>>(column).expect("a column")),
+                [
                     failed.map(|(stage, _)| stage.index() as i64),
                     failed.map(|(_, fingerprint)| fingerprint.0)
-                ),
+                ],
                 "pair {pair}"
             );
             assert!(job.token >= self.tokens[*pair as usize]);

@@ -1,11 +1,11 @@
-//! Tests of the catalog on real database files.
+//! Tests of the catalog on real databases: files in the module `tests`, PostgreSQL in `tests_on_postgres`.
 
 mod answers;
 mod guards;
 mod histories;
 mod import;
 mod model;
-mod plans;
+mod place;
 mod protocol;
 mod schema;
 mod staleness;
@@ -13,90 +13,25 @@ mod state_machine;
 mod together;
 mod verdicts;
 
-use std::path::Path;
-use std::time::Duration;
+use serde_json::{Map, json};
 
-use serde_json::{Map, Value, json};
-use tokio::sync::{mpsc, oneshot};
-
-use super::db::commit_delay::CommitDelay;
+pub(in crate::catalog) use self::place::Place;
 use super::db::query::query_scalar;
 use super::{
-    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints,
-    ImportChunk, ImportRow, ImportSummary, InputVersion, InputVersions, Lease, MetricResult,
-    RerunPolicy, StageCheckpoint, WorkerInfo,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
+    InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
     Scores, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };
 
-impl Catalog {
-    /// Imports rows in one transaction.
-    pub(crate) async fn import(
-        &self,
-        rows: Vec<ImportRow>,
-        now: UnixMillis,
-    ) -> super::Result<ImportSummary> {
-        let (sender, chunks) = mpsc::channel(2);
-        for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
-            sender.try_send(chunk).expect("room for both");
-        }
-        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
-        Ok(summary)
-    }
-
-    /// Stores true alignments.
-    async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> super::Result<u64> {
-        let (sender, chunks) = mpsc::channel(1);
-        sender.try_send(ImportChunk::End).expect("room");
-        let (_, stored) = self.import_all(chunks, truths, 1).await?;
-        Ok(stored)
-    }
-
-    /// Stores a stage without commit delay.
-    async fn checkpoint_now(
-        &self,
-        lease: Lease,
-        stage: StageCheckpoint,
-    ) -> super::Result<CheckpointOutcome> {
-        let _waiting = self.waiting().await?;
-        self.checkpoint(lease, vec![stage]).await
-    }
-
-    /// Creates a catalog whose writer delays deferrable requests for an hour.
-    pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
-        Self::create(path).await?.close().await;
-        Self::with_writer(path, false, CommitDelay::of(Duration::from_hours(1))).await
-    }
-
-    /// Keeps the writer busy until the sender is used or dropped.
-    pub(crate) async fn hold(&self) -> oneshot::Sender<()> {
-        let (held, is_held) = oneshot::channel();
-        let (release, released) = oneshot::channel();
-        let catalog = self.clone();
-        tokio::spawn(async move {
-            let wait = catalog.in_transaction(move |_| {
-                Box::pin(async move {
-                    held.send(()).expect("a receiver");
-                    // A dropped sender releases the writer too.
-                    let _ = released.await;
-                    Ok(())
-                })
-            });
-            wait.await.expect("an empty transaction");
-        });
-        is_held.await.expect("a busy writer");
-        release
-    }
-}
-
-/// A catalog in a temporary directory.
-struct World {
+/// A catalog with a worker.
+pub(in crate::catalog) struct World {
     catalog: Catalog,
     fingerprints: FingerprintIds,
     worker: WorkerId,
-    dir: tempfile::TempDir,
+    pub(in crate::catalog) place: Place,
 }
 
 fn name(text: &str) -> PairName {
@@ -124,10 +59,11 @@ fn fingerprints(revision: [u32; 4]) -> Fingerprints {
 
 impl World {
     async fn new(pairs: usize) -> Self {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let catalog = Catalog::create(&dir.path().join("catalog.sqlite"))
-            .await
-            .expect("a catalog");
+        Self::at(Place::new(), pairs).await
+    }
+
+    pub(in crate::catalog) async fn at(place: Place, pairs: usize) -> Self {
+        let catalog = place.create().await.expect("a catalog");
         let rows = (0..pairs).map(|n| row(&format!("p{n}"))).collect();
         catalog.import(rows, 1).await.expect("imported");
         let fingerprints = catalog
@@ -139,7 +75,7 @@ impl World {
             catalog,
             fingerprints,
             worker,
-            dir,
+            place,
         }
     }
 
@@ -229,7 +165,7 @@ impl World {
         let n: i64 = query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-                    r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash
+                    r.fingerprint <> CAST(?1 ->> r.stage AS bigint) OR r.mesh_hash <> p.mesh_hash
                     OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes))",
         )
         .bind(current.expect("fingerprints"))

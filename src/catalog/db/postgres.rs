@@ -1,0 +1,267 @@
+//! Opens a catalog in a PostgreSQL database.
+
+use std::time::Duration;
+
+use sqlx::migrate::Migrator;
+use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions, PgSslMode};
+use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Transaction};
+
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::error_kind::CatalogErrorKind;
+use crate::catalog::db::open::SCHEMA_VERSION;
+
+/// Schema of the tables, unless the URL sets another `search_path`.
+const SCHEMA: &str = "mocban";
+/// Oldest supported major version of the server.
+const OLDEST_SERVER: u32 = 15;
+/// Read connections per process.
+const READERS: u32 = 2;
+/// Longest time for one connection attempt.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
+
+static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
+
+/// Where a catalog is: a server, a database and a schema.
+#[derive(Debug, Clone)]
+pub(crate) struct PostgresPlace {
+    options: PgConnectOptions,
+    schema: String,
+}
+
+impl PostgresPlace {
+    /// Parses a URL such as `postgres://user@host/database`. The password may also come from the environment variable
+    /// `PGPASSWORD` or the file `.pgpass`.
+    ///
+    /// # Errors
+    /// Returns an error if the URL is invalid, or allows a connection without encryption to another machine.
+    pub(crate) fn parse(url: &str) -> Result<Self> {
+        let options: PgConnectOptions = url.parse().map_err(|error| {
+            let shown = without_password(url);
+            CatalogError::CatalogUrl(format!("{shown} is not a URL of PostgreSQL: {error}"))
+        })?;
+        let is_local = options.get_socket().is_some()
+            || options.get_host().starts_with('/')
+            || ["localhost", "127.0.0.1", "::1", "[::1]"].contains(&options.get_host());
+        let has_mode = url.contains("sslmode=");
+        let options = match options.get_ssl_mode() {
+            PgSslMode::Prefer if !is_local && !has_mode => options.ssl_mode(PgSslMode::VerifyFull),
+            PgSslMode::Disable | PgSslMode::Allow | PgSslMode::Prefer if !is_local => {
+                let shown = without_password(url);
+                return Err(CatalogError::CatalogUrl(format!(
+                    "{shown} allows a connection without encryption; use sslmode=verify-full, or require in a network you trust"
+                )));
+            }
+            _ => options,
+        };
+        let given = options.get_options().unwrap_or_default();
+        let given = given.split("search_path=").nth(1);
+        let schema = given.and_then(|rest| rest.split_whitespace().next());
+        let schema = schema.unwrap_or(SCHEMA).to_owned();
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        if !schema.chars().all(is_plain) {
+            return Err(CatalogError::CatalogUrl(format!(
+                "the schema {schema} is not allowed; use lower-case letters, digits and _"
+            )));
+        }
+        let options = options.application_name("mocban").options([
+            ("search_path", schema.as_str()),
+            ("standard_conforming_strings", "on"),
+            ("default_transaction_isolation", "read committed"),
+            ("idle_in_transaction_session_timeout", "60s"),
+            ("client_min_messages", "warning"),
+        ]);
+        Ok(Self { options, schema })
+    }
+
+    /// Returns the place as text, without the password.
+    pub(crate) fn text(&self) -> String {
+        let options = &self.options;
+        let database = options.get_database().unwrap_or_default();
+        format!(
+            "postgres://{}@{}:{}/{database}?schema={}",
+            options.get_username(),
+            options.get_host(),
+            options.get_port(),
+            self.schema
+        )
+    }
+
+    /// Opens a connection for writing. If `may_create` is set, creates a missing schema.
+    ///
+    /// # Errors
+    /// Returns an error if the server does not answer or refuses, or if the schema is missing or has another version.
+    pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
+        let mut conn = self.connect_to_server().await?;
+        if self.version(&mut conn).await?.is_none() {
+            if !may_create {
+                return Err(CatalogError::NoSchema(self.text()));
+            }
+            self.create_schema(&mut conn).await?;
+        }
+        self.require_current(&mut conn).await?;
+        Ok(conn)
+    }
+
+    /// Opens read connections.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`].
+    pub(crate) async fn reader_pool(&self) -> Result<PgPool> {
+        let mut conn = self.connect_to_server().await?;
+        self.require_current(&mut conn).await?;
+        conn.close().await?;
+        let options = self.options.clone();
+        let options = options.options([("default_transaction_read_only", "on")]);
+        let pool = PgPoolOptions::new()
+            .max_connections(READERS)
+            .acquire_timeout(CONNECT_TIMEOUT);
+        Ok(pool.connect_lazy_with(options))
+    }
+
+    async fn connect_to_server(&self) -> Result<PgConnection> {
+        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.options.connect()).await;
+        let connected = connected.unwrap_or_else(|_| {
+            let error = std::io::Error::from(std::io::ErrorKind::TimedOut);
+            Err(sqlx::Error::Io(error))
+        });
+        let conn = connected.map_err(|error| CatalogError::NotConnected {
+            place: self.text(),
+            reason: connection_error(&error),
+        })?;
+        let version = conn.server_version_num().unwrap_or(0) / 10_000;
+        if version < OLDEST_SERVER {
+            return Err(CatalogError::NotConnected {
+                place: self.text(),
+                reason: format!("it is PostgreSQL {version}; {OLDEST_SERVER} or later is needed"),
+            });
+        }
+        Ok(conn)
+    }
+
+    /// Returns the version of the schema, or `None` if there is no catalog.
+    async fn version(&self, conn: &mut PgConnection) -> Result<Option<i64>> {
+        let exists = "SELECT to_regclass($1 || '.catalog_version') IS NOT NULL";
+        let exists: bool = sqlx::query_scalar(exists)
+            .bind(&self.schema)
+            .fetch_one(&mut *conn)
+            .await?;
+        if !exists {
+            return Ok(None);
+        }
+        let version = sqlx::query_scalar("SELECT version FROM catalog_version");
+        Ok(version.fetch_optional(conn).await?)
+    }
+
+    async fn require_current(&self, conn: &mut PgConnection) -> Result<()> {
+        match self.version(conn).await? {
+            None => Err(CatalogError::NoSchema(self.text())),
+            Some(SCHEMA_VERSION) => Ok(()),
+            Some(found) => Err(CatalogError::OtherVersion {
+                path: self.text().into(),
+                found,
+                known: SCHEMA_VERSION,
+            }),
+        }
+    }
+
+    /// Creates the schema. Other processes see the whole schema or none of it.
+    async fn create_schema(&self, conn: &mut PgConnection) -> Result<()> {
+        let mut transaction = conn.begin().await?;
+        lock(&mut transaction).await?;
+        // Another process may have created it before the lock was free.
+        if self.version(&mut transaction).await?.is_none() {
+            // Lower-case letters, digits and `_` only.
+            let create = format!("CREATE SCHEMA IF NOT EXISTS {}", self.schema);
+            sqlx::raw_sql(sqlx::AssertSqlSafe(create))
+                .execute(&mut *transaction)
+                .await?;
+            for migration in MIGRATOR.iter() {
+                sqlx::raw_sql(migration.sql.clone())
+                    .execute(&mut *transaction)
+                    .await?;
+            }
+        }
+        Ok(transaction.commit().await?)
+    }
+}
+
+/// Takes the lock of a catalog until the end of the transaction. All writes except group commits take it, so that they
+/// run one after another, as in SQLite.
+pub(crate) const LOCK: &str =
+    "SELECT pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482))";
+
+async fn lock(transaction: &mut Transaction<'_, Postgres>) -> Result<()> {
+    sqlx::query(LOCK).execute(&mut **transaction).await?;
+    Ok(())
+}
+
+/// Returns whether a catalog's location is a URL of PostgreSQL.
+pub(crate) fn is_url(location: &str) -> bool {
+    location.starts_with("postgres://") || location.starts_with("postgresql://")
+}
+
+/// Removes the password from a URL, for messages.
+pub(crate) fn without_password(url: &str) -> String {
+    let Some((scheme, rest)) = url.split_once("://") else {
+        return "the catalog's address".to_owned();
+    };
+    let rest = rest.split(['?', '#']).next().unwrap_or_default();
+    match rest.rsplit_once('@') {
+        Some((user, host)) => {
+            let user = user.split(':').next().unwrap_or_default();
+            format!("{scheme}://{user}@{host}")
+        }
+        None => format!("{scheme}://{rest}"),
+    }
+}
+
+/// Describes why a connection failed, with what to do.
+fn connection_error(error: &sqlx::Error) -> String {
+    let code = error.as_database_error().and_then(|error| error.code());
+    match code.as_deref() {
+        Some("28P01" | "28000") => {
+            format!("{error}; check the user and the password in ~/.pgpass or PGPASSWORD")
+        }
+        Some("3D000") => format!("{error}; create it with `createdb`, or correct the address"),
+        Some("53300") => format!("{error}; close other programs, or raise max_connections"),
+        Some(_) => error.to_string(),
+        None if CatalogErrorKind::of(error) == Some(CatalogErrorKind::Away) => {
+            format!("{error}; check the host, the port and that PostgreSQL runs")
+        }
+        None => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PostgresPlace, without_password};
+
+    #[test]
+    fn passwords_are_not_shown() {
+        for url in [
+            "postgres://me:secret@db.example/lab",
+            "postgres://me:se@cret@db.example/lab?sslmode=disable",
+            "postgres://db.example:5432/lab?password=secret",
+        ] {
+            assert!(!without_password(url).contains("cret"), "{url}");
+        }
+        let place = PostgresPlace::parse("postgres://me:secret@localhost/lab").expect("a place");
+        assert_eq!(
+            place.text(),
+            "postgres://me@localhost:5432/lab?schema=mocban"
+        );
+    }
+
+    #[test]
+    fn connections_to_other_machines_are_encrypted() {
+        let refused = PostgresPlace::parse("postgres://me@db.example/lab?sslmode=disable");
+        assert!(
+            refused
+                .expect_err("no encryption")
+                .to_string()
+                .contains("verify-full")
+        );
+        PostgresPlace::parse("postgres://me@db.example/lab?sslmode=require").expect("encrypted");
+        PostgresPlace::parse("postgres://me@localhost/lab?sslmode=disable").expect("local");
+    }
+}
