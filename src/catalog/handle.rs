@@ -119,6 +119,11 @@ impl Catalog {
         }
     }
 
+    /// Returns whether the catalog is in a database server.
+    pub(crate) const fn is_on_server(&self) -> bool {
+        matches!(self.readers, Readers::Postgres(_))
+    }
+
     /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
     pub async fn close(self) {
         // Readers first: an open reader prevents a complete checkpoint.

@@ -16,6 +16,7 @@ mod records;
 mod test_helpers;
 #[cfg(test)]
 mod tests;
+mod transfer;
 // The same tests on PostgreSQL.
 #[cfg(test)]
 #[path = "tests/mod.rs"]
@@ -32,6 +33,7 @@ pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
+pub use db::postgres::has_password;
 pub use handle::Catalog;
 pub use new_catalog::NewCatalog;
 pub use queue::claim::ClaimRequest;
@@ -45,6 +47,7 @@ pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;
+pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
@@ -59,3 +62,4 @@ pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use records::review_context::ReviewContext;
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
+pub use transfer::CopiedTable;

@@ -9,8 +9,8 @@ use super::examples::{with_examples, without_global_options};
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
-    backup, check, completions, config, contact_sheet, demo, export, import, man, report, restore,
-    retry, review, run, show, status, verdict, view,
+    backup, check, completions, config, contact_sheet, copy, demo, export, import, man, report,
+    restore, retry, review, run, show, status, verdict, view, worker,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -38,6 +38,10 @@ pub(super) enum Command {
     Import(import::ImportArgs),
     /// Align the pairs that are not aligned yet
     Run(run::RunArgs),
+    /// Find the pairs to align for workers on several machines, without aligning any
+    Plan(worker::PlanArgs),
+    /// Align pairs that were planned, beside workers on this and other machines
+    Worker(worker::WorkerArgs),
     /// Show the state of the project on one screen
     Status(status::StatusArgs),
     /// Show one pair: numbers, files, history, and why it will run again
@@ -50,6 +54,8 @@ pub(super) enum Command {
     Backup(backup::BackupArgs),
     /// Make a project of a backup
     Restore(restore::RestoreArgs),
+    /// Copy a catalog between a project folder and PostgreSQL
+    Copy(copy::CopyArgs),
     /// Record and list people's verdicts on the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),

@@ -8,17 +8,17 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::busy::Busy;
-use super::context::Context;
+use super::context::{Context, now};
 use super::error_text;
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
 use super::table::{columns, count};
-use crate::catalog::CatalogError;
+use crate::catalog::{Catalog, CatalogError};
 use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
 use crate::domain::one_line;
-use crate::runner::RunError;
+use crate::runner::{self, RunError};
 use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
 
 /// Arguments of `check`.
@@ -70,15 +70,19 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
     } else {
         context.open_read_only().await?
     };
-    let lock = args.repair.then(|| exclusive_lock(&project)).transpose();
-    let lock = lock.context("nothing was repaired")?;
+    let running = runner::is_running(&project, &catalog, now()).await?;
+    let lock = match args.repair {
+        true => exclusive_lock(&project, &catalog, running).context("nothing was repaired")?,
+        false => None,
+    };
     let options = CheckOptions {
         quick: args.quick,
         repair: args.repair,
-        in_use: lock.is_none() && RunLock::is_held(&project),
+        in_use: !args.repair && running,
     };
     let summary = check_project(&project, &catalog, options).await;
     catalog.close().await;
+    drop(lock);
     Ok(summary?)
 }
 
@@ -96,11 +100,18 @@ fn is_readable(path: &Path) -> bool {
     read.is_ok()
 }
 
-/// Takes the run's lock if no other process works on the project.
-fn exclusive_lock(project: &Project) -> Result<RunLock, RunError> {
+/// Takes the run's lock if no other process works on the project. A shared catalog has no such lock.
+fn exclusive_lock(
+    project: &Project,
+    catalog: &Catalog,
+    running: bool,
+) -> Result<Option<RunLock>, RunError> {
+    if catalog.is_shared() && !running {
+        return Ok(None);
+    }
     let lock = RunLock::acquire(project, false)?;
-    if lock.is_exclusive() {
-        Ok(lock)
+    if lock.is_exclusive() && !catalog.is_shared() {
+        Ok(Some(lock))
     } else {
         Err(LockError::InUse { pid: None }.into())
     }

@@ -8,16 +8,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use serde_json::json;
 
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
 use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
-use crate::catalog::Catalog;
+use crate::catalog::{Catalog, has_password};
 use crate::config::{BaseLayer, Loaded, Sources, load};
 use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
-use crate::store::{Project, SETTINGS_FILE, StoreError};
+use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
@@ -127,20 +127,52 @@ impl Context {
 
     /// Opens the project and its catalog for reading; works during a run.
     pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
-        let project = self.project()?;
-        let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
-        Ok((project, catalog))
+        match self.catalog_url()? {
+            Some(url) => {
+                let project = Project::open_directory(&self.dir())?;
+                Ok((project, Catalog::connect_read_only(&url).await?))
+            }
+            None => {
+                let project = Project::open(&self.dir())?;
+                let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
+                Ok((project, catalog))
+            }
+        }
     }
 
     /// Opens the project and its catalog for reading and writing.
     pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
-        let project = self.project()?;
-        let catalog = Catalog::open(&project.catalog_path()).await?;
-        Ok((project, catalog))
+        match self.catalog_url()? {
+            Some(url) => {
+                let project = Project::open_directory(&self.dir())?;
+                Ok((project, Catalog::connect(&url, false).await?))
+            }
+            None => {
+                let project = Project::open(&self.dir())?;
+                let catalog = Catalog::open(&project.catalog_path()).await?;
+                Ok((project, catalog))
+            }
+        }
     }
 
-    fn project(&self) -> Result<Project, StoreError> {
-        Project::open(&self.dir())
+    /// Returns the URL of the catalog in PostgreSQL, or `None` if the catalog is a file in the project.
+    ///
+    /// # Errors
+    /// Returns an error if the URL on the command line has a password, or if the settings are invalid and no catalog
+    /// file shows where the catalog is.
+    pub(super) fn catalog_url(&self) -> anyhow::Result<Option<String>> {
+        if let Some(url) = &self.global.catalog {
+            refuse_password(url)?;
+            return Ok(Some(url.clone()).filter(|url| !url.is_empty()));
+        }
+        match self.settings() {
+            Ok(settings) => {
+                let url = settings.config.storage.catalog;
+                Ok(Some(url).filter(|url| !url.is_empty()))
+            }
+            Err(_) if self.dir().join(CATALOG_FILE).exists() => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// Loads the settings in effect for this project.
@@ -185,6 +217,9 @@ impl Context {
         if let Some(config) = &self.global.config {
             words.extend(["--config".to_owned(), shell_quoted(config)]);
         }
+        if let Some(url) = &self.global.catalog {
+            words.extend(["--catalog".to_owned(), shell_quoted(url)]);
+        }
         for set in &self.global.set {
             words.extend(["--set".to_owned(), shell_quoted(set)]);
         }
@@ -196,6 +231,15 @@ impl Context {
     pub(super) fn program_with(&self, tail: &str) -> String {
         format!("{} {tail}", self.program)
     }
+}
+
+/// Refuses an address of PostgreSQL with a password, which other users of the machine could read.
+pub(super) fn refuse_password(url: &str) -> Result<(), Refusal> {
+    if has_password(url) {
+        let text = "other users of this machine can read a password on the command line; put it into ~/.pgpass or PGPASSWORD";
+        return Err(Refusal::Usage(text.to_owned()));
+    }
+    Ok(())
 }
 
 /// Returns the current time; no other clock reaches the catalog.

@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 23] = [
+const EXAMPLES: [(&str, &str); 26] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100",
@@ -16,6 +16,14 @@ const EXAMPLES: [(&str, &str); 23] = [
         "run",
         "mocban -C blocks run\nmocban -C blocks run --dry-run",
     ),
+    (
+        "plan",
+        "mocban -C blocks --catalog postgres://me@db.example/lab plan",
+    ),
+    (
+        "worker",
+        "mocban -C blocks --catalog postgres://me@db.example/lab worker --jobs 8",
+    ),
     ("status", "mocban -C blocks status --watch"),
     ("show", "mocban -C blocks show b01-0117"),
     ("retry", "mocban -C blocks retry --class io"),
@@ -25,6 +33,7 @@ const EXAMPLES: [(&str, &str); 23] = [
         "restore",
         "mocban restore blocks.sqlite again --inputs /data/scans",
     ),
+    ("copy", "mocban copy blocks postgres://me@db.example/lab"),
     ("verdict", "mocban -C blocks verdict log"),
     (
         "verdict set",

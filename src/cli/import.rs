@@ -86,7 +86,7 @@ pub(super) async fn import_pairs(
     let warnings = std::mem::take(&mut listing.warnings);
     let dir = context.dir();
     let truths = match &args.truth {
-        Some(file) => read_truths(file, &listing.ids, &dir).await?,
+        Some(file) => read_truths(file, &listing.ids, context).await?,
         None => Vec::new(),
     };
     let project = Project::at(&dir);
@@ -96,8 +96,9 @@ pub(super) async fn import_pairs(
         truths,
         allow_missing: args.allow_missing,
     });
+    let url = context.catalog_url()?;
     let missing_dirs = missing_dirs(&dir);
-    let stored = store(&project, &list).await;
+    let stored = store(&project, url.as_deref(), &list).await;
     if stored.is_err() {
         // Fails, as it should, if another process put something there.
         let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
@@ -132,7 +133,18 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 }
 
 /// Stores the list in the project. A new project appears only when its catalog holds the list.
-async fn store(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<StoredList> {
+async fn store(
+    project: &Project,
+    url: Option<&str>,
+    list: &Arc<ImportList>,
+) -> anyhow::Result<StoredList> {
+    if let Some(url) = url {
+        Project::create(project.dir())?;
+        let catalog = Catalog::connect(url, true).await?;
+        let stored = store_in(&catalog, project, list).await;
+        catalog.close().await;
+        return stored;
+    }
     while let Some(new) = begin(project).await? {
         let stored = store_in(new.catalog(), project, list).await;
         if stored.is_err() {
@@ -234,7 +246,11 @@ fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
 }
 
 /// Reads true alignments. Refuses pairs that are neither in the list nor in the project.
-async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result<Vec<TruthRow>> {
+async fn read_truths(
+    file: &Path,
+    listed: &RowIds,
+    context: &Context,
+) -> anyhow::Result<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths =
@@ -244,9 +260,8 @@ async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result
     if others.is_empty() {
         return Ok(truths);
     }
-    let unknown = match Project::open(dir) {
-        Ok(project) => {
-            let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
+    let unknown = match context.open_read_only().await {
+        Ok((_, catalog)) => {
             let unknown = catalog.unknown_names(&others).await?;
             catalog.close().await;
             unknown

@@ -11,6 +11,7 @@ mod completions;
 mod config;
 mod contact_sheet;
 mod context;
+mod copy;
 mod demo;
 mod error_text;
 mod examples;
@@ -46,6 +47,7 @@ mod truth_file;
 mod verdict;
 mod verdict_file;
 mod view;
+mod worker;
 
 use std::ffi::OsString;
 
@@ -101,7 +103,7 @@ fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
 /// tasks are short and exchange many messages, so they run faster on a single thread.
 fn runtime(command: &Command) -> std::io::Result<Runtime> {
     let mut builder = match command {
-        Command::Run(_) | Command::Demo(_) => Builder::new_current_thread(),
+        Command::Run(_) | Command::Worker(_) | Command::Demo(_) => Builder::new_current_thread(),
         _ => Builder::new_multi_thread(),
     };
     builder.worker_threads(2).enable_all().build()
@@ -112,11 +114,14 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Demo(args) => demo::demo(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
+        Command::Plan(args) => worker::plan(args, context).await,
+        Command::Worker(args) => worker::worker(args, context).await,
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
+        Command::Copy(args) => copy::copy(args, context).await,
         Command::Restore(args) => restore::restore(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,

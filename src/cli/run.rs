@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::context::{Context, shell_quoted};
+use super::context::{Context, now, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::ProgressReporter;
@@ -15,11 +15,11 @@ use super::{select, signals};
 use crate::catalog::{Catalog, Plan, RerunPolicy};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
-use crate::runner::{self, RunOptions, RunSummary, Stop};
-use crate::store::{Project, RunLock};
+use crate::runner::{self, RunOptions, RunPart, RunSummary, Stop};
+use crate::store::Project;
 
 /// Arguments of `run`.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct RunArgs {
     /// Only these pairs [default: all]
     pub(super) pairs: Vec<String>,
@@ -48,7 +48,7 @@ pub(super) struct RunArgs {
 }
 
 /// Parses which pairs to run again.
-fn rerun(text: &str) -> Result<RerunPolicy, String> {
+pub(super) fn rerun(text: &str) -> Result<RerunPolicy, String> {
     match text {
         "failed" => Ok(RerunPolicy::Failed),
         "stale" => Ok(RerunPolicy::Changed),
@@ -58,13 +58,23 @@ fn rerun(text: &str) -> Result<RerunPolicy, String> {
 }
 
 pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    execute(args, RunPart::All, context).await
+}
+
+/// Runs one part of a run or all.
+pub(super) async fn execute(
+    args: RunArgs,
+    part: RunPart,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
     let (project, catalog) = context.open().await?;
-    let options = options(&args, &config, &catalog).await?;
+    let options = options(&args, &config, &catalog, part).await?;
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
+        let running = runner::is_running(&project, &catalog, now()).await?;
         catalog.close().await;
-        return print_plan(&plan, RunLock::is_held(&project), context);
+        return print_plan(&plan, running, context);
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     context.print_json(&as_json(&summary))?;
@@ -76,7 +86,7 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
 }
 
 /// Parses a number of bytes with an optional unit: 4G, 512M, 900K.
-fn bytes(text: &str) -> Result<u64, String> {
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let units = [('K', 10), ('M', 20), ('G', 30), ('T', 40)];
     let split = |(unit, shift): (char, u32)| {
@@ -91,12 +101,18 @@ fn bytes(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "a size is a whole number with K, M, G or T, such as 4G".to_owned())
 }
 
-async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::Result<RunOptions> {
+pub(super) async fn options(
+    args: &RunArgs,
+    config: &Config,
+    catalog: &Catalog,
+    part: RunPart,
+) -> anyhow::Result<RunOptions> {
     let pairs = select::some_or_all(catalog, &args.pairs).await?;
     let plain = from_config(config);
     Ok(RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
         memory: args.memory.or(plain.memory),
+        part,
         join: args.join,
         max_failures: args.max_failures,
         pairs,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::context::{Context, shell_quoted};
+use super::context::{Context, now, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::output;
@@ -16,7 +16,6 @@ use super::verdict::reviewer_name;
 use crate::catalog::{StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
-use crate::store::RunLock;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
@@ -37,7 +36,7 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
         let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
         let status = ProjectStatus {
             // Read before the counts: a run that ends in between leaves no leases.
-            running: RunLock::is_held(&project),
+            running: runner::is_running(&project, &catalog, now()).await?,
             failures: Failures::read(&catalog, args.failed).await?,
             counts: catalog.status(&fingerprints).await?,
         };

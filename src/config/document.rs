@@ -19,6 +19,8 @@ pub struct Config {
     pub limits: InputLimits,
     /// Resources of a run; they change no result.
     pub run: RunSettings,
+    /// Where the project's data is.
+    pub storage: StorageSettings,
     /// The stages.
     #[serde(flatten)]
     pub stages: Settings,
@@ -46,6 +48,14 @@ pub struct RunSettings {
     pub memory_mib: u64,
     /// Time limit for one stage of one pair, in seconds.
     pub stage_timeout_s: u64,
+}
+
+/// Where the project's data is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StorageSettings {
+    /// URL of the catalog in PostgreSQL. Empty for a file in the project.
+    pub catalog: String,
 }
 
 /// The review page.

@@ -9,7 +9,7 @@ mod ranges;
 mod sources;
 mod tree;
 
-pub use document::{Config, InputLimits, ReviewSettings, RunSettings};
+pub use document::{Config, InputLimits, ReviewSettings, RunSettings, StorageSettings};
 pub use error::{ConfigError, Origin, hint, nearest};
 pub use sources::{BaseLayer, Preset, Sources, explanation};
 pub use tree::{Setting, Tree};

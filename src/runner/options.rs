@@ -14,6 +14,8 @@ pub struct RunOptions {
     /// Memory limit in bytes for all pairs computed at the same time. A pair's memory is estimated from its mesh's file
     /// size and its print's pixel count. A pair that exceeds the limit runs alone. `None` means no limit.
     pub memory: Option<u64>,
+    /// What to do besides computing.
+    pub part: RunPart,
     /// Join a run in progress in another process.
     pub join: bool,
     /// Start no more pairs after this many have failed.
@@ -32,11 +34,23 @@ pub struct RunOptions {
     pub image_limits: raster::ImageLimits,
 }
 
+/// Which part of a run to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunPart {
+    /// Plan, then compute.
+    All,
+    /// Look at the inputs and requeue pairs whose settings or inputs changed, but compute nothing.
+    Plan,
+    /// Compute what others planned.
+    Work,
+}
+
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
             workers: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
             memory: None,
+            part: RunPart::All,
             join: false,
             max_failures: None,
             pairs: None,

@@ -11,9 +11,10 @@ use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
 use super::input_reads::ReadLimits;
-use super::options::RunOptions;
+use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
+use super::run_guard::RunGuard;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
@@ -24,7 +25,7 @@ use crate::catalog::{
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
-use crate::store::{Project, RunLock};
+use crate::store::Project;
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
@@ -91,8 +92,10 @@ pub(super) async fn run_with(
     let clock = Clock::start();
     let selection = selection(catalog, options).await?;
     let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
-    let mut lock = RunLock::acquire(project, options.join)?;
-    require_same_settings(catalog, &mut lock, fingerprints).await?;
+    let mut guard = RunGuard::acquire(project, catalog, options)?;
+    guard
+        .require_same_settings(catalog, fingerprints, fingerprint_ids, options)
+        .await?;
     let worker = catalog
         .register_worker(this_process(), fingerprint_ids, clock.now())
         .await?;
@@ -105,10 +108,27 @@ pub(super) async fn run_with(
         clock,
         stop,
     };
-    if let Err(error) = start.prepare(&mut lock, worker, &mut on_event).await {
+    if let Err(error) = start.prepare(&mut guard, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
         let _ = catalog.end_worker(worker, clock.now()).await;
         return Err(error);
+    }
+    if options.part == RunPart::Plan {
+        catalog.end_worker(worker, clock.now()).await?;
+        let status = catalog.status(fingerprints).await?;
+        let left = catalog.work_left(options.until, selection.as_ref()).await?;
+        return Ok(RunSummary {
+            done: 0,
+            failed: 0,
+            stages: 0,
+            left: left.pairs,
+            failed_in_all: left.quarantined,
+            stopped: false,
+            too_many_failures: false,
+            compute_time: Duration::ZERO,
+            elapsed_ms: clock.elapsed_ms(),
+            status,
+        });
     }
     let (events, mut received) = mpsc::unbounded_channel();
     let context = Arc::new(RunContext {
@@ -153,23 +173,20 @@ struct RunStart<'a> {
 }
 
 impl RunStart<'_> {
-    /// Recovers pairs of dead processes, requeues pairs to run again, and ends back-offs that are due. Reports how much
-    /// work there is.
+    /// Recovers pairs of dead processes, plans unless others do, and reports how much work there is.
     async fn prepare(
         &self,
-        lock: &mut RunLock,
+        guard: &mut RunGuard,
         worker: WorkerId,
         on_event: &mut (impl FnMut(RunEvent) + Send),
     ) -> Result<(), RunError> {
         let (catalog, options) = (self.catalog, self.options);
-        let recovered = self.recover(lock, worker).await?;
-        let limits = read_limits(options, self.stop);
-        input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
-        catalog
-            .requeue_stale(self.fingerprints, self.selection, options.rerun)
-            .await?;
-        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        catalog.release_due_backoffs(now, longest).await?;
+        let recovered = self.recover(guard, worker).await?;
+        if options.part != RunPart::Work && guard.lock_planning(catalog).await? {
+            let planned = self.plan().await;
+            guard.unlock_planning(catalog).await?;
+            planned?;
+        }
         let left = catalog.work_left(options.until, self.selection).await?;
         on_event(RunEvent::Started {
             pairs: left.pairs,
@@ -183,12 +200,25 @@ impl RunStart<'_> {
         Ok(())
     }
 
-    /// Recovers the leases of dead processes, then lets other processes join. Does nothing if this process has joined a
-    /// run, because other processes then hold valid leases. Returns how many pairs are ready again.
-    async fn recover(&self, lock: &mut RunLock, worker: WorkerId) -> Result<u64, RunError> {
-        if !lock.is_exclusive() {
+    /// Looks at the inputs, requeues pairs to run again, and ends back-offs that are due.
+    async fn plan(&self) -> Result<(), RunError> {
+        let (catalog, options) = (self.catalog, self.options);
+        let limits = read_limits(options, self.stop);
+        input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
+        catalog
+            .requeue_stale(self.fingerprints, self.selection, options.rerun)
+            .await?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        catalog.release_due_backoffs(now, longest).await?;
+        Ok(())
+    }
+
+    /// Recovers the leases of dead processes, then lets other processes join. Does nothing if other processes may hold
+    /// valid leases. Returns how many pairs are ready again.
+    async fn recover(&self, guard: &mut RunGuard, worker: WorkerId) -> Result<u64, RunError> {
+        let Some(lock) = guard.exclusive() else {
             return Ok(0);
-        }
+        };
         let (dead, now) = (DeadWorker::AllExcept(worker), self.clock.now());
         let recovered = self.catalog.recover(dead, now).await?;
         let (project, poisoned) = (self.project, &recovered.poisoned);
@@ -209,24 +239,6 @@ fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
         stop: stop.clone(),
         until: StopLevel::Drain,
     }
-}
-
-/// Refuses settings that differ from those of the run in progress. The first process defines the settings of a run.
-async fn require_same_settings(
-    catalog: &Catalog,
-    lock: &mut RunLock,
-    fingerprints: &Fingerprints,
-) -> Result<(), RunError> {
-    if lock.is_exclusive() {
-        lock.set_fingerprints(&fingerprints.hash_line())?;
-        return Ok(());
-    }
-    let running = lock.fingerprints()?;
-    if running == fingerprints.hash_line() {
-        return Ok(());
-    }
-    let changes = catalog.changes_from(&running, fingerprints).await?;
-    Err(RunError::OtherSettings(changes))
 }
 
 async fn selection(

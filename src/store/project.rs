@@ -60,6 +60,14 @@ impl Project {
         Self::found(dir)
     }
 
+    /// Opens a project whose catalog is not a file in its directory.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such directory.
+    pub fn open_directory(dir: &Path) -> Result<Self, StoreError> {
+        Self::found(dir)
+    }
+
     /// Returns a project that may not exist yet; touches no file.
     pub fn at(dir: &Path) -> Self {
         Self {

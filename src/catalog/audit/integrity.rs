@@ -6,6 +6,7 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, SqliteConnection};
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
 use crate::catalog::db::query::{query_as, query_scalar};
@@ -40,9 +41,27 @@ pub struct CounterDrift {
     pub counted: u64,
 }
 
-const REFERENCES: &str = "
+const REFERENCES: Sql = Sql::pair(
+    "
 SELECT \"table\" || coalesce(' row ' || rowid, '') || ' names a ' || parent || ' that is not there'
-FROM pragma_foreign_key_check LIMIT ?1";
+FROM pragma_foreign_key_check LIMIT ?1",
+    "
+SELECT what FROM (
+    SELECT 'stage_result of pair ' || r.pair || ' names a pair that is not there' AS what
+    FROM stage_result AS r WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = r.pair)
+    UNION ALL SELECT 'stage_result of pair ' || r.pair || ' names a fingerprint that is not there'
+    FROM stage_result AS r WHERE NOT EXISTS (SELECT 1 FROM fingerprint AS f WHERE f.id = r.fingerprint)
+    UNION ALL SELECT 'stage_result of pair ' || r.pair || ' names a worker that is not there'
+    FROM stage_result AS r WHERE NOT EXISTS (SELECT 1 FROM worker AS w WHERE w.id = r.worker)
+    UNION ALL SELECT 'metric_result of pair ' || m.pair || ' names a pair that is not there'
+    FROM metric_result AS m WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = m.pair)
+    UNION ALL SELECT 'attempt row ' || a.id || ' names a pair that is not there'
+    FROM attempt AS a WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = a.pair)
+    UNION ALL SELECT 'job row ' || j.pair || ' names a fingerprint that is not there' FROM job AS j
+    WHERE j.fingerprint IS NOT NULL AND NOT EXISTS (SELECT 1 FROM fingerprint AS f WHERE f.id = j.fingerprint)
+    UNION ALL SELECT 'job row ' || j.pair || ' names a worker that is not there' FROM job AS j
+    WHERE j.worker IS NOT NULL AND NOT EXISTS (SELECT 1 FROM worker AS w WHERE w.id = j.worker)) AS broken LIMIT ?1",
+);
 
 const OBJECTS: &str = "
 SELECT type || ' ' || name, sql FROM sqlite_schema

@@ -32,7 +32,7 @@ impl Catalog {
         // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
         // off, so that the pool keeps only read connections.
         let Conn::Sqlite(Held::Pooled(conn)) = self.read_conn().await? else {
-            return Err(CatalogError::FileOnly("be copied to a file; use `pg_dump`"));
+            return self.back_up_server(file, settings).await;
         };
         let mut conn = conn.detach();
         sqlx::query("PRAGMA query_only = 0")
@@ -41,6 +41,17 @@ impl Catalog {
         let copied = vacuum_into(&mut conn, file).await?;
         copied.map_err(|error| not_copied(file, error))?;
         conn.close().await?;
+        let stored = store_settings(file, settings).await;
+        stored.map_err(|error| disk_error(file, error))?;
+        verify(file).await
+    }
+
+    /// Like [`Self::back_up`], for a catalog in PostgreSQL.
+    async fn back_up_server(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
+        let copy = Self::create(file).await?;
+        let copied = self.copy_to(&copy, |_, _| {}).await;
+        copy.close().await;
+        copied?;
         let stored = store_settings(file, settings).await;
         stored.map_err(|error| disk_error(file, error))?;
         verify(file).await

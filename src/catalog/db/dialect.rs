@@ -27,6 +27,14 @@ impl Sql {
         }
     }
 
+    /// Makes a statement with one text for both databases.
+    pub(crate) const fn both(text: &'static str) -> Self {
+        Self {
+            sqlite: text,
+            postgres: None,
+        }
+    }
+
     /// Returns the text for PostgreSQL, with parameters written as `?` or `?1`.
     fn postgres(self) -> Cow<'static, str> {
         match self.postgres {
@@ -60,10 +68,7 @@ impl Sql {
 
 impl From<&'static str> for Sql {
     fn from(both: &'static str) -> Self {
-        Self {
-            sqlite: both,
-            postgres: None,
-        }
+        Self::both(both)
     }
 }
 
@@ -76,9 +81,10 @@ fn postgres_text(both: &str) -> String {
 
 /// Appends a value as SQL of PostgreSQL. The connection must have the setting `standard_conforming_strings`, with which
 /// a quote is the only character of a text that has a meaning.
-fn add_literal(script: &mut String, argument: &Argument) -> Result<()> {
+pub(crate) fn add_literal(script: &mut String, argument: &Argument) -> Result<()> {
     // Writing to a string does not fail.
     let _ = match argument {
+        Argument::Null => write!(script, "NULL"),
         Argument::Integer(Some(number)) => write!(script, "bigint '{number}'"),
         Argument::Integer(None) => write!(script, "CAST(NULL AS bigint)"),
         Argument::Real(Some(number)) => write!(script, "double precision '{number}'"),

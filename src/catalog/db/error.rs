@@ -102,9 +102,14 @@ pub enum CatalogError {
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]
     NoSchema(String),
-    /// An operation that only a catalog in a file has.
-    #[error("a catalog in PostgreSQL cannot {0}")]
-    FileOnly(&'static str),
+    /// The target of a copy holds another catalog.
+    #[error("{0} holds another catalog; give an empty target")]
+    NotEmpty(PathBuf),
+    /// After a copy, a table differs from the original.
+    #[error(
+        "the table {0} of the copy differs from the original, which changed since the copy was begun; remove the copy, and copy again while no run is active"
+    )]
+    CopyDiffers(&'static str),
     /// A path that is not UTF-8.
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),

@@ -195,9 +195,12 @@ async fn lock(transaction: &mut Transaction<'_, Postgres>) -> Result<()> {
     Ok(())
 }
 
-/// Returns whether a catalog's location is a URL of PostgreSQL.
-pub(crate) fn is_url(location: &str) -> bool {
-    location.starts_with("postgres://") || location.starts_with("postgresql://")
+/// Returns whether a URL contains a password.
+pub fn has_password(url: &str) -> bool {
+    let rest = url.split_once("://").map_or(url, |(_, rest)| rest);
+    let (address, parameters) = rest.split_once('?').unwrap_or((rest, ""));
+    let user = address.rsplit_once('@').map_or("", |(user, _)| user);
+    user.contains(':') || parameters.contains("password=")
 }
 
 /// Removes the password from a URL, for messages.

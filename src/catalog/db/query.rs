@@ -164,6 +164,7 @@ pub(crate) fn sqlite_arguments(
     let mut converted = SqliteArguments::default();
     for argument in arguments {
         let added = match argument {
+            Argument::Null => converted.add(None::<i64>),
             Argument::Integer(value) => converted.add(value),
             Argument::Real(value) => converted.add(value),
             Argument::Text(value) => converted.add(value),
@@ -179,6 +180,7 @@ fn postgres_arguments(arguments: Vec<Argument>) -> Result<PgArguments> {
     let mut converted = PgArguments::default();
     for argument in arguments {
         let added = match argument {
+            Argument::Null => converted.add(None::<i64>),
             Argument::Integer(value) => converted.add(value),
             Argument::Real(value) => converted.add(value),
             Argument::Text(value) => converted.add(value),

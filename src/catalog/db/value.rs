@@ -151,6 +151,8 @@ pub(crate) fn read_blob<T, E: Into<BoxDynError>>(
 /// A parameter of a statement. `None` is NULL, with the type that PostgreSQL needs for it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Argument {
+    /// NULL of any type, only for literals and SQLite.
+    Null,
     Integer(Option<i64>),
     Real(Option<f64>),
     Text(Option<String>),

@@ -58,7 +58,8 @@ pub(crate) struct Heartbeat {
 /// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
 /// prepare the statement again each time.
 ///
-/// PostgreSQL skips jobs that another process is about to lease. An exclusive job excludes only leases on the same host.
+/// PostgreSQL skips jobs that another process is about to lease. An exclusive job excludes only leases on the same host. A
+/// worker whose settings are not those of the last plan gets nothing.
 pub(crate) const CLAIM: Sql = Sql::pair(
     "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
@@ -75,6 +76,7 @@ WHERE job.pair = ANY (ARRAY(
         SELECT j.pair FROM job AS j WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
         ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
     AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
+    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
     AND NOT EXISTS (
         SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
         WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
@@ -100,6 +102,7 @@ WHERE job.pair = ANY (ARRAY(
     WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
         ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
     AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
+    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
     AND NOT EXISTS (
         SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
         WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))

@@ -14,5 +14,6 @@ pub(crate) mod recovery;
 pub(crate) mod requeue;
 mod run_plan;
 pub(crate) mod selection;
+pub(crate) mod shared_runs;
 pub(crate) mod staleness;
 pub(crate) mod workers;

@@ -1,0 +1,132 @@
+//! Runs of several machines on a catalog in PostgreSQL: the settings that all of them use, and the lock of planning.
+//! Runs on a catalog in a file use lock files instead.
+
+use serde_json::Value;
+
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::queue::fingerprint::{FingerprintIds, differences, fields_of};
+use crate::catalog::queue::lease::FingerprintId;
+use crate::catalog::queue::plan::FieldChange;
+use crate::catalog::{Catalog, Result};
+use crate::domain::{Stage, UnixMillis};
+
+/// Time without a heartbeat after which `status` no longer counts a worker, in milliseconds. Only for display, because
+/// the clocks of two machines may differ.
+const SHOWN_ACTIVE_MS: i64 = 60_000;
+
+/// The fingerprints of a leased job's worker that differ from those given.
+const OTHERS: &str = "
+SELECT w.fingerprints FROM worker AS w
+WHERE w.fingerprints <> ?1 AND w.id IN (SELECT worker FROM job WHERE status = 1) ORDER BY w.id LIMIT 1";
+
+const SET: &str = "
+INSERT INTO run_settings (id, fingerprints) VALUES (1, ?1) ON CONFLICT (id) DO UPDATE SET fingerprints = excluded.fingerprints";
+
+const ACTIVE: &str =
+    "SELECT count(*) FROM worker WHERE ended IS NULL AND died = 0 AND heartbeat > ?1";
+
+/// A lock that belongs to the connection, so it is free when the process ends.
+const TRY_LOCK: &str =
+    "SELECT pg_try_advisory_lock(hashtextextended(current_setting('search_path'), 1))";
+const UNLOCK: &str =
+    "SELECT pg_advisory_unlock(hashtextextended(current_setting('search_path'), 1))";
+
+/// Whether a run may use its settings.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SharedSettings {
+    /// All workers use them.
+    Same,
+    /// Others use other settings, which differ in these fields.
+    Other(Vec<FieldChange>),
+}
+
+impl Catalog {
+    /// Returns whether several machines can share the catalog.
+    pub const fn is_shared(&self) -> bool {
+        self.is_on_server()
+    }
+
+    /// Makes these the settings of all workers, unless pairs are leased by workers with other settings. Workers with
+    /// other settings get no more pairs.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn set_run_settings(&self, fingerprints: FingerprintIds) -> Result<SharedSettings> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let mine = fingerprints.json();
+                let others = query_scalar(OTHERS).bind(&mine);
+                if let Some(others) = others.fetch_optional(conn).await? {
+                    return other(conn, others, fingerprints).await;
+                }
+                query(SET).bind(&mine).execute(conn).await?;
+                Ok(SharedSettings::Same)
+            })
+        })
+        .await
+    }
+
+    /// Compares the settings of a new worker with those of the last plan. Without a plan, any settings are accepted.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn compare_run_settings(
+        &self,
+        fingerprints: FingerprintIds,
+    ) -> Result<SharedSettings> {
+        let mut conn = self.snapshot().await?;
+        let planned = query_scalar("SELECT fingerprints FROM run_settings");
+        let planned: Option<String> = planned.fetch_optional(&mut conn).await?;
+        match planned {
+            Some(planned) if planned != fingerprints.json() => {
+                other(&mut conn, planned, fingerprints).await
+            }
+            Some(_) | None => Ok(SharedSettings::Same),
+        }
+    }
+
+    /// Counts the workers whose last heartbeat is recent.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn active_workers(&self, now: UnixMillis) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        let active = query_scalar(ACTIVE).bind(now - SHOWN_ACTIVE_MS);
+        active.fetch_one(&mut conn).await
+    }
+
+    /// Takes the lock of planning. Returns `false` if another process plans.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn try_lock_planning(&self) -> Result<bool> {
+        self.in_transaction(|conn| Box::pin(query_scalar(TRY_LOCK).fetch_one(conn)))
+            .await
+    }
+
+    /// Releases the lock of planning.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn unlock_planning(&self) -> Result<()> {
+        self.in_transaction(|conn| Box::pin(query(UNLOCK).execute(conn)))
+            .await
+    }
+}
+
+/// Returns the fields in which the fingerprints differ from others, which are a JSON array of ids by stage.
+async fn other(
+    conn: &mut Conn,
+    others: String,
+    fingerprints: FingerprintIds,
+) -> Result<SharedSettings> {
+    let others: [i64; 4] = serde_json::from_str(&others)?;
+    let mut changes = Vec::new();
+    for (stage, id) in Stage::ALL.into_iter().zip(others) {
+        let mine: Value = fields_of(conn, fingerprints.of(stage)).await?;
+        let other = fields_of(conn, FingerprintId(id)).await?;
+        changes.extend(differences(stage, &other, &mine));
+    }
+    Ok(SharedSettings::Other(changes))
+}

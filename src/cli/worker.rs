@@ -1,0 +1,74 @@
+//! `plan` and `worker`: the two parts of a run, for runs on several machines.
+
+use clap::Args;
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::ExitCode;
+use super::run::{self, RunArgs};
+use super::signals;
+use super::table::count;
+use crate::catalog::RerunPolicy;
+use crate::domain::Stage;
+use crate::runner::{self, RunPart, Stop};
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PlanArgs {
+    /// Only these pairs [default: all]
+    pub(super) pairs: Vec<String>,
+    /// Also plan these pairs again: failed, stale (settings or files changed, which every plan includes) or all
+    #[arg(long, value_name = "WHICH", value_parser = run::rerun)]
+    pub(super) rerun: Option<RerunPolicy>,
+}
+
+/// Arguments of `worker`.
+#[derive(Debug, Args)]
+pub(super) struct WorkerArgs {
+    /// Number of pairs to process at the same time [default: one per core]
+    #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) jobs: Option<u16>,
+    /// Memory for the pairs processed at the same time, such as 4G or 512M [default: most of the free memory]
+    #[arg(long, value_name = "SIZE", value_parser = run::bytes)]
+    pub(super) memory: Option<u64>,
+    /// Stop after this many pairs have failed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) max_failures: Option<u64>,
+    /// Run only this stage and earlier ones
+    #[arg(long, value_name = "STAGE")]
+    pub(super) stage: Option<Stage>,
+}
+
+pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let args = RunArgs {
+        pairs: args.pairs,
+        rerun: args.rerun,
+        ..RunArgs::default()
+    };
+    let config = context.settings()?.config;
+    let (project, catalog) = context.open().await?;
+    let options = run::options(&args, &config, &catalog, RunPart::Plan).await?;
+    let stop = Stop::new();
+    let watch = signals::watch(&stop)?;
+    let planned = runner::run(&project, &catalog, &config.stages, &options, &stop, |_| {}).await;
+    watch.abort();
+    catalog.close().await;
+    let planned = planned?;
+    context.print_json(&json!({"schema": 1, "pairs": planned.left, "status": planned.status}))?;
+    context.info(&format!("{} to run", count(planned.left, "pair")));
+    if planned.left > 0 {
+        context.next("worker");
+    }
+    Ok(ExitCode::Done)
+}
+
+pub(super) async fn worker(args: WorkerArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let args = RunArgs {
+        jobs: args.jobs,
+        memory: args.memory,
+        max_failures: args.max_failures,
+        stage: args.stage,
+        ..RunArgs::default()
+    };
+    run::execute(args, RunPart::Work, context).await
+}
