@@ -10,6 +10,7 @@ use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
+use crate::catalog::db::patience::Patience;
 use crate::catalog::db::postgres::PostgresPlace;
 use crate::catalog::db::request::{Message, Reply};
 use crate::catalog::db::write_connection::{Work, WriteConnection};
@@ -32,6 +33,8 @@ pub struct Catalog {
     /// `None` for a read-only catalog.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
+    /// Whether this process waits for a server that is away.
+    pub(crate) patience: Arc<Patience>,
     /// Path of the file, or the URL of a PostgreSQL catalog without the password.
     pub(crate) path: Arc<Path>,
 }
@@ -54,6 +57,7 @@ impl Catalog {
             readers: Readers::Sqlite(open::reader_pool(path).await?),
             inbox: None,
             delay: CommitDelay::new(),
+            patience: Arc::default(),
             path: path.into(),
         })
     }
@@ -66,8 +70,8 @@ impl Catalog {
     ) -> Result<Self> {
         let conn = open::write_conn(path, allow_empty).await?;
         let readers = Readers::Sqlite(open::reader_pool(path).await?);
-        let conn = Conn::Sqlite(Held::Owned(conn));
-        Ok(Self::start(readers, conn, path, delay))
+        let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), path.into());
+        Ok(Self::start(readers, writer, delay, Arc::default()))
     }
 
     /// Opens the catalog at a URL of PostgreSQL. If `may_create` is set, creates it if it is missing.
@@ -85,9 +89,11 @@ impl Catalog {
         delay: Arc<CommitDelay>,
     ) -> Result<Self> {
         let place = PostgresPlace::parse(url)?;
-        let conn = Conn::Postgres(Held::Owned(place.connect(may_create).await?));
+        let conn = place.connect(may_create).await?;
         let readers = Readers::Postgres(place.reader_pool().await?);
-        Ok(Self::start(readers, conn, Path::new(&place.text()), delay))
+        let patience: Arc<Patience> = Arc::default();
+        let writer = WriteConnection::to_server(conn, place, Arc::clone(&patience));
+        Ok(Self::start(readers, writer, delay, patience))
     }
 
     /// Opens the catalog at a URL of PostgreSQL read-only.
@@ -100,21 +106,26 @@ impl Catalog {
             readers: Readers::Postgres(place.reader_pool().await?),
             inbox: None,
             delay: CommitDelay::new(),
+            patience: Arc::default(),
             path: Path::new(&place.text()).into(),
         })
     }
 
     /// Starts the writer task.
-    fn start(readers: Readers, conn: Conn, path: &Path, delay: Arc<CommitDelay>) -> Self {
+    fn start(
+        readers: Readers,
+        writer: WriteConnection,
+        delay: Arc<CommitDelay>,
+        patience: Arc<Patience>,
+    ) -> Self {
         let (sender, inbox) = mpsc::channel(INBOX);
-        let path: Arc<Path> = path.into();
-        let writer = WriteConnection::new(conn, Arc::clone(&path));
-        let writer = writer::run(writer, inbox, Arc::clone(&delay));
-        tokio::spawn(writer);
+        let path = Arc::clone(&writer.path);
+        tokio::spawn(writer::run(writer, inbox, Arc::clone(&delay)));
         Self {
             readers,
             inbox: Some(sender),
             delay,
+            patience,
             path,
         }
     }

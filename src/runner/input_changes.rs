@@ -20,7 +20,11 @@ pub(super) async fn store_changes(
     among: Option<&PairSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
-    let mut page = catalog.known_inputs(None, PAGE, among).await?;
+    let read = async |after| {
+        let page = catalog.patiently(async || catalog.known_inputs(after, PAGE, among).await);
+        page.await
+    };
+    let mut page = read(None).await?;
     while let Some(last) = page.last()
         && limits.stop.level() < limits.until
     {
@@ -30,13 +34,11 @@ pub(super) async fn store_changes(
             known,
         });
         // Read the catalog's next page while the files of the current page are compared.
-        let (changed, next) = tokio::join!(
-            read_each(compared.collect(), limits),
-            catalog.known_inputs(after, PAGE, among)
-        );
+        let (changed, next) = tokio::join!(read_each(compared.collect(), limits), read(after));
         let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
         if !changed.is_empty() {
-            catalog.store_inputs(changed).await?;
+            let stored = catalog.patiently(async || catalog.store_inputs(changed.clone()).await);
+            stored.await?;
         }
         page = next?;
     }
@@ -55,16 +57,17 @@ pub(super) async fn store_inputs_of_quarantined(
         return Ok(());
     }
     let among = PairSelection::of(pairs);
-    let known = catalog
-        .known_inputs(None, pairs.len(), Some(&among))
-        .await?;
+    let known =
+        catalog.patiently(async || catalog.known_inputs(None, pairs.len(), Some(&among)).await);
+    let known = known.await?;
     let unread = known.into_iter().map(|known| UnreadInputs {
         project: project.clone(),
         known,
     });
     let inputs = read_each(unread.collect(), limits).await;
-    let inputs = inputs.into_iter().flatten().collect();
-    Ok(catalog.record_poisoned_inputs(inputs).await?)
+    let inputs: Vec<_> = inputs.into_iter().flatten().collect();
+    let stored = catalog.patiently(async || catalog.record_poisoned_inputs(inputs.clone()).await);
+    Ok(stored.await?)
 }
 
 /// Returns the current versions of two files. Returns `None` for a file if reading it fails or is ended by `limits`.

@@ -225,7 +225,9 @@ impl Prefetch {
         if leases.is_empty() {
             return Ok(());
         }
-        let works = context.catalog.work(&leases).await?;
+        let catalog = &context.catalog;
+        let works = catalog.patiently(async || catalog.work(&leases).await);
+        let works = works.await?;
         let leased = self.estimate(leases.into_iter().zip(works)).await;
         self.queue.extend(leased);
         Ok(())

@@ -27,6 +27,9 @@ use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::Project;
 
+/// How long a run that is asked to stop waits for a database server that is away.
+const GIVE_UP_AFTER: Duration = Duration::from_secs(2);
+
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
@@ -146,9 +149,13 @@ pub(super) async fn run_with(
         compute_us: AtomicU64::new(0),
     });
     let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+    let given_up = tokio::spawn(give_up_after_stop(catalog.clone(), stop.clone()));
     let counts = scheduler.run(&mut received, &mut on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let ended = catalog.end_worker(scheduler.worker(), clock.now()).await;
+    let worker = scheduler.worker();
+    let ended = catalog.patiently(async || catalog.end_worker(worker, clock.now()).await);
+    let ended = ended.await;
+    given_up.abort();
     // A lost log explains other errors.
     let ended = match ended {
         Err(error) if error.log_loss().is_some() => return Err(error.into()),
@@ -159,6 +166,14 @@ pub(super) async fn run_with(
     let status = catalog.status(fingerprints).await?;
     let left = catalog.work_left(options.until, selection.as_ref()).await?;
     Ok(summary(&counts, left, status, &context))
+}
+
+/// Stops waiting for a database server that is away when the run is asked to stop, after a short time in which the server
+/// may take the leases back.
+async fn give_up_after_stop(catalog: Catalog, stop: Stop) {
+    stop.reached(StopLevel::Drain).await;
+    tokio::time::sleep(GIVE_UP_AFTER).await;
+    catalog.stop_waiting();
 }
 
 /// What a run works on, before its scheduler starts.
@@ -205,11 +220,16 @@ impl RunStart<'_> {
         let (catalog, options) = (self.catalog, self.options);
         let limits = read_limits(options, self.stop);
         input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
-        catalog
-            .requeue_stale(self.fingerprints, self.selection, options.rerun)
-            .await?;
+        let (fingerprints, selection) = (self.fingerprints, self.selection);
+        let requeued = async || {
+            catalog
+                .requeue_stale(fingerprints, selection, options.rerun)
+                .await
+        };
+        catalog.patiently(requeued).await?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        catalog.release_due_backoffs(now, longest).await?;
+        let ended = catalog.patiently(async || catalog.release_due_backoffs(now, longest).await);
+        ended.await?;
         Ok(())
     }
 

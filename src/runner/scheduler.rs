@@ -179,7 +179,9 @@ impl Scheduler {
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
         let until = self.context.until;
         let catalog = &self.context.catalog;
-        Ok(catalog.outstanding(until, self.selection.as_ref()).await?)
+        let selection = self.selection.as_ref();
+        let left = catalog.patiently(async || catalog.outstanding(until, selection).await);
+        Ok(left.await?)
     }
 
     fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
@@ -240,9 +242,9 @@ impl Scheduler {
         let left = self.outstanding().await?;
         if left.next_due.is_some_and(|due| due <= now) {
             let longest = policy::longest_backoff_ms();
-            self.context
-                .catalog
-                .release_due_backoffs(now, longest)
+            let catalog = &self.context.catalog;
+            catalog
+                .patiently(async || catalog.release_due_backoffs(now, longest).await)
                 .await?;
         }
         self.prefetch.expect_more();

@@ -75,13 +75,22 @@ impl WorkerSession {
     pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let expired = self.worker;
-        catalog.end_worker(expired, now).await?;
+        catalog
+            .patiently(async || catalog.end_worker(expired, now).await)
+            .await?;
+        let fingerprints = context.fingerprints;
         self.worker = catalog
-            .register_worker(this_process(), context.fingerprints, now)
+            .patiently(async || {
+                catalog
+                    .register_worker(this_process(), fingerprints, now)
+                    .await
+            })
             .await?;
         self.last_heartbeat = now;
         let dead = DeadWorker::Workers(vec![expired]);
-        catalog.recover(dead, now).await?;
+        catalog
+            .patiently(async || catalog.recover(dead.clone(), now).await)
+            .await?;
         Ok(())
     }
 
@@ -89,17 +98,23 @@ impl WorkerSession {
     /// many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
-        let holders = catalog.lease_holders().await?;
+        let holders = catalog.patiently(async || catalog.lease_holders().await);
+        let holders = holders.await?;
         let dead = self.liveness.observe(&holders, self.worker, now);
         let (mut ready, mut poisoned) = (0, Vec::new());
         if !dead.is_empty() {
-            let recovered = catalog.recover(DeadWorker::Workers(dead), now).await?;
+            let dead = DeadWorker::Workers(dead);
+            let recovered = catalog.patiently(async || catalog.recover(dead.clone(), now).await);
+            let recovered = recovered.await?;
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
             let margin = context.timing.deadline_margin.as_millis() as i64;
-            let overdue = catalog.recover_overdue(self.worker, margin, now).await?;
+            let me = self.worker;
+            let overdue =
+                catalog.patiently(async || catalog.recover_overdue(me, margin, now).await);
+            let overdue = overdue.await?;
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }

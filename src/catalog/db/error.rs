@@ -98,6 +98,8 @@ pub enum CatalogError {
         place: String,
         /// Why, with what to do.
         reason: String,
+        /// Whether the server may answer later.
+        is_away: bool,
     },
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]

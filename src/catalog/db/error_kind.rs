@@ -90,6 +90,7 @@ impl CatalogError {
                 CatalogErrorKind::of(error)
             }
             Self::WrongCounters { .. } => Some(CatalogErrorKind::Contradiction),
+            Self::NotConnected { is_away: true, .. } => Some(CatalogErrorKind::Away),
             Self::Shared(error) => error.kind(),
             _ => None,
         }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::known_leases::{KnownLeases, stored_before};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
 use crate::catalog::db::write_connection::BEGIN;
-use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints};
+use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::{self, ClaimRequest, Heartbeat};
-use crate::catalog::queue::counters::Deltas;
+use crate::catalog::queue::counters::{DONE, Deltas};
 use crate::catalog::queue::fail::{self, FailedRow};
 use crate::catalog::queue::lease::{FencedRow, Lease, StageFailure};
 
@@ -90,17 +91,73 @@ impl Batch {
     }
 
     /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
-    /// the transaction may still be open, so the caller must roll it back.
-    pub(crate) async fn apply(&self, conn: &mut Conn) -> Result<BatchReply> {
+    /// the transaction may still be open, so the caller must roll it back. `leases` are given for a server, where an
+    /// earlier commit of the same batch may have been stored although its answer was lost.
+    pub(crate) async fn apply(
+        &self,
+        conn: &mut Conn,
+        mut leases: Option<&mut KnownLeases>,
+    ) -> Result<BatchReply> {
         let mut script = Script::default();
         script.execute(BEGIN);
         let statements = self.add_jobs(&mut script)?;
         let rows = script.run(conn).await?;
+        let (mut stored, mut unknown) = (Vec::new(), Vec::new());
+        if let Some(leases) = &mut leases {
+            stored = self.stored_before(conn, &statements, &rows).await?;
+            for request in self.claims.items() {
+                unknown.push(leases.unknown(conn, request.worker).await?);
+            }
+        }
         let mut script = Script::default();
-        let reply = self.add_records(&mut script, &statements, &rows)?;
+        let mut reply = self.add_records(&mut script, &statements, &rows, &stored)?;
         script.execute("COMMIT");
         script.run(conn).await?;
+        for (claimed, unknown) in reply.claims.iter_mut().zip(unknown) {
+            let is_new = |lease: &Lease| !claimed.iter().any(|other| other.pair == lease.pair);
+            let found: Vec<Lease> = unknown.into_iter().filter(is_new).collect();
+            claimed.extend(found);
+        }
+        if let Some(leases) = leases {
+            self.note_leases(leases, &reply);
+        }
         Ok(reply)
+    }
+
+    /// Finds the requests without effect in this transaction that an earlier commit has stored.
+    async fn stored_before(
+        &self,
+        conn: &mut Conn,
+        statements: &JobStatements,
+        rows: &ScriptRows,
+    ) -> Result<Vec<FencedRow>> {
+        let advanced = rows.read_if_any(statements.advanced.as_ref())?;
+        let failed = rows.read_if_any(statements.failed.as_ref())?;
+        let released = rows.read_if_any(statements.released.as_ref())?;
+        let checkpoints = self.checkpoints.items().map(|item| &**item);
+        let checkpoints = checkpoints.filter(|(lease, _)| !lease.is_in(&advanced));
+        let failures = self.failures.items().map(|item| &item.0);
+        let failures = failures.filter(|lease| fail::row_of(lease, &failed).is_none());
+        let releases = self.releases.items();
+        let releases = releases.filter(|lease| !lease.is_in(&released));
+        stored_before(conn, checkpoints, failures.chain(releases)).await
+    }
+
+    /// Notes which leases have begun and ended.
+    fn note_leases(&self, leases: &mut KnownLeases, reply: &BatchReply) {
+        for (item, kept) in self.checkpoints.items().zip(&reply.checkpoints) {
+            let is_done = position_after(&item.1).is_some_and(|(cursor, _)| cursor == DONE);
+            if is_done || !kept {
+                leases.remove(&item.0);
+            }
+        }
+        let failures = self.failures.items().map(|item| &item.0);
+        failures
+            .chain(self.releases.items())
+            .for_each(|lease| leases.remove(lease));
+        for claimed in &reply.claims {
+            leases.add(claimed);
+        }
     }
 
     /// Adds the statements that change workers and jobs.
@@ -129,6 +186,7 @@ impl Batch {
         script: &mut Script,
         statements: &JobStatements,
         rows: &ScriptRows,
+        stored_before: &[FencedRow],
     ) -> Result<BatchReply> {
         let mut deltas = Deltas::default();
         let advanced = rows.read_if_any(statements.advanced.as_ref())?;
@@ -153,11 +211,15 @@ impl Batch {
         let releases = self.releases.items();
         Ok(BatchReply {
             heartbeats: heartbeats.collect::<Result<_>>()?,
-            checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
-            failures: failures
-                .map(|item| fail::row_of(&item.0, &failed).is_some())
+            checkpoints: checkpoints
+                .map(|item| item.0.is_in(&advanced) || item.0.is_in(stored_before))
                 .collect(),
-            releases: releases.map(|lease| lease.is_in(&released)).collect(),
+            failures: failures
+                .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(stored_before))
+                .collect(),
+            releases: releases
+                .map(|lease| lease.is_in(&released) || lease.is_in(stored_before))
+                .collect(),
             claims,
         })
     }

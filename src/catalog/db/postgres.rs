@@ -127,12 +127,14 @@ impl PostgresPlace {
         let conn = connected.map_err(|error| CatalogError::NotConnected {
             place: self.text(),
             reason: connection_error(&error),
+            is_away: CatalogErrorKind::of(&error) == Some(CatalogErrorKind::Away),
         })?;
         let version = conn.server_version_num().unwrap_or(0) / 10_000;
         if version < OLDEST_SERVER {
             return Err(CatalogError::NotConnected {
                 place: self.text(),
                 reason: format!("it is PostgreSQL {version}; {OLDEST_SERVER} or later is needed"),
+                is_away: false,
             });
         }
         Ok(conn)

@@ -1,6 +1,8 @@
 //! Statements with parameters, run on either database.
 
+use std::io;
 use std::marker::PhantomData;
+use std::time::Duration;
 
 use sqlx::postgres::PgArguments;
 use sqlx::sqlite::SqliteArguments;
@@ -102,7 +104,7 @@ impl<R> Query<R> {
                 let arguments = postgres_arguments(self.arguments)?;
                 let sql = AssertSqlSafe(self.sql.postgres_query());
                 let query = sqlx::query_with(sql, arguments);
-                query.execute(&mut **conn).await?;
+                limited(query.execute(&mut **conn)).await?;
             }
         }
         Ok(())
@@ -123,7 +125,7 @@ impl<R: Rows> Query<R> {
                 let arguments = postgres_arguments(self.arguments)?;
                 let sql = AssertSqlSafe(self.sql.postgres_query());
                 let rows = sqlx::query_with(sql, arguments).fetch_all(&mut **conn);
-                let rows = rows.await?.into_iter();
+                let rows = limited(rows).await?.into_iter();
                 rows.map(|row| R::value(Row::Postgres(row))).collect()
             }
         }
@@ -141,7 +143,7 @@ impl<R: Rows> Query<R> {
                 let arguments = postgres_arguments(self.arguments)?;
                 let sql = AssertSqlSafe(self.sql.postgres_query());
                 let row = sqlx::query_with(sql, arguments).fetch_optional(&mut **conn);
-                let row = row.await?.map(Row::Postgres);
+                let row = limited(row).await?.map(Row::Postgres);
                 row.map(R::value).transpose()
             }
         }
@@ -189,4 +191,22 @@ fn postgres_arguments(arguments: Vec<Argument>) -> Result<PgArguments> {
         added.map_err(sqlx::Error::Encode)?;
     }
     Ok(converted)
+}
+
+/// Longest time for one statement on a server. A connection that broke without a message would otherwise be waited for
+/// without end.
+const STATEMENT_LIMIT: Duration = Duration::from_secs(60);
+
+/// Limits the time of a statement on a server. After an error the connection cannot be used again.
+pub(crate) async fn limited<T>(
+    statement: impl Future<Output = sqlx::Result<T>>,
+) -> sqlx::Result<T> {
+    let limited = tokio::time::timeout(STATEMENT_LIMIT, statement).await;
+    limited.unwrap_or_else(|_| {
+        let text = format!("no answer for {} s", STATEMENT_LIMIT.as_secs());
+        Err(sqlx::Error::Io(io::Error::new(
+            io::ErrorKind::TimedOut,
+            text,
+        )))
+    })
 }

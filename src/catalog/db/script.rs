@@ -11,7 +11,7 @@ use sqlx::{AssertSqlSafe, Either, Executor as _};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::query::sqlite_arguments;
+use crate::catalog::db::query::{limited, sqlite_arguments};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Argument;
 
@@ -98,11 +98,8 @@ impl Script {
                 let arguments = sqlite_arguments(arguments.flat_map(|(_, arguments)| arguments))?;
                 // Concatenated constants only.
                 let query = sqlx::query_with(AssertSqlSafe(sql), arguments);
-                rows_of(
-                    conn.fetch_many(query)
-                        .map_ok(|one| one.map_right(Row::Sqlite)),
-                )
-                .await
+                let results = conn.fetch_many(query);
+                Ok(rows_of(results.map_ok(|one| one.map_right(Row::Sqlite))).await?)
             }
             Conn::Postgres(conn) => {
                 let mut sql = String::new();
@@ -111,11 +108,9 @@ impl Script {
                 }
                 // Constants, and values that `add_postgres` quotes.
                 let query = sqlx::raw_sql(AssertSqlSafe(sql));
-                rows_of(
-                    conn.fetch_many(query)
-                        .map_ok(|one| one.map_right(Row::Postgres)),
-                )
-                .await
+                let results = conn.fetch_many(query);
+                let rows = rows_of(results.map_ok(|one| one.map_right(Row::Postgres)));
+                Ok(limited(rows).await?)
             }
         }
     }
@@ -124,7 +119,7 @@ impl Script {
 /// Collects the rows of each statement of a stream. The left value marks the end of a statement.
 async fn rows_of<E>(
     mut results: impl Stream<Item = sqlx::Result<Either<E, Row>>> + Unpin,
-) -> Result<ScriptRows> {
+) -> sqlx::Result<ScriptRows> {
     let mut rows = vec![Vec::new()];
     while let Some(result) = results.try_next().await? {
         match result {

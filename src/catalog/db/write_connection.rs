@@ -5,14 +5,16 @@ use std::path::Path;
 use std::pin::Pin;
 use std::sync::Arc;
 
-use sqlx::Connection as _;
+use sqlx::{Connection as _, PgConnection};
 
 use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
+use crate::catalog::db::known_leases::KnownLeases;
 use crate::catalog::db::log_watch::LogWatch;
-use crate::catalog::db::postgres::LOCK;
+use crate::catalog::db::patience::Patience;
+use crate::catalog::db::postgres::{LOCK, PostgresPlace};
 use crate::catalog::db::query::query;
 
 /// Begins a transaction.
@@ -21,20 +23,88 @@ pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
 /// A future that borrows the write connection.
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 
-/// The write connection, and for SQLite the log that its commits go to.
+/// The write connection.
 pub(crate) struct WriteConnection {
     pub(crate) conn: Conn,
     pub(crate) path: Arc<Path>,
+    /// The log that the commits go to, in SQLite.
     log: Option<LogWatch>,
+    /// What is needed to connect again, in PostgreSQL.
+    server: Option<Server>,
+}
+
+/// The server of a catalog in PostgreSQL.
+struct Server {
+    place: PostgresPlace,
+    patience: Arc<Patience>,
+    leases: KnownLeases,
 }
 
 impl WriteConnection {
     pub(crate) fn new(conn: Conn, path: Arc<Path>) -> Self {
-        let log = match &conn {
-            Conn::Sqlite(_) => Some(LogWatch::new(&path)),
-            Conn::Postgres(_) => None,
+        let log = Some(LogWatch::new(&path));
+        Self {
+            conn,
+            path,
+            log,
+            server: None,
+        }
+    }
+
+    /// A connection to a server.
+    pub(crate) fn to_server(
+        conn: PgConnection,
+        place: PostgresPlace,
+        patience: Arc<Patience>,
+    ) -> Self {
+        Self {
+            conn: Conn::Postgres(Held::Owned(conn)),
+            path: Path::new(&place.text()).into(),
+            log: None,
+            server: Some(Server {
+                place,
+                patience,
+                leases: KnownLeases::default(),
+            }),
+        }
+    }
+
+    /// Returns the connection, and the leases that this process knows of if the catalog is on a server.
+    pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut KnownLeases>) {
+        let leases = self.server.as_mut().map(|server| &mut server.leases);
+        (&mut self.conn, &self.path, leases)
+    }
+
+    /// Connects again after an error that the server is away, and waits for it. Returns `false` if the catalog is not
+    /// on a server, if nobody waits any more, or if the server answers with another error.
+    pub(crate) async fn reconnect(&mut self) -> bool {
+        let Some(server) = &mut self.server else {
+            return false;
         };
-        Self { conn, path, log }
+        let mut attempt = 0;
+        loop {
+            match server.place.connect(false).await {
+                Ok(conn) => {
+                    self.conn = Conn::Postgres(Held::Owned(conn));
+                    server.leases.answers_may_be_lost();
+                    tracing::info!("connected to the database server again");
+                    return true;
+                }
+                Err(error) if error.is_away() => {
+                    if attempt == 0 {
+                        tracing::warn!(%error, "the database server is away, waiting for it");
+                    }
+                    if !server.patience.wait(attempt).await {
+                        return false;
+                    }
+                    attempt += 1;
+                }
+                Err(error) => {
+                    tracing::warn!(%error, "cannot connect to the database server again");
+                    return false;
+                }
+            }
+        }
     }
 
     /// Checks the log. Must be called before and after each commit, so that a reply is sent only for what is stored.
@@ -54,8 +124,16 @@ impl WriteConnection {
         work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>>,
     ) -> Result<T> {
         self.check_log().await?;
-        let Self { conn, path, .. } = self;
-        retry_while_busy!(path, begin(conn).await)?;
+        loop {
+            let (conn, path, _) = self.parts();
+            match retry_while_busy!(path, begin(conn).await) {
+                Err(error) if error.is_away() && self.reconnect().await => {
+                    tracing::debug!(%error, "the transaction begins again");
+                }
+                begun => break begun?,
+            }
+        }
+        let conn = &mut self.conn;
         let mut outcome = work(&mut *conn).await;
         if outcome.is_ok()
             && let Err(error) = execute(conn, "COMMIT").await

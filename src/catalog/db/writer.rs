@@ -91,14 +91,23 @@ async fn commit(writer: &mut WriteConnection, batch: Batch) {
 
 async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply> {
     writer.check_log().await?;
-    let WriteConnection { conn, path, .. } = writer;
-    let reply = retry_while_busy!(path, {
-        let outcome = batch.apply(conn).await;
-        if outcome.is_err() {
-            rollback(conn).await;
+    let reply = loop {
+        let (conn, path, mut leases) = writer.parts();
+        let reply = retry_while_busy!(path, {
+            let outcome = batch.apply(conn, leases.as_deref_mut()).await;
+            if outcome.as_ref().is_err_and(|error| !error.is_away()) {
+                rollback(conn).await;
+            }
+            outcome
+        });
+        match reply {
+            // What was stored before the connection broke is found when the batch is applied again.
+            Err(error) if error.is_away() && writer.reconnect().await => {
+                tracing::debug!(%error, "the commit is tried again");
+            }
+            reply => break reply,
         }
-        outcome
-    });
+    };
     writer.check_log().await?;
     reply
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::script::{Script, Statement};
-use crate::catalog::queue::counters::{CounterKey, DONE, Deltas, cursor};
+use crate::catalog::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
@@ -37,10 +37,10 @@ UPDATE job SET stage = item.next, status = item.status,
     attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
     dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
         SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
-FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, worker bigint, token bigint, next bigint, status bigint,
+FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, worker bigint, token bigint, stage bigint, next bigint, status bigint,
     fingerprint bigint, first bigint, mixed bigint, low_confidence bigint, deadline bigint, alive_since bigint)
-WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status = 1 AND EXISTS (
-    SELECT 1 FROM worker AS w WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
+WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status = 1
+    AND job.stage = item.stage AND EXISTS (SELECT 1 FROM worker AS w WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
 RETURNING job.pair, job.token",
 );
 
@@ -222,6 +222,12 @@ fn key_after(stage: &StageCheckpoint) -> CounterKey {
     CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
+/// Returns the position and the status of a job after stages are stored, or `None` if there are none.
+pub(crate) fn position_after(stages: &[StageCheckpoint]) -> Option<(Cursor, JobStatus)> {
+    let after = key_after(stages.last()?);
+    Some((after.cursor, after.status))
+}
+
 /// Builds the item of [`ADVANCE`] for a job, or returns `None` if there are no stages. The job becomes dirty if the
 /// stages are not consecutive (`mixed` is 1), or if the upstream of the fingerprint `first` is not the job's
 /// fingerprint.
@@ -236,7 +242,7 @@ fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     Some(json!({
         "pair": lease.pair, "worker": lease.worker, "token": lease.token, "next": after.cursor,
         "status": after.status.code(), "fingerprint": after.fingerprint, "first": first,
-        "mixed": i64::from(!follow), "low_confidence": i64::from(low_confidence), "deadline": deadline,
+        "stage": cursor(lease.cursor), "mixed": i64::from(!follow), "low_confidence": i64::from(low_confidence), "deadline": deadline,
         "alive_since": last.alive_since,
     }))
 }

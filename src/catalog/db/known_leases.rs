@@ -1,0 +1,117 @@
+//! The leases that this process knows of, on a server. The answer to a claim can be lost after its commit. Then the
+//! catalog has leases that nobody works on, while the worker's heartbeats keep them valid.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use serde_json::json;
+
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::query::query_as;
+use crate::catalog::db::row::from_row;
+use crate::catalog::db::rows::json_array;
+use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
+use crate::catalog::queue::lease::{FencedRow, Lease};
+use crate::domain::{JobStatus, PairId, WorkerId};
+
+/// How long after a reconnection unknown leases are looked for. A server may execute a commit of the broken connection
+/// until it notices that the connection is broken.
+const SEARCH_TIME: Duration = Duration::from_mins(2);
+
+/// Selects the leases of a worker.
+const LEASES: &str = "
+SELECT pair, worker, token, stage, fingerprint, attempt, exclusive FROM job WHERE status = 1 AND worker = ?1";
+
+/// Selects the jobs of a JSON array of `[pair]`.
+const JOBS: &str = "
+SELECT j.pair, j.token, j.stage, j.status, j.worker FROM json_each(?1) AS item
+    CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
+
+/// Tokens of known leases by pair.
+#[derive(Debug, Default)]
+pub(crate) struct KnownLeases {
+    tokens: BTreeMap<PairId, i64>,
+    search_until: Option<Instant>,
+}
+
+/// The state of a job.
+struct JobState {
+    pair: i64,
+    token: i64,
+    stage: i64,
+    status: JobStatus,
+    worker: Option<i64>,
+}
+
+from_row! { JobState { pair, token, stage, status, worker } }
+
+impl KnownLeases {
+    /// Notes that answers may have been lost.
+    pub(crate) fn answers_may_be_lost(&mut self) {
+        self.search_until = Some(Instant::now() + SEARCH_TIME);
+    }
+
+    /// Adds leases that a claim returned.
+    pub(crate) fn add(&mut self, leases: &[Lease]) {
+        let tokens = leases.iter().map(|lease| (lease.pair, lease.token));
+        self.tokens.extend(tokens);
+    }
+
+    /// Removes a lease that has ended.
+    pub(crate) fn remove(&mut self, lease: &Lease) {
+        self.tokens.remove(&lease.pair);
+    }
+
+    /// Returns the leases of a worker that this process does not know of. Asks the server only for some time after a
+    /// reconnection.
+    pub(crate) async fn unknown(
+        &mut self,
+        conn: &mut Conn,
+        worker: WorkerId,
+    ) -> Result<Vec<Lease>> {
+        if self.search_until.is_none_or(|until| Instant::now() > until) {
+            self.search_until = None;
+            return Ok(Vec::new());
+        }
+        let mut leases: Vec<Lease> = query_as(LEASES).bind(worker.0).fetch_all(conn).await?;
+        leases.retain(|lease| self.tokens.get(&lease.pair) != Some(&lease.token));
+        Ok(leases)
+    }
+}
+
+/// Returns the checkpoints among those that changed no job which an earlier commit has stored.
+pub(crate) async fn stored_before<'i>(
+    conn: &mut Conn,
+    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
+    ended: impl Iterator<Item = &'i Lease>,
+) -> Result<Vec<FencedRow>> {
+    let checkpoints: BTreeMap<_, _> = checkpoints
+        .filter_map(|(lease, stages)| Some((lease.pair.0, (lease, position_after(stages)?))))
+        .collect();
+    let ended: BTreeMap<_, _> = ended.map(|lease| (lease.pair.0, lease)).collect();
+    let pairs = checkpoints.keys().chain(ended.keys());
+    let pairs: Vec<_> = pairs.map(|pair| json!([pair])).collect();
+    if pairs.is_empty() {
+        return Ok(Vec::new());
+    }
+    let jobs = query_as(JOBS).bind(json_array(pairs)).fetch_all(conn);
+    let jobs: Vec<JobState> = jobs.await?;
+    let is_stored = |job: &JobState| {
+        if let Some((lease, (stage, status))) = checkpoints.get(&job.pair) {
+            let worker = (*status == JobStatus::Leased).then_some(lease.worker.0);
+            return job.token == lease.token
+                && (job.stage, job.status, job.worker) == (*stage, *status, worker);
+        }
+        ended
+            .get(&job.pair)
+            .is_some_and(|lease| job.token == lease.token && job.worker.is_none())
+    };
+    let stored = jobs.into_iter().filter(is_stored);
+    Ok(stored
+        .map(|job| FencedRow {
+            pair: job.pair,
+            token: job.token,
+        })
+        .collect())
+}

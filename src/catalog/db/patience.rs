@@ -1,0 +1,85 @@
+//! Waits for a database server that is away: restarted, unreachable, or behind a broken network.
+
+use std::hash::{BuildHasher as _, RandomState};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use tokio::sync::Notify;
+
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::CatalogErrorKind;
+use crate::catalog::{Catalog, CatalogError};
+
+/// First wait before another attempt.
+const FIRST_WAIT: Duration = Duration::from_millis(100);
+/// Longest wait. Each wait is multiplied with a random factor, so that many processes do not come back together.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+
+/// Whether a process still waits for its server.
+#[derive(Debug, Default)]
+pub(crate) struct Patience {
+    is_given_up: AtomicBool,
+    given_up: Notify,
+}
+
+impl Patience {
+    /// Ends all waits, now and later.
+    fn give_up(&self) {
+        self.is_given_up.store(true, Ordering::Release);
+        self.given_up.notify_waiters();
+    }
+
+    /// Waits before attempt `attempt`, from 0. Returns `false`, at once, if nobody waits any more.
+    pub(crate) async fn wait(&self, attempt: u32) -> bool {
+        let doubled = FIRST_WAIT.saturating_mul(1 << attempt.min(16));
+        // Between 0.5 and 1.5. The standard library seeds each state at random.
+        let random = RandomState::new().hash_one(attempt) >> 32;
+        let factor = 0.5 + random as f64 / f64::from(u32::MAX);
+        let wait = tokio::time::sleep(doubled.min(LONGEST_WAIT).mul_f64(factor));
+        let given_up = self.given_up.notified();
+        if self.is_given_up.load(Ordering::Acquire) {
+            return false;
+        }
+        tokio::select! {
+            () = wait => true,
+            () = given_up => false,
+        }
+    }
+}
+
+impl CatalogError {
+    /// Returns whether the database server cannot be reached at the moment.
+    pub fn is_away(&self) -> bool {
+        self.kind() == Some(CatalogErrorKind::Away)
+    }
+}
+
+impl Catalog {
+    /// Calls `operation` again while the database server is away. The operation must have the same effect if an earlier
+    /// call was stored although its answer was lost.
+    ///
+    /// # Errors
+    /// Returns the error of the operation, also that the server is away after [`Catalog::stop_waiting`].
+    pub async fn patiently<T>(&self, operation: impl AsyncFn() -> Result<T>) -> Result<T> {
+        let mut attempt = 0;
+        loop {
+            match operation().await {
+                Err(error) if error.is_away() => {
+                    if attempt == 0 {
+                        tracing::warn!(%error, "the database server is away, waiting for it");
+                    }
+                    if !self.patience.wait(attempt).await {
+                        return Err(error);
+                    }
+                    attempt += 1;
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Ends all waits for a database server that is away. Operations then fail while it is.
+    pub fn stop_waiting(&self) {
+        self.patience.give_up();
+    }
+}
