@@ -58,9 +58,11 @@ impl KnownLeases {
         self.tokens.extend(tokens);
     }
 
-    /// Removes a lease that has ended.
+    /// Removes a lease that has ended. A later lease of the same pair stays.
     pub(crate) fn remove(&mut self, lease: &Lease) {
-        self.tokens.remove(&lease.pair);
+        if self.tokens.get(&lease.pair) == Some(&lease.token) {
+            self.tokens.remove(&lease.pair);
+        }
     }
 
     /// Returns the leases of a worker that this process does not know of. Asks the server only for some time after a

@@ -10,7 +10,7 @@ use sqlx::{Connection as _, PgConnection};
 use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::dialect::Sql;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::known_leases::KnownLeases;
 use crate::catalog::db::log_watch::LogWatch;
 use crate::catalog::db::patience::Patience;
@@ -31,6 +31,8 @@ pub(crate) struct WriteConnection {
     log: Option<LogWatch>,
     /// What is needed to connect again, in PostgreSQL.
     server: Option<Server>,
+    /// Whether a statement got no answer, so that the state of the connection is unknown.
+    is_broken: bool,
 }
 
 /// The server of a catalog in PostgreSQL.
@@ -48,6 +50,7 @@ impl WriteConnection {
             path,
             log,
             server: None,
+            is_broken: false,
         }
     }
 
@@ -66,6 +69,7 @@ impl WriteConnection {
                 patience,
                 leases: KnownLeases::default(),
             }),
+            is_broken: false,
         }
     }
 
@@ -73,6 +77,13 @@ impl WriteConnection {
     pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut KnownLeases>) {
         let leases = self.server.as_mut().map(|server| &mut server.leases);
         (&mut self.conn, &self.path, leases)
+    }
+
+    /// Connects again if the state of the connection is unknown.
+    pub(crate) async fn mend(&mut self) {
+        if self.is_broken {
+            self.reconnect().await;
+        }
     }
 
     /// Connects again after an error that the server is away, and waits for it. Returns `false` if the catalog is not
@@ -86,6 +97,7 @@ impl WriteConnection {
             match server.place.connect(false).await {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
+                    self.is_broken = false;
                     server.leases.answers_may_be_lost();
                     tracing::info!("connected to the database server again");
                     return true;
@@ -124,6 +136,7 @@ impl WriteConnection {
         work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>>,
     ) -> Result<T> {
         self.check_log().await?;
+        self.mend().await;
         loop {
             let (conn, path, _) = self.parts();
             match retry_while_busy!(path, begin(conn).await) {
@@ -133,14 +146,17 @@ impl WriteConnection {
                 begun => break begun?,
             }
         }
-        let conn = &mut self.conn;
+        let Self {
+            conn, is_broken, ..
+        } = self;
         let mut outcome = work(&mut *conn).await;
         if outcome.is_ok()
             && let Err(error) = execute(conn, "COMMIT").await
         {
             outcome = Err(error);
         }
-        if outcome.is_err() {
+        *is_broken = outcome.as_ref().is_err_and(CatalogError::is_away);
+        if outcome.is_err() && !*is_broken {
             rollback(conn).await;
         }
         self.check_log().await?;

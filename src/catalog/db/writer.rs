@@ -91,6 +91,7 @@ async fn commit(writer: &mut WriteConnection, batch: Batch) {
 
 async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply> {
     writer.check_log().await?;
+    writer.mend().await;
     let reply = loop {
         let (conn, path, mut leases) = writer.parts();
         let reply = retry_while_busy!(path, {

@@ -41,6 +41,11 @@ FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND
 RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
+/// Locks jobs in PostgreSQL, always in the order of pairs.
+const LOCK_JOBS: &str = "
+SELECT pair, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
+WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE";
+
 /// Selects one page of the clean jobs with one stage, status and fingerprint, sorted by pair.
 pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
@@ -224,12 +229,31 @@ async fn failed_jobs(conn: &mut Conn, selection: &RetrySelection) -> Result<Vec<
     Ok(query.fetch_all(conn).await?)
 }
 
+/// Returns the jobs whose key is still the given one, and locks them until the end of the transaction. In SQLite, no job
+/// changes during a transaction.
+async fn unchanged(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<Vec<(KeyedJob, Stage)>> {
+    if matches!(conn, Conn::Sqlite(_)) {
+        return Ok(jobs.to_vec());
+    }
+    let pairs = json_array(jobs.iter().map(|(job, _)| job.pair));
+    let locked: Vec<KeyedJob> = query_as(LOCK_JOBS).bind(pairs).fetch_all(conn).await?;
+    let locked: BTreeMap<i64, CounterKey> = locked.iter().map(|job| (job.pair, job.key)).collect();
+    let mut unchanged = jobs.to_vec();
+    unchanged.retain(|(job, _)| locked.get(&job.pair) == Some(&job.key));
+    Ok(unchanged)
+}
+
 /// Resets each job to the given stage, except leased jobs. Returns the number of changed jobs.
 async fn requeue(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
     if jobs.is_empty() {
         return Ok(0);
     }
-    let items = json_array(jobs.iter().map(|(job, to)| json!([job.pair, to.index()])));
+    let unchanged = unchanged(conn, jobs).await?;
+    let items = json_array(
+        unchanged
+            .iter()
+            .map(|(job, to)| json!([job.pair, to.index()])),
+    );
     let moved = query_as(REQUEUE).bind(&items);
     let moved: Vec<KeyedJob> = moved.fetch_all(&mut *conn).await?;
     let clear = query(CLEAR_FAILURES).bind(&items);
