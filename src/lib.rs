@@ -187,6 +187,7 @@ pub mod manifest;
 pub mod mesh;
 pub mod page_vec;
 #[cfg(test)]
+#[path = "../tests/support/postgres_server.rs"]
 mod postgres_server;
 pub mod raster;
 pub mod report;

@@ -21,7 +21,7 @@ const INBOX: usize = 1024;
 
 /// Read connections.
 #[derive(Debug, Clone)]
-enum Readers {
+enum ReaderPool {
     Sqlite(SqlitePool),
     Postgres(PgPool),
 }
@@ -29,7 +29,7 @@ enum Readers {
 /// An open catalog. Clones share the connections.
 #[derive(Debug, Clone)]
 pub struct Catalog {
-    readers: Readers,
+    readers: ReaderPool,
     /// `None` for a read-only catalog.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
@@ -54,7 +54,7 @@ impl Catalog {
     /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
-            readers: Readers::Sqlite(open::reader_pool(path).await?),
+            readers: ReaderPool::Sqlite(open::reader_pool(path).await?),
             inbox: None,
             delay: CommitDelay::new(),
             patience: Arc::default(),
@@ -69,7 +69,7 @@ impl Catalog {
         delay: Arc<CommitDelay>,
     ) -> Result<Self> {
         let conn = open::write_conn(path, allow_empty).await?;
-        let readers = Readers::Sqlite(open::reader_pool(path).await?);
+        let readers = ReaderPool::Sqlite(open::reader_pool(path).await?);
         let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), path.into());
         Ok(Self::start(readers, writer, delay, Arc::default()))
     }
@@ -90,7 +90,7 @@ impl Catalog {
     ) -> Result<Self> {
         let place = PostgresPlace::parse(url)?;
         let conn = place.connect(may_create).await?;
-        let readers = Readers::Postgres(place.reader_pool().await?);
+        let readers = ReaderPool::Postgres(place.reader_pool().await?);
         let patience: Arc<Patience> = Arc::default();
         let writer = WriteConnection::to_server(conn, place, Arc::clone(&patience));
         Ok(Self::start(readers, writer, delay, patience))
@@ -103,7 +103,7 @@ impl Catalog {
     pub async fn connect_read_only(url: &str) -> Result<Self> {
         let place = PostgresPlace::parse(url)?;
         Ok(Self {
-            readers: Readers::Postgres(place.reader_pool().await?),
+            readers: ReaderPool::Postgres(place.reader_pool().await?),
             inbox: None,
             delay: CommitDelay::new(),
             patience: Arc::default(),
@@ -113,7 +113,7 @@ impl Catalog {
 
     /// Starts the writer task.
     fn start(
-        readers: Readers,
+        readers: ReaderPool,
         writer: WriteConnection,
         delay: Arc<CommitDelay>,
         patience: Arc<Patience>,
@@ -132,15 +132,15 @@ impl Catalog {
 
     /// Returns whether the catalog is in a database server.
     pub(crate) const fn is_on_server(&self) -> bool {
-        matches!(self.readers, Readers::Postgres(_))
+        matches!(self.readers, ReaderPool::Postgres(_))
     }
 
     /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
     pub async fn close(self) {
-        // Readers first: an open reader prevents a complete checkpoint.
+        // ReaderPool first: an open reader prevents a complete checkpoint.
         match self.readers {
-            Readers::Sqlite(pool) => pool.close().await,
-            Readers::Postgres(pool) => pool.close().await,
+            ReaderPool::Sqlite(pool) => pool.close().await,
+            ReaderPool::Postgres(pool) => pool.close().await,
         }
         if let Some(inbox) = self.inbox {
             let (sender, receiver) = oneshot::channel();
@@ -167,16 +167,16 @@ impl Catalog {
 
     pub(crate) async fn read_conn(&self) -> Result<Conn> {
         Ok(match &self.readers {
-            Readers::Sqlite(pool) => Conn::Sqlite(Held::Pooled(pool.acquire().await?)),
-            Readers::Postgres(pool) => Conn::Postgres(Held::Pooled(pool.acquire().await?)),
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Pooled(pool.acquire().await?)),
+            ReaderPool::Postgres(pool) => Conn::Postgres(Held::Pooled(pool.acquire().await?)),
         })
     }
 
     /// Begins a read transaction, which sees the catalog as of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Conn> {
         Ok(match &self.readers {
-            Readers::Sqlite(pool) => Conn::Sqlite(Held::Snapshot(pool.begin().await?)),
-            Readers::Postgres(pool) => {
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Snapshot(pool.begin().await?)),
+            ReaderPool::Postgres(pool) => {
                 let begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
                 Conn::Postgres(Held::Snapshot(pool.begin_with(begin).await?))
             }

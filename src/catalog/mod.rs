@@ -17,6 +17,7 @@ mod test_helpers;
 #[cfg(test)]
 mod tests;
 mod transfer;
+mod waiting;
 // The same tests on PostgreSQL.
 #[cfg(test)]
 #[path = "tests/mod.rs"]

@@ -71,9 +71,10 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
         context.open_read_only().await?
     };
     let running = runner::is_running(&project, &catalog, now()).await?;
-    let lock = match args.repair {
-        true => exclusive_lock(&project, &catalog, running).context("nothing was repaired")?,
-        false => None,
+    let lock = if args.repair {
+        exclusive_lock(&project, &catalog, running).context("nothing was repaired")?
+    } else {
+        None
     };
     let options = CheckOptions {
         quick: args.quick,

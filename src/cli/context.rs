@@ -127,31 +127,25 @@ impl Context {
 
     /// Opens the project and its catalog for reading; works during a run.
     pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
-        match self.catalog_url()? {
-            Some(url) => {
-                let project = Project::open_directory(&self.dir())?;
-                Ok((project, Catalog::connect_read_only(&url).await?))
-            }
-            None => {
-                let project = Project::open(&self.dir())?;
-                let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
-                Ok((project, catalog))
-            }
+        if let Some(url) = self.catalog_url()? {
+            let project = Project::open_directory(&self.dir())?;
+            Ok((project, Catalog::connect_read_only(&url).await?))
+        } else {
+            let project = Project::open(&self.dir())?;
+            let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
+            Ok((project, catalog))
         }
     }
 
     /// Opens the project and its catalog for reading and writing.
     pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
-        match self.catalog_url()? {
-            Some(url) => {
-                let project = Project::open_directory(&self.dir())?;
-                Ok((project, Catalog::connect(&url, false).await?))
-            }
-            None => {
-                let project = Project::open(&self.dir())?;
-                let catalog = Catalog::open(&project.catalog_path()).await?;
-                Ok((project, catalog))
-            }
+        if let Some(url) = self.catalog_url()? {
+            let project = Project::open_directory(&self.dir())?;
+            Ok((project, Catalog::connect(&url, false).await?))
+        } else {
+            let project = Project::open(&self.dir())?;
+            let catalog = Catalog::open(&project.catalog_path()).await?;
+            Ok((project, catalog))
         }
     }
 

@@ -16,7 +16,7 @@ use crate::store::Project;
 /// Arguments of `copy`.
 #[derive(Debug, Args)]
 pub(super) struct CopyArgs {
-    /// The catalog to copy: a project folder, or an address such as postgres://me@db.example/lab
+    /// The catalog to copy: a project folder, or an address such as <postgres://me@db.example/lab>
     pub(super) from: String,
     /// Where to copy it: a project folder without a catalog, or an address of PostgreSQL without one; an interrupted copy
     /// goes on where it stopped

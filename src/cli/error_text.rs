@@ -171,7 +171,11 @@ pub(super) fn catalog_path(project: &Path) -> String {
 /// Explains a catalog error: names the file and what the user can do. Returns `None` if the error's own message already
 /// explains it.
 pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
-    let path = catalog_path(project);
+    let path = if error.is_of_server() {
+        "the catalog in PostgreSQL".to_owned()
+    } else {
+        catalog_path(project)
+    };
     if let Some(loss) = error.log_loss() {
         return Some(log_lost(&path, loss));
     }
@@ -179,6 +183,10 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
             CatalogError::Damaged(path.into()).to_string()
         }
+        Some(CatalogErrorKind::ReadOnly) if error.is_of_server() => format!(
+            "the user of the database may not do this ({}); connect as a user with more rights",
+            root_cause(error)
+        ),
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
             CatalogError::NotWritable(path.into()).to_string()
         }
@@ -190,6 +198,9 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             "{path}: the disk reported an error ({}), or another program changed the catalog's files; check the disk, then run `check`",
             root_cause(error)
         ),
+        Some(CatalogErrorKind::Away) if matches!(error, CatalogError::NotConnected { .. }) => {
+            return None;
+        }
         Some(CatalogErrorKind::Away) => format!(
             "the catalog's database server cannot be reached ({}); check that it runs, then start the command again: nothing stored is lost",
             root_cause(error)

@@ -35,6 +35,8 @@ mod fault;
 mod fault_scenario;
 #[cfg(target_os = "linux")]
 mod faults;
+#[cfg(unix)]
+mod fleet;
 #[cfg(target_os = "linux")]
 mod grid_print;
 mod hanging;
@@ -58,6 +60,9 @@ mod one_pair;
 mod page;
 mod parsers;
 #[cfg(target_os = "linux")]
+#[cfg(unix)]
+#[path = "../support/postgres_server.rs"]
+mod postgres_server;
 mod power;
 mod processes;
 mod queue;

@@ -119,7 +119,7 @@ impl Catalog {
     pub async fn broken_references(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let lines = query_scalar(REFERENCES).bind(LINES as i64);
-        Ok(lines.fetch_all(&mut conn).await?)
+        lines.fetch_all(&mut conn).await
     }
 
     /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.

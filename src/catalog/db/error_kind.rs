@@ -83,6 +83,23 @@ impl CatalogErrorKind {
 }
 
 impl CatalogError {
+    /// Returns whether the database server cannot be reached at the moment.
+    pub fn is_away(&self) -> bool {
+        self.kind() == Some(CatalogErrorKind::Away)
+    }
+
+    /// Returns whether a database server reported the error.
+    pub fn is_of_server(&self) -> bool {
+        match self {
+            Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {
+                let error = error.as_database_error();
+                error.is_some_and(|error| error.try_downcast_ref::<PgDatabaseError>().is_some())
+            }
+            Self::Shared(error) => error.is_of_server(),
+            _ => false,
+        }
+    }
+
     /// Returns the kind of a SQLite error or of wrong counters, or `None` for any other error.
     pub fn kind(&self) -> Option<CatalogErrorKind> {
         match self {

@@ -165,7 +165,7 @@ impl Batch {
         let heartbeats = self.heartbeats.items();
         let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, *heartbeat));
         Ok(JobStatements {
-            heartbeats: heartbeats.collect::<Result<_>>()?,
+            heartbeats: heartbeats.collect(),
             advanced: checkpoint::add_advance(
                 script,
                 self.checkpoints.items().map(|item| &**item),
@@ -176,7 +176,7 @@ impl Batch {
                 .claims
                 .items()
                 .map(|request| claim::add_claim(script, request))
-                .collect::<Result<_>>()?,
+                .collect(),
         })
     }
 

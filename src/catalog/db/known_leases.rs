@@ -82,7 +82,7 @@ impl KnownLeases {
     }
 }
 
-/// Returns the checkpoints among those that changed no job which an earlier commit has stored.
+/// Returns the jobs of checkpoints, and of failures and releases (`ended`), which an earlier commit has already stored.
 pub(crate) async fn stored_before<'i>(
     conn: &mut Conn,
     checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,

@@ -6,10 +6,6 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::CatalogErrorKind;
-use crate::catalog::{Catalog, CatalogError};
-
 /// First wait before another attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
 /// Longest wait. Each wait is multiplied with a random factor, so that many processes do not come back together.
@@ -24,7 +20,7 @@ pub(crate) struct Patience {
 
 impl Patience {
     /// Ends all waits, now and later.
-    fn give_up(&self) {
+    pub(crate) fn give_up(&self) {
         self.is_given_up.store(true, Ordering::Release);
         self.given_up.notify_waiters();
     }
@@ -44,42 +40,5 @@ impl Patience {
             () = wait => true,
             () = given_up => false,
         }
-    }
-}
-
-impl CatalogError {
-    /// Returns whether the database server cannot be reached at the moment.
-    pub fn is_away(&self) -> bool {
-        self.kind() == Some(CatalogErrorKind::Away)
-    }
-}
-
-impl Catalog {
-    /// Calls `operation` again while the database server is away. The operation must have the same effect if an earlier
-    /// call was stored although its answer was lost.
-    ///
-    /// # Errors
-    /// Returns the error of the operation, also that the server is away after [`Catalog::stop_waiting`].
-    pub async fn patiently<T>(&self, operation: impl AsyncFn() -> Result<T>) -> Result<T> {
-        let mut attempt = 0;
-        loop {
-            match operation().await {
-                Err(error) if error.is_away() => {
-                    if attempt == 0 {
-                        tracing::warn!(%error, "the database server is away, waiting for it");
-                    }
-                    if !self.patience.wait(attempt).await {
-                        return Err(error);
-                    }
-                    attempt += 1;
-                }
-                outcome => return outcome,
-            }
-        }
-    }
-
-    /// Ends all waits for a database server that is away. Operations then fail while it is.
-    pub fn stop_waiting(&self) {
-        self.patience.give_up();
     }
 }

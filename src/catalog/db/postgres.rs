@@ -222,18 +222,19 @@ pub(crate) fn without_password(url: &str) -> String {
 
 /// Describes why a connection failed, with what to do.
 fn connection_error(error: &sqlx::Error) -> String {
-    let code = error.as_database_error().and_then(|error| error.code());
+    let code = error
+        .as_database_error()
+        .and_then(sqlx::error::DatabaseError::code);
     match code.as_deref() {
         Some("28P01" | "28000") => {
             format!("{error}; check the user and the password in ~/.pgpass or PGPASSWORD")
         }
         Some("3D000") => format!("{error}; create it with `createdb`, or correct the address"),
         Some("53300") => format!("{error}; close other programs, or raise max_connections"),
-        Some(_) => error.to_string(),
         None if CatalogErrorKind::of(error) == Some(CatalogErrorKind::Away) => {
             format!("{error}; check the host, the port and that PostgreSQL runs")
         }
-        None => error.to_string(),
+        Some(_) | None => error.to_string(),
     }
 }
 

@@ -195,7 +195,7 @@ fn postgres_arguments(arguments: Vec<Argument>) -> Result<PgArguments> {
 
 /// Longest time for one statement on a server. A connection that broke without a message would otherwise be waited for
 /// without end.
-const STATEMENT_LIMIT: Duration = Duration::from_secs(60);
+const STATEMENT_LIMIT: Duration = Duration::from_mins(1);
 
 /// Limits the time of a statement on a server. After an error the connection cannot be used again.
 pub(crate) async fn limited<T>(

@@ -3,7 +3,7 @@
 use serde_json::Value;
 use sqlx::error::BoxDynError;
 
-use crate::catalog::db::value::{FromValue, Value as ColumnValue, read_blob, read_text};
+use crate::catalog::db::value::{Argument, FromValue, Value as ColumnValue, read_blob, read_text};
 use crate::catalog::queue::lease::FingerprintId;
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName,
@@ -38,9 +38,21 @@ decode! {
     ReviewOrder: text = str::parse;
     ThresholdMetric: text = str::parse;
     Verdict: text = str::parse;
-    Affine2: text = |text| serde_json::from_str(text);
-    AttentionCheck: text = |text| serde_json::from_str(text);
-    PrintFromMesh: text = |text| serde_json::from_str(text);
+    Affine2: text = serde_json::from_str;
+    AttentionCheck: text = serde_json::from_str;
+    PrintFromMesh: text = serde_json::from_str;
+}
+
+impl From<FingerprintId> for Argument {
+    fn from(FingerprintId(id): FingerprintId) -> Self {
+        Self::from(id)
+    }
+}
+
+impl From<Option<FingerprintId>> for Argument {
+    fn from(id: Option<FingerprintId>) -> Self {
+        Self::from(id.map(|FingerprintId(id)| id))
+    }
 }
 
 fn status(code: i64) -> Result<JobStatus, String> {

@@ -5,8 +5,6 @@ use std::borrow::Cow;
 use serde::de::DeserializeOwned;
 use sqlx::error::BoxDynError;
 
-use crate::catalog::queue::lease::FingerprintId;
-
 /// A value of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Value<'r> {
@@ -179,7 +177,6 @@ macro_rules! arguments {
 arguments! {
     i64: Integer = |number| number;
     u32: Integer = i64::from;
-    FingerprintId: Integer = |FingerprintId(id)| id;
     f64: Real = |number| number;
     &str: Text = str::to_owned;
     String: Text = |text| text;

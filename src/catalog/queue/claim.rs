@@ -130,19 +130,16 @@ pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
 /// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.
-pub(crate) fn add_heartbeat(
-    script: &mut Script,
-    heartbeat: Heartbeat,
-) -> Result<Statement<(i64,)>> {
+pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: Heartbeat) -> Statement<(i64,)> {
     let statement = script.add(HEARTBEAT);
     script.bind(heartbeat.now);
     script.bind(heartbeat.worker.0);
     script.bind(heartbeat.alive_since);
-    Ok(statement)
+    statement
 }
 
 /// Adds a claim to a script.
-pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<Statement<Lease>> {
+pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Statement<Lease> {
     let slots = if request.exclusive {
         request.slots.min(1)
     } else {
@@ -163,7 +160,7 @@ pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<S
     script.bind(request.worker.0);
     script.bind(request.alive_since);
     script.bind(i64::from(request.exclusive));
-    Ok(statement)
+    statement
 }
 
 /// Counts claimed leases, and returns them in the order of the claim.

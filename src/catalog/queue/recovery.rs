@@ -129,7 +129,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
-        Ok(query_as(HOLDERS).fetch_all(&mut conn).await?)
+        query_as(HOLDERS).fetch_all(&mut conn).await
     }
 
     /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused

@@ -226,7 +226,7 @@ async fn failed_jobs(conn: &mut Conn, selection: &RetrySelection) -> Result<Vec<
             query_as(FAILED_AMONG).bind(select(conn, names).await?.json)
         }
     };
-    Ok(query.fetch_all(conn).await?)
+    query.fetch_all(conn).await
 }
 
 /// Returns the jobs whose key is still the given one, and locks them until the end of the transaction. In SQLite, no job

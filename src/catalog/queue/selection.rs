@@ -47,5 +47,5 @@ pub(crate) async fn unknown_names(conn: &mut Conn, names: &[PairName]) -> Result
     let sql = "SELECT atom FROM json_each(?1) AS given
         WHERE NOT EXISTS (SELECT 1 FROM pair WHERE name = given.atom) ORDER BY given.key";
     let query = query_scalar(sql).bind(names_json(names));
-    Ok(query.fetch_all(conn).await?)
+    query.fetch_all(conn).await
 }

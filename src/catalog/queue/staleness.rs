@@ -231,7 +231,7 @@ pub(crate) async fn inspect_all(
 /// Counts the pairs that have a result with outdated settings or inputs.
 pub(crate) async fn count_stale(conn: &mut Conn, current: &str) -> Result<u64> {
     let query = query_scalar(COUNT_STALE).bind(current);
-    Ok(query.fetch_one(conn).await?)
+    query.fetch_one(conn).await
 }
 
 /// Unmarks dirty jobs whose results are consistent again, in a range of pairs.

@@ -139,7 +139,7 @@ impl Catalog {
             None => query_as(LEFT_ALL).bind(cursor(until)),
             Some(among) => query_as(LEFT_AMONG).bind(cursor(until)).bind(&among.json),
         };
-        Ok(query.fetch_one(&mut conn).await?)
+        query.fetch_one(&mut conn).await
     }
 
     /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.

@@ -28,7 +28,7 @@ impl Catalog {
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         let exists = query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");
-        Ok(exists.fetch_one(&mut conn).await?)
+        exists.fetch_one(&mut conn).await
     }
 }
 

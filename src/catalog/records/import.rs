@@ -120,7 +120,7 @@ impl Catalog {
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
-        Ok(names.fetch_all(&mut conn).await?)
+        names.fetch_all(&mut conn).await
     }
 
     /// Returns the unknown names among `names`, in the given order.

@@ -45,7 +45,7 @@ impl Catalog {
         let [one, other] = file_names;
         let query = query_as(NAMED).bind(one).bind(other);
         let mut conn = self.read_conn().await?;
-        Ok(query.fetch_all(&mut conn).await?)
+        query.fetch_all(&mut conn).await
     }
 
     /// Replaces the paths of meshes and prints in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new

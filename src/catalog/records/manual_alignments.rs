@@ -158,7 +158,7 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(LOG).bind(after);
         let query = query.bind(limit as i64);
-        Ok(query.fetch_all(&mut conn).await?)
+        query.fetch_all(&mut conn).await
     }
 
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.

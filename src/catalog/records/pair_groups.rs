@@ -28,7 +28,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn meta_columns(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
-        Ok(query_scalar(META_COLUMNS).fetch_all(&mut conn).await?)
+        query_scalar(META_COLUMNS).fetch_all(&mut conn).await
     }
 
     /// Counts the pairs with equal values of an attribute, which is `block`, `character` or another text for none. A

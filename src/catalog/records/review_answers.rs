@@ -235,7 +235,7 @@ impl Catalog {
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(ANSWERS).bind(reviewer);
-        Ok(query.fetch_all(&mut conn).await?)
+        query.fetch_all(&mut conn).await
     }
 
     /// Returns all answers to attention checks, including undone ones, oldest first.
@@ -258,7 +258,7 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(CHECK_ANSWERS).bind(after);
         let query = query.bind(limit as i64);
-        Ok(query.fetch_all(&mut conn).await?)
+        query.fetch_all(&mut conn).await
     }
 
     /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
@@ -268,7 +268,7 @@ impl Catalog {
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let query = query_scalar("SELECT key FROM review_key");
-        Ok(query.fetch_one(&mut conn).await?)
+        query.fetch_one(&mut conn).await
     }
 }
 

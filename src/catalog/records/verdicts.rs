@@ -191,7 +191,7 @@ impl Catalog {
                     .bind(None::<&str>)
                     .bind(None::<i64>)
                     .bind(None::<i64>);
-                Ok(query.fetch_all(conn).await?)
+                query.fetch_all(conn).await
             })
         })
         .await
@@ -214,7 +214,7 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(LOG).bind(None::<i64>).bind(None::<&str>);
         let query = query.bind(after).bind(limit as i64);
-        Ok(query.fetch_all(&mut conn).await?)
+        query.fetch_all(&mut conn).await
     }
 }
 
@@ -267,7 +267,7 @@ async fn is_stored(
         .bind(new.verdict.name())
         .bind(new.reason.map(Reason::name))
         .bind(&new.note);
-    Ok(stored.fetch_one(conn).await?)
+    stored.fetch_one(conn).await
 }
 
 /// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row
@@ -309,7 +309,7 @@ pub(crate) async fn log(conn: &mut Conn, pair: Option<&PairName>) -> Result<Vec<
     let query = query_as(LOG).bind(None::<i64>);
     let query = query.bind(pair.map(PairName::as_str));
     let query = query.bind(None::<i64>).bind(None::<i64>);
-    Ok(query.fetch_all(conn).await?)
+    query.fetch_all(conn).await
 }
 
 /// Returns each reviewer's newest verdict on each result of the given pairs, sorted by reviewer. Ignores undone

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 use sqlx::AssertSqlSafe;
 
-use self::tables::{TABLES, Table};
+use self::tables::{CopyTable, TABLES};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::add_literal;
 use crate::catalog::db::query::{query, query_scalar, sqlite_arguments};
@@ -99,7 +99,7 @@ impl Catalog {
     }
 
     /// Returns the largest key of a table, or the key before all rows.
-    async fn last_key(&self, table: &Table) -> Result<Vec<Argument>> {
+    async fn last_key(&self, table: &CopyTable) -> Result<Vec<Argument>> {
         let mut conn = self.read_conn().await?;
         match query(table.last).fetch_optional(&mut conn).await? {
             Some(row) => key(&row, table.keys),
@@ -129,11 +129,11 @@ impl Catalog {
 }
 
 /// Reads the rows that follow a key.
-async fn page(conn: &mut Conn, table: &Table, after: &[Argument]) -> Result<Vec<Row>> {
+async fn page(conn: &mut Conn, table: &CopyTable, after: &[Argument]) -> Result<Vec<Row>> {
     let page = after
         .iter()
         .cloned()
-        .fold(query(table.page), |page, key| page.bind(key));
+        .fold(query(table.page), super::db::query::Query::bind);
     page.bind(PAGE).fetch_all(conn).await
 }
 
@@ -161,7 +161,7 @@ fn value(row: &Row, column: usize) -> Result<Value<'_>> {
 }
 
 /// Inserts rows in one statement. A row that is there already is kept.
-async fn insert(conn: &mut Conn, table: &Table, rows: &[Row]) -> Result<()> {
+async fn insert(conn: &mut Conn, table: &CopyTable, rows: &[Row]) -> Result<()> {
     let mut sql = format!("INSERT INTO {} ({}) VALUES ", table.name, table.names);
     let mut arguments = Vec::new();
     for (number, row) in rows.iter().enumerate() {
@@ -198,7 +198,7 @@ async fn insert(conn: &mut Conn, table: &Table, rows: &[Row]) -> Result<()> {
 }
 
 /// Counts and hashes the rows of a table, in the order of their keys.
-async fn content(conn: &mut Conn, table: &Table) -> Result<CopiedTable> {
+async fn content(conn: &mut Conn, table: &CopyTable) -> Result<CopiedTable> {
     let mut after = vec![Argument::from(i64::MIN); table.keys];
     if table.name == "metric_result" {
         after[1] = Argument::from("");

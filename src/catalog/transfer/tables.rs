@@ -4,7 +4,7 @@ use crate::catalog::db::dialect::Sql;
 
 /// A table of a catalog.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(super) struct CopyTable {
     pub(super) name: &'static str,
     /// Columns by which rows are sorted and paged, in order: one or two of the first columns.
     pub(super) keys: usize,
@@ -23,7 +23,7 @@ pub(super) struct Table {
 /// Describes a table with a numeric key, whose new rows the database numbers if `numbered` is given.
 macro_rules! table {
     ($name:literal, $columns:literal, $key:literal $(, $rest:literal)* $(; $numbered:ident)?) => {
-        Table {
+        CopyTable {
             name: $name,
             keys: 1,
             columns: $columns,
@@ -47,7 +47,7 @@ macro_rules! table {
 /// Describes a table with two key columns.
 macro_rules! table_by_two {
     ($name:literal, $columns:literal, $first:literal, $second:literal $(, $rest:literal)*) => {
-        Table {
+        CopyTable {
             name: $name,
             keys: 2,
             columns: $columns,
@@ -64,7 +64,7 @@ macro_rules! table_by_two {
 
 /// Every table, in an order in which no row refers to a later table. The counters are counted anew, and the settings of
 /// the last plan are not copied.
-pub(super) const TABLES: [Table; 17] = [
+pub(super) const TABLES: [CopyTable; 17] = [
     table!("review_key", 2, "id", "key"),
     table!("worker", 9, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "died"; numbered),
     table!("fingerprint", 5, "id", "stage", "hash", "fields", "upstream"; numbered),

@@ -1,0 +1,238 @@
+//! Several processes on a catalog in PostgreSQL: the results are those of one process on a file, also when the server and
+//! the processes crash. `MOCBAN_KILLS` and `MOCBAN_KILLED_PAIRS` set the numbers of crashes and pairs.
+
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::cli::{Call, binary, call, empty, mocban};
+use crate::postgres_server::Server;
+use crate::resume::{copy_folder, project};
+use crate::test_size::size_from_env;
+use crate::uninterrupted::files;
+
+/// Shortens leases to five seconds.
+const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
+
+/// A project in a file that has been run, and the same pairs in PostgreSQL, not run yet.
+struct Fleet {
+    dir: tempfile::TempDir,
+    server: Server,
+}
+
+impl Fleet {
+    /// Returns `None` if no server is installed.
+    fn new(pairs: &str) -> Option<Self> {
+        let server = Server::start()?;
+        let dir = empty();
+        let fresh = project(dir.path(), "file", pairs);
+        copy_folder(fresh.dir(), &dir.path().join("shared"));
+        std::fs::remove_file(dir.path().join("shared/catalog.sqlite")).expect("removed");
+        mocban(dir.path(), &["copy", "file", server.url()]).expect(0);
+        mocban(dir.path(), &["-C", "file", "run"]).expect(0);
+        Some(Self { dir, server })
+    }
+
+    fn path(&self) -> &Path {
+        self.dir.path()
+    }
+
+    /// Calls a command on the shared project.
+    fn shared(&self, args: &[&str]) -> Call {
+        let mut command = binary();
+        command.current_dir(self.path());
+        command.args(["-C", "shared", "--catalog", self.server.url()]);
+        call(command.args(args))
+    }
+
+    fn worker(&self) -> Child {
+        let mut command = binary();
+        command
+            .current_dir(self.path())
+            .env(TIME_SCALE.0, TIME_SCALE.1);
+        command.args(["-C", "shared", "--catalog", self.server.url()]);
+        let command = command.args(["worker", "-j", "1"]);
+        let worker = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        worker.expect("the binary starts")
+    }
+
+    /// Asserts that the shared project is whole, and that its export and report are those of the project in a file.
+    fn assert_same(&self) {
+        self.shared(&["check"]).expect(0);
+        mocban(self.path(), &["-C", "file", "export", "-o", "file-export"]).expect(0);
+        self.shared(&["export", "-o", "shared-export"]).expect(0);
+        let [one, other] =
+            ["file-export", "shared-export"].map(|name| files(&self.path().join(name)));
+        assert_eq!(
+            one.keys().collect::<Vec<_>>(),
+            other.keys().collect::<Vec<_>>()
+        );
+        for (path, bytes) in &one {
+            assert!(other[path] == *bytes, "{} differs", path.display());
+        }
+        let report = mocban(self.path(), &["-C", "file", "report"]).expect(0);
+        assert_eq!(self.shared(&["report"]).expect(0).out, report.out);
+    }
+
+    /// Asserts that no lease is left, no attempt failed and no pair is blamed for a crash.
+    fn assert_nothing_is_blamed(&self) {
+        let status = self.shared(&["status", "--json"]).expect(0).json();
+        assert_eq!(status["jobs"]["leased"], 0, "{status}");
+        assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
+    }
+}
+
+#[test]
+fn workers_on_postgres_give_the_results_of_one_run_on_a_file() {
+    let Some(fleet) = Fleet::new("24") else {
+        return;
+    };
+    fleet.shared(&["plan"]).expect(0);
+    let workers = [(); 3].map(|()| fleet.worker());
+    for mut worker in workers {
+        assert!(worker.wait().expect("an exit code").success());
+    }
+    fleet.assert_same();
+    fleet.assert_nothing_is_blamed();
+    // Back to a file, with the verdicts.
+    fleet
+        .shared(&[
+            "verdict",
+            "set",
+            "upright-0000",
+            "pass",
+            "--reviewer",
+            "lan",
+        ])
+        .expect(0);
+    mocban(fleet.path(), &["copy", fleet.server.url(), "back"]).expect(0);
+    let log = |project: &[&str]| {
+        let args = [project, &["verdict", "log", "--json"]].concat();
+        mocban(fleet.path(), &args).expect(0).out
+    };
+    let shared = ["-C", "shared", "--catalog", fleet.server.url()];
+    assert_eq!(log(&["-C", "back"]), log(&shared));
+    fleet.shared(&["backup", "all.sqlite"]).expect(0);
+    mocban(fleet.path(), &["restore", "all.sqlite", "restored"]).expect(0);
+    assert_eq!(log(&["-C", "restored"]), log(&shared));
+}
+
+#[test]
+fn crashes_of_the_server_and_of_workers_lose_nothing() {
+    let (kills, pairs) = (
+        size_from_env("MOCBAN_KILLS", 6),
+        size_from_env("MOCBAN_KILLED_PAIRS", 40),
+    );
+    let Some(fleet) = Fleet::new(&pairs.to_string()) else {
+        return;
+    };
+    fleet.shared(&["plan"]).expect(0);
+    let mut dice = ChaCha8Rng::seed_from_u64(24);
+    let mut workers = vec![fleet.worker(), fleet.worker(), fleet.worker()];
+    for kill in 0..kills {
+        // The crash must come at a random moment, so the test waits for a time and not for an event.
+        std::thread::sleep(Duration::from_millis(dice.random_range(50..500)));
+        if kill % 2 == 0 {
+            fleet.server.stop_at_once();
+            fleet.server.start_again();
+        } else {
+            let victim = dice.random_range(0..workers.len());
+            // It may have ended.
+            let _ = workers[victim].kill();
+            workers[victim].wait().expect("an exit code");
+            workers[victim] = fleet.worker();
+        }
+    }
+    for mut worker in workers {
+        assert!(worker.wait().expect("an exit code").success());
+    }
+    fleet.assert_same();
+    fleet.assert_nothing_is_blamed();
+}
+
+#[test]
+fn a_worker_with_other_settings_is_refused() {
+    let Some(fleet) = Fleet::new("2") else { return };
+    fleet.shared(&["plan"]).expect(0);
+    let refused = fleet.shared(&["--set", "register.smoothing_px=1.3", "worker"]);
+    let refused = refused.expect(2);
+    assert!(
+        refused.err.contains("register.smoothing_px: "),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn every_refusal_of_the_server_says_what_to_do() {
+    let Some(fleet) = Fleet::new("2") else { return };
+    let url = fleet.server.url();
+    let at = |url: &str, args: &[&str]| {
+        let mut command = binary();
+        command.current_dir(fleet.path()).env_remove("PGPASSWORD");
+        call(command.args(["-C", "shared", "--catalog", url]).args(args))
+    };
+    let sql = |text: &str| {
+        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+        runtime.block_on(async {
+            let mut conn = <sqlx::PgConnection as sqlx::Connection>::connect(url).await;
+            let conn = conn.as_mut().expect("a connection");
+            let text = sqlx::AssertSqlSafe(text.to_owned());
+            sqlx::raw_sql(text).execute(conn).await.expect("valid SQL");
+        });
+    };
+    sql("CREATE ROLE guarded LOGIN PASSWORD 'secret'; CREATE ROLE viewer LOGIN;
+        GRANT USAGE ON SCHEMA mocban TO viewer; GRANT SELECT ON ALL TABLES IN SCHEMA mocban TO viewer;");
+    let mut cases = Vec::new();
+    cases.push((
+        at(&url.replace("mocban@", "guarded@"), &["status"]),
+        "PGPASSWORD",
+    ));
+    cases.push((
+        at(&url.replace("/postgres?", "/nowhere?"), &["status"]),
+        "createdb",
+    ));
+    let host = url.split("host=").nth(1).expect("a socket");
+    cases.push((
+        at(&url.replace(host, "/nowhere"), &["status"]),
+        "PostgreSQL runs",
+    ));
+    cases.push((
+        at(
+            &format!("{url}&options=-c%20search_path%3Dempty"),
+            &["status"],
+        ),
+        "mocban import",
+    ));
+    cases.push((
+        at("postgres://me:secret@localhost/lab", &["status"]),
+        ".pgpass",
+    ));
+    cases.push((
+        at("postgres://me@db.example/lab?sslmode=disable", &["status"]),
+        "verify-full",
+    ));
+    cases.push((at("mysql://me@db.example/lab", &["status"]), "postgres"));
+    let viewer = url.replace("mocban@", "viewer@");
+    at(&viewer, &["status"]).expect(0);
+    cases.push((at(&viewer, &["worker"]), "more rights"));
+    sql("UPDATE mocban.catalog_version SET version = 9");
+    cases.push((at(url, &["status"]), "another version"));
+    for (call, way_on) in cases {
+        assert_ne!(call.code, 0);
+        assert!(call.err.contains(way_on), "{way_on}: {}", call.err);
+        assert_eq!(
+            call.err
+                .lines()
+                .filter(|line| line.starts_with("error:"))
+                .count(),
+            1,
+            "{}",
+            call.err
+        );
+        assert!(!call.err.contains("secret"), "{}", call.err);
+    }
+}

@@ -1,0 +1,155 @@
+//! PostgreSQL servers for tests. Each listens on a socket in a temporary directory and ends with this process.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Mutex, Once, OnceLock};
+
+/// Folders where packages install the server, besides `PATH`. The newest version first.
+const FOLDERS: [&str; 7] = [
+    "/usr/lib/postgresql/18/bin",
+    "/usr/lib/postgresql/17/bin",
+    "/usr/lib/postgresql/16/bin",
+    "/usr/lib/postgresql/15/bin",
+    "/opt/homebrew/opt/postgresql/bin",
+    "/usr/local/opt/postgresql/bin",
+    "/usr/pgsql/bin",
+];
+
+/// Creates a database cluster in the folder `$1` with the programs in `$2`, and starts the server. Then stops it at once,
+/// as in a crash, for each line `stop`, and starts it for each line `start`. Prints a line after each. Ends, and removes
+/// the folder, when its standard input ends. The server refuses to run as root, so `$3` may hold a command that changes
+/// the user. The user `guarded` needs a password.
+const SCRIPT: &str = r#"
+cd "$1" || exit 1
+start() {
+    $3 "$2/postgres" -D "$1/data" -k "$1" -c listen_addresses= -c max_connections=200 >>"$1/log" 2>&1 &
+    server=$!
+    until "$2/pg_isready" -q -h "$1" -U mocban -d postgres; do
+        kill -0 $server 2>/dev/null || exit 1
+    done
+    echo ready
+}
+$3 "$2/initdb" -D "$1/data" -U mocban -A trust --no-sync --locale=C -E UTF8 >"$1/log" 2>&1 || exit 1
+printf 'local all guarded scram-sha-256\nlocal all all trust\n' | $3 tee "$1/data/pg_hba.conf" >/dev/null
+start "$1" "$2" "$3"
+while read -r command; do
+    case $command in
+        stop) kill -QUIT $server; wait $server; echo ready ;;
+        start) start "$1" "$2" "$3" ;;
+    esac
+done
+kill -QUIT $server
+wait $server
+rm -rf "$1"
+"#;
+
+/// A running server.
+#[derive(Debug)]
+pub(crate) struct Server {
+    /// Address of its database, to which parameters can be added with `&`.
+    url: String,
+    commands: Mutex<(ChildStdin, BufReader<ChildStdout>)>,
+}
+
+/// Returns the address of a server that all tests of this process share, unless `MOCBAN_TEST_POSTGRES` names one.
+#[allow(dead_code, reason = "not every test binary shares a server")]
+pub(crate) fn url() -> Option<&'static str> {
+    static SHARED: OnceLock<Option<Server>> = OnceLock::new();
+    static GIVEN: OnceLock<Option<String>> = OnceLock::new();
+    let given = GIVEN.get_or_init(|| std::env::var("MOCBAN_TEST_POSTGRES").ok());
+    if let Some(url) = given {
+        return Some(url);
+    }
+    SHARED.get_or_init(Server::start).as_ref().map(Server::url)
+}
+
+impl Server {
+    /// Starts a server. Returns `None`, and prints why once, if none is installed.
+    pub(crate) fn start() -> Option<Self> {
+        static SKIPPED: Once = Once::new();
+        let Some(programs) = programs() else {
+            // Written directly, because the test harness hides what a passing test prints.
+            let text = "skipped: no PostgreSQL server (initdb) is installed, so catalogs are tested in files only\n";
+            SKIPPED.call_once(|| drop(std::io::stderr().write_all(text.as_bytes())));
+            return None;
+        };
+        let dir = tempfile::Builder::new().prefix("mocban-pg-").tempdir();
+        let dir = dir.expect("a temporary directory").keep();
+        let mut user = "";
+        if rustix::process::geteuid().is_root() {
+            let nobody = Some(65534);
+            std::os::unix::fs::chown(&dir, nobody, nobody).expect("root may change the owner");
+            user = "setpriv --reuid=65534 --regid=65534 --clear-groups";
+        }
+        // It ends with this process, so nobody waits for it.
+        #[allow(clippy::zombie_processes, reason = "the script ends with this process")]
+        let mut script = Command::new("sh")
+            .args(["-c", SCRIPT, "sh"])
+            .args([&dir, &programs])
+            .arg(user)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("a shell");
+        let input = script.stdin.take().expect("a pipe");
+        let output = script.stdout.take().expect("a pipe");
+        let server = Self {
+            url: format!(
+                "postgres://mocban@localhost/postgres?host={}",
+                dir.display()
+            ),
+            commands: Mutex::new((input, BufReader::new(output))),
+        };
+        assert!(
+            server.is_ready(),
+            "PostgreSQL did not start: see {}",
+            dir.display()
+        );
+        Some(server)
+    }
+
+    /// Returns the address of its database.
+    pub(crate) fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Stops the server as in a crash.
+    #[allow(dead_code, reason = "not every test binary stops the server")]
+    pub(crate) fn stop_at_once(&self) {
+        self.command("stop");
+    }
+
+    /// Starts the server again.
+    #[allow(dead_code, reason = "not every test binary stops the server")]
+    pub(crate) fn start_again(&self) {
+        self.command("start");
+    }
+
+    fn command(&self, command: &str) {
+        let mut commands = self.commands.lock().expect("no panic");
+        writeln!(commands.0, "{command}").expect("the script reads");
+        drop(commands);
+        assert!(self.is_ready(), "PostgreSQL did not {command}");
+    }
+
+    /// Reads the script's answer.
+    fn is_ready(&self) -> bool {
+        let mut line = String::new();
+        let mut commands = self.commands.lock().expect("no panic");
+        commands.1.read_line(&mut line).is_ok() && line == "ready\n"
+    }
+}
+
+fn programs() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::env::split_paths(&path).collect::<Vec<_>>();
+    let folders = folders.iter().map(PathBuf::as_path);
+    let mut folders = folders.chain(FOLDERS.map(Path::new));
+    let has_all = |dir: &&Path| {
+        ["initdb", "postgres", "pg_isready"]
+            .iter()
+            .all(|name| dir.join(name).is_file())
+    };
+    folders.find(has_all).map(Path::to_owned)
+}
