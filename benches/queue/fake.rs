@@ -46,6 +46,52 @@ impl Fake {
         })
     }
 
+    /// Registers a worker without a project's files.
+    pub(super) async fn without_files(
+        catalog: &Catalog,
+        fingerprints: &Fingerprints,
+    ) -> anyhow::Result<Self> {
+        let fingerprints = catalog.register_fingerprints(fingerprints).await?;
+        let version = |name: &str| InputVersion {
+            hash: ContentHash::of(name.as_bytes()),
+            stat: "1 2 3".to_owned(),
+        };
+        let fake = Self {
+            worker: WorkerId(0),
+            fingerprints,
+            mesh: version("mesh.stl"),
+            print: version("print.png"),
+        };
+        fake.another_worker(catalog).await
+    }
+
+    /// Registers another worker.
+    pub(super) async fn another_worker(&self, catalog: &Catalog) -> anyhow::Result<Self> {
+        let info = WorkerInfo {
+            host: "bench".to_owned(),
+            pid: std::process::id(),
+            boot_id: None,
+        };
+        let worker = catalog.register_worker(info, self.fingerprints, 1);
+        Ok(Self {
+            worker: worker.await?,
+            ..self.clone()
+        })
+    }
+
+    /// Stores all stages of a pair in one commit.
+    pub(super) async fn finish_at_once(
+        &self,
+        catalog: &Catalog,
+        lease: Lease,
+    ) -> anyhow::Result<()> {
+        let stages = Stage::ALL.map(|stage| self.done(stage)).to_vec();
+        match catalog.checkpoint(lease, stages).await? {
+            CheckpointOutcome::Done => Ok(()),
+            other => anyhow::bail!("the pair is not done: {other:?}"),
+        }
+    }
+
     /// Requests up to `slots` pairs.
     pub(super) fn request(&self, slots: usize) -> ClaimRequest {
         ClaimRequest::new(self.worker, slots, 1_000)

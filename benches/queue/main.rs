@@ -5,6 +5,7 @@
 //! cargo bench --bench queue
 //! cargo bench --bench queue -- --pairs 10000,100000,1000000 --queue-pairs 5000
 //! cargo build --release --manifest-path benches/peers-queue/Cargo.toml --target-dir target/peers-queue
+//! cargo bench --bench queue -- --postgres postgres://me@localhost/bench --pairs 1000000
 //! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
 //! ```
 //!
@@ -21,6 +22,7 @@ mod loops;
 #[path = "../accuracy/markdown.rs"]
 mod markdown;
 mod options;
+mod postgres;
 mod process;
 mod queues;
 mod scale;
@@ -36,6 +38,12 @@ use options::Options;
 
 fn main() -> anyhow::Result<()> {
     let options = Options::parse();
+    if let Some(url) = &options.postgres {
+        // Several connections are used at the same time.
+        let runtime = tokio::runtime::Runtime::new()?;
+        let text = runtime.block_on(postgres::table(&options, url))?;
+        return Ok(std::io::stdout().write_all(text.as_bytes())?);
+    }
     // The same runtime as for `mocban run`.
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     let runtime = runtime.enable_all().build()?;
