@@ -19,6 +19,10 @@ const READERS: u32 = 2;
 /// Longest time for one connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Setting of the write connection. With it, the planner reads the ready jobs in the order of their index also while it
+/// does not know how many they are.
+const IN_INDEX_ORDER: [(&str, &str); 1] = [("enable_bitmapscan", "off")];
+
 static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
 
 /// Where a catalog is: a server, a database and a schema.
@@ -91,7 +95,8 @@ impl PostgresPlace {
     /// # Errors
     /// Returns an error if the server does not answer or refuses, or if the schema is missing or has another version.
     pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
-        let mut conn = self.connect_to_server().await?;
+        let options = self.options.clone().options(IN_INDEX_ORDER);
+        let mut conn = self.connect_to_server(&options).await?;
         if self.version(&mut conn).await?.is_none() {
             if !may_create {
                 return Err(CatalogError::NoSchema(self.text()));
@@ -107,7 +112,7 @@ impl PostgresPlace {
     /// # Errors
     /// As for [`Self::connect`].
     pub(crate) async fn reader_pool(&self) -> Result<PgPool> {
-        let mut conn = self.connect_to_server().await?;
+        let mut conn = self.connect_to_server(&self.options).await?;
         self.require_current(&mut conn).await?;
         conn.close().await?;
         let options = self.options.clone();
@@ -118,8 +123,8 @@ impl PostgresPlace {
         Ok(pool.connect_lazy_with(options))
     }
 
-    async fn connect_to_server(&self) -> Result<PgConnection> {
-        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.options.connect()).await;
+    async fn connect_to_server(&self, options: &PgConnectOptions) -> Result<PgConnection> {
+        let connected = tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await;
         let connected = connected.unwrap_or_else(|_| {
             let error = std::io::Error::from(std::io::ErrorKind::TimedOut);
             Err(sqlx::Error::Io(error))

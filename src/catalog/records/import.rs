@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
@@ -70,6 +71,9 @@ ON CONFLICT (name) DO UPDATE SET
     block = excluded.block, meta = excluded.meta, attributes = excluded.attributes
 RETURNING id";
 
+/// Tells PostgreSQL's planner how large the tables are now.
+const ANALYZE: Sql = Sql::pair("SELECT 1", "ANALYZE pair, job");
+
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT id, 0, 0 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))
@@ -107,6 +111,7 @@ impl Catalog {
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
                 let stored = ground_truth::set(conn, &truths).await?;
+                query(ANALYZE).execute(conn).await?;
                 Ok((summary, stored))
             })
         })
