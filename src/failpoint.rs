@@ -83,11 +83,16 @@ mod test_build {
     }
 
     /// Stops the process until it receives SIGCONT.
+    #[cfg(unix)]
     pub(super) fn stop() {
         use rustix::process::{Signal, getpid, kill_process};
         // If the signal cannot be sent, the process runs on, and the test that waits for it to stop fails.
         let _ = kill_process(getpid(), Signal::STOP);
     }
+
+    /// Does nothing: Windows has no signal that stops a process.
+    #[cfg(windows)]
+    pub(super) const fn stop() {}
 
     /// Creates the hold file and waits until it is removed.
     pub(super) fn hold() {

@@ -169,11 +169,6 @@
 //! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
 //! (see `benches/queue/main.rs`).
 
-#[cfg(not(unix))]
-compile_error!(
-    "mocban runs on Unix only: it needs file locks, inodes and folders that can be synced"
-);
-
 pub mod catalog;
 pub mod check;
 pub mod cli;
@@ -186,6 +181,7 @@ pub mod local_server;
 pub mod manifest;
 pub mod mesh;
 pub mod page_vec;
+mod platform;
 #[cfg(test)]
 #[path = "../tests/support/postgres_server.rs"]
 mod postgres_server;

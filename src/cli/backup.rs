@@ -1,7 +1,7 @@
 //! `backup`: copies catalog, verdicts and settings to one file. The copy is consistent even during a run.
 
 use std::fs::Metadata;
-use std::os::unix::fs::MetadataExt as _;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -15,6 +15,7 @@ use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
+use crate::platform::stat;
 use crate::store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
 };
@@ -104,9 +105,11 @@ fn check_target(file: &Path, project: &Project) -> anyhow::Result<()> {
 
 /// Returns whether two paths name the same existing file or folder.
 fn is_same(one: &Path, other: &Path) -> anyhow::Result<bool> {
-    let identity = |path: &Path| {
-        let found = metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
-        anyhow::Ok(found.map(|meta| (meta.dev(), meta.ino())))
+    let identity = |path: &Path| match stat(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        found => found
+            .map(|found| Some(found.id))
+            .with_context(|| format!("cannot read {}", path.display())),
     };
     let one = identity(one)?;
     Ok(one.is_some() && one == identity(other)?)

@@ -3,14 +3,12 @@
 use std::error::Error;
 use std::path::Path;
 
-use rustix::io::Errno;
-use rustix::process::{Resource, getrlimit};
-
 use super::exit::{ExitCode, Refusal};
 use super::time_text::local;
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use crate::config::ConfigError;
 use crate::export::FolderError;
+use crate::platform;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, StoreError, TargetLockError};
 
@@ -62,7 +60,7 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
     if is_out_of_files(error) {
         return format!(
             "this process may open only {} files at a time; raise the limit with `ulimit -n 256` and try again",
-            max_open_files()
+            platform::max_open_files()
         );
     }
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
@@ -91,19 +89,13 @@ fn is_disk_full(error: &anyhow::Error) -> bool {
 /// Most files that a command needs open at the same time, rounded up.
 const FILES_NEEDED: u64 = 64;
 
-/// Returns the number of files that this process may have open at the same time.
-fn max_open_files() -> u64 {
-    getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
-}
-
 /// Returns whether a command failed because its limit of open files is reached. `SQLite` does not say why it cannot
 /// open a file. In that case, a limit below `FILES_NEEDED` counts as the reason.
 fn is_out_of_files(error: &anyhow::Error) -> bool {
     let mut system_errors = error
         .chain()
         .filter_map(|cause| cause.downcast_ref::<std::io::Error>());
-    let too_many = Some(Errno::MFILE.raw_os_error());
-    if system_errors.any(|error| error.raw_os_error() == too_many) {
+    if system_errors.any(platform::is_out_of_files) {
         return true;
     }
     let is_unopened = catalog_error(error).is_some_and(|error| {
@@ -111,7 +103,7 @@ fn is_out_of_files(error: &anyhow::Error) -> bool {
         matches!(error, CatalogError::NotWritable(_))
             || matches!(error.kind(), Some(CannotOpen | ReadOnly))
     });
-    is_unopened && max_open_files() < FILES_NEEDED
+    is_unopened && platform::max_open_files() < FILES_NEEDED
 }
 
 /// Joins the chain of causes. A cause that the text already quotes is left out.
@@ -252,8 +244,6 @@ fn root_cause(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use rustix::io::Errno;
-
     use super::{ExitCode, Refusal, describe};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
     use crate::catalog::{CatalogError, LockOwner};
@@ -274,8 +264,10 @@ mod tests {
         assert_eq!(join_causes(&error), "a.png: disk on fire");
     }
 
+    #[cfg(unix)]
     #[test]
     fn full_disk_or_quota_is_explained() {
+        use rustix::io::Errno;
         for code in [Errno::NOSPC, Errno::DQUOT, Errno::IO] {
             let io = std::io::Error::from_raw_os_error(code.raw_os_error());
             let text = describe(&anyhow::Error::new(io).context("a.png"), Path::new("p"));

@@ -103,6 +103,7 @@ mod tests {
         assert_eq!(loaded.tree.origin("run.workers"), Origin::File(file));
     }
 
+    #[cfg(unix)]
     #[test]
     fn link_to_missing_settings_is_an_error() {
         let dir = tempfile::tempdir().expect("a temporary directory");

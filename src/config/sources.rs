@@ -1,7 +1,6 @@
 //! The layers above the defaults: preset, file, environment variables, flags.
 
 use std::io::ErrorKind;
-use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
@@ -9,6 +8,7 @@ use toml::{Table, Value};
 use super::error::{ConfigError, Origin, hint, quote};
 use super::tree::Tree;
 use crate::domain::enum_names;
+use crate::platform::is_pipe;
 use crate::store::read_file_or_pipe;
 
 /// Settings that come with the program.
@@ -197,7 +197,7 @@ fn is_present(path: &Path) -> std::io::Result<bool> {
         }
         found => found?,
     };
-    if path.metadata()?.file_type().is_fifo() {
+    if is_pipe(path.metadata()?.file_type()) {
         return Err(std::io::Error::other("it is a pipe, not a file"));
     }
     Ok(true)

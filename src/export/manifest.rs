@@ -217,6 +217,7 @@ mod tests {
         }
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_link_in_place_of_a_file_is_foreign_and_never_read() {
         for name in [MANIFEST, "pairs.jsonl"] {

@@ -11,10 +11,11 @@ use hyper::server::conn::http1;
 use hyper::service::Service;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
-use rustix::process::{Resource, getrlimit};
 use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
+
+use crate::platform;
 
 /// Limits on the connections of a server.
 #[derive(Debug, Clone, Copy)]
@@ -34,9 +35,8 @@ pub struct ConnectionLimits {
 impl ConnectionLimits {
     /// Returns the limits for this process. At most a quarter of its file descriptors are used for connections.
     pub fn system() -> Self {
-        let descriptors = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
         Self {
-            connections: (descriptors / 4).clamp(4, 128) as usize,
+            connections: (platform::max_open_files() / 4).clamp(4, 128) as usize,
             header: Duration::from_secs(15),
             response: Duration::from_mins(1),
             shutdown: Duration::from_secs(2),

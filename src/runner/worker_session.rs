@@ -9,6 +9,7 @@ use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{CatalogError, DeadWorker, LeaseHolder, WorkerInfo};
 use crate::domain::{UnixMillis, WorkerId};
+use crate::platform;
 
 /// The worker that this process is registered as.
 #[derive(Debug)]
@@ -162,12 +163,8 @@ impl Liveness {
 /// Returns what the catalog records about this process.
 pub(super) fn this_process() -> WorkerInfo {
     let boot_id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
-    let host = rustix::system::uname()
-        .nodename()
-        .to_string_lossy()
-        .into_owned();
     WorkerInfo {
-        host,
+        host: platform::host_name(),
         pid: std::process::id(),
         boot_id: boot_id.map(|id| id.trim().to_owned()),
     }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
+use crate::platform::{canonicalize, sync_file};
 
 /// Name of the new file in its staging folder.
 const NEW: &str = "new";
@@ -18,7 +19,7 @@ const NEW: &str = "new";
 /// Returns an error if the file cannot be written.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
-    let path = match std::fs::canonicalize(path) {
+    let path = match canonicalize(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => path.to_owned(),
         found => found?,
     };
@@ -56,7 +57,7 @@ fn metadata(path: &Path) -> std::io::Result<Option<Metadata>> {
 /// Returns an error if syncing, renaming or setting the permissions fails. If syncing the folder fails, the file is
 /// already renamed, and the message says that it is complete.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
-    File::open(partial)?.sync_all()?;
+    sync_file(partial)?;
     if let Some(earlier) = metadata(path)? {
         std::fs::set_permissions(partial, earlier.permissions())?;
     }
@@ -110,6 +111,7 @@ mod tests {
         assert!(error.contains("name too long"), "{error}");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_link_stays_a_link_and_a_device_is_written_to_directly() {
         let dir = tempfile::tempdir().expect("a temporary directory");

@@ -3,9 +3,8 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use rustix::io::Errno;
-
 use crate::domain::FailureClass;
+use crate::platform::{is_out_of_files, is_system_out_of_files};
 
 /// Why an input file could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -90,17 +89,16 @@ impl InputError {
 
 /// Replaces an error about too many open files with an error that names a remedy.
 pub(super) fn with_advice(error: io::Error) -> io::Error {
-    let is_about = |errno: Errno| error.raw_os_error() == Some(errno.raw_os_error());
-    if is_about(Errno::MFILE) {
+    if is_out_of_files(&error) {
         io::Error::other("too many open files; raise the limit with `ulimit -n`")
-    } else if is_about(Errno::NFILE) {
+    } else if is_system_out_of_files(&error) {
         io::Error::other("the system has too many open files; close other programs")
     } else {
         error
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::io;
 

@@ -2,13 +2,13 @@
 
 use std::fs::File;
 use std::io::{self, Read, Take};
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
 use crate::domain::ContentHash;
 use crate::page_vec::PageVec;
+use crate::platform::generation;
 
 /// Returns size, modification time and inode of a file as text. If all three are unchanged, the content is assumed to
 /// be unchanged.
@@ -16,7 +16,7 @@ fn file_stat(meta: &std::fs::Metadata) -> String {
     let modified = meta.modified().ok();
     let modified = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
     let modified = modified.map_or(0, |since| since.as_nanos());
-    format!("{}:{modified}:{}", meta.len(), meta.ino())
+    format!("{}:{modified}:{}", meta.len(), generation(meta))
 }
 
 /// An input file and its content.

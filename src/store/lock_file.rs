@@ -2,8 +2,9 @@
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read as _, Result, Write as _};
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
+
+use crate::platform::{is_without_locks, stat_link, stat_open};
 
 /// Number of attempts to lock a file that other processes keep removing.
 const ATTEMPTS: u32 = 100;
@@ -73,7 +74,7 @@ fn attempt(options: &OpenOptions, path: &Path) -> Result<LockAttempt> {
             // The previous owner removed the file after it was opened here.
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Ok(LockAttempt::Busy(read_pid(&mut file))),
-            Err(TryLockError::Error(error)) if is_unsupported(&error) => {
+            Err(TryLockError::Error(error)) if is_without_locks(&error) => {
                 return Ok(LockAttempt::Unsupported);
             }
             Err(TryLockError::Error(error)) => return Err(error),
@@ -84,27 +85,12 @@ fn attempt(options: &OpenOptions, path: &Path) -> Result<LockAttempt> {
 
 /// Returns whether an open file still has this path.
 fn is_at(file: &File, path: &Path) -> Result<bool> {
-    let open = file.metadata()?;
-    match std::fs::symlink_metadata(path) {
-        Ok(found) => Ok((found.dev(), found.ino()) == (open.dev(), open.ino())),
+    let open = stat_open(file)?;
+    match stat_link(path) {
+        Ok(found) => Ok(found.id == open.id),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
         Err(error) => Err(error),
     }
-}
-
-/// Returns whether an error of a lock means that the file system has no locks.
-fn is_unsupported(error: &std::io::Error) -> bool {
-    use rustix::io::Errno;
-    let codes = [
-        Errno::NOTSUP,
-        Errno::NOSYS,
-        Errno::NOLCK,
-        Errno::INVAL,
-        Errno::BADF,
-    ];
-    codes
-        .iter()
-        .any(|code| error.raw_os_error() == Some(code.raw_os_error()))
 }
 
 /// Returns the pid in the file. Returns `None` if the file contains no pid yet.
@@ -116,7 +102,7 @@ fn read_pid(file: &mut File) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LockAttempt, LockFile, is_unsupported};
+    use super::{LockAttempt, LockFile};
 
     #[test]
     fn one_process_holds_the_lock_and_others_learn_its_pid() {
@@ -136,12 +122,5 @@ mod tests {
         // The lock ended when it was dropped; the file is stale.
         let stale = LockFile::existing(&path);
         assert!(matches!(stale, Ok(LockAttempt::Held(_))));
-    }
-
-    #[test]
-    fn missing_support_for_locks_differs_from_a_failing_disk() {
-        let error = |code: rustix::io::Errno| std::io::Error::from(code);
-        assert!(is_unsupported(&error(rustix::io::Errno::NOTSUP)));
-        assert!(!is_unsupported(&error(rustix::io::Errno::IO)));
     }
 }

@@ -1,13 +1,11 @@
 //! Opening files of users. Opening a pipe waits for a writer, and some devices never end, so the type is checked first.
 
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
-use std::os::unix::fs::{FileTypeExt as _, OpenOptionsExt as _};
 use std::path::Path;
 
-use rustix::fs::{OFlags, fcntl_setfl};
-
 use super::input_error::{InputError, with_advice};
+use crate::platform::{is_pipe, is_socket, let_reads_wait, open_without_waiting};
 
 /// Returns the metadata of a regular file.
 ///
@@ -26,15 +24,11 @@ pub(super) fn regular_metadata(path: &Path) -> Result<Metadata, InputError> {
 pub fn open_regular(path: &Path) -> Result<(File, Metadata), InputError> {
     regular_metadata(path)?;
     let failed = |error: io::Error| InputError::io(path, error);
-    let mut options = OpenOptions::new();
-    options.read(true);
-    let without_waiting = OFlags::NONBLOCK | OFlags::NOCTTY;
-    options.custom_flags(without_waiting.bits().cast_signed());
-    let file = options.open(path).map_err(failed)?;
+    let file = open_without_waiting(path).map_err(failed)?;
     let meta = file.metadata().map_err(failed)?;
     check_regular(path, &meta)?;
     // Some archive file systems fail instead of waiting if this flag is set.
-    fcntl_setfl(&file, OFlags::empty()).map_err(|error| failed(error.into()))?;
+    let_reads_wait(&file).map_err(failed)?;
     Ok((file, meta))
 }
 
@@ -73,7 +67,7 @@ fn check_regular(path: &Path, meta: &Metadata) -> Result<(), InputError> {
 }
 
 fn check_readable(meta: &Metadata) -> io::Result<()> {
-    if meta.is_file() || meta.file_type().is_fifo() {
+    if meta.is_file() || is_pipe(meta.file_type()) {
         return Ok(());
     }
     let text = format!("it is {}, not a file", kind(meta));
@@ -85,9 +79,9 @@ fn kind(meta: &Metadata) -> &'static str {
     let file_type = meta.file_type();
     if file_type.is_dir() {
         "a directory"
-    } else if file_type.is_fifo() {
+    } else if is_pipe(file_type) {
         "a pipe"
-    } else if file_type.is_socket() {
+    } else if is_socket(file_type) {
         "a socket"
     } else {
         "a device"

@@ -1,7 +1,8 @@
 //! The folder that holds the name of a file or folder.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
+
+use crate::platform::{open_folder, sync_names};
 
 /// Returns the folder that holds the name of a file or folder.
 pub(super) fn parent_folder(path: &Path) -> PathBuf {
@@ -11,5 +12,5 @@ pub(super) fn parent_folder(path: &Path) -> PathBuf {
 
 /// Makes the names in a folder durable.
 pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    File::open(folder)?.sync_all()
+    sync_names(&open_folder(folder)?)
 }

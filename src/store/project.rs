@@ -1,9 +1,9 @@
 //! The project directory: the paths of its catalog, settings, artifacts and inputs.
 
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Component, Path, PathBuf};
 
 use super::parent_folder::{parent_folder, sync_folder};
+use crate::platform::{FileId, stat, with_slashes};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";
@@ -16,8 +16,8 @@ const ARTIFACTS: &str = "artifacts";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Project {
     dir: PathBuf,
-    /// Device and inode of the directory when it was opened. `None` if the project may not exist yet.
-    identity: Option<(u64, u64)>,
+    /// Identity of the directory when it was opened. `None` if the project may not exist yet.
+    identity: Option<FileId>,
 }
 
 /// Why a project's directory cannot be used.
@@ -78,10 +78,10 @@ impl Project {
 
     /// Returns the project in an existing directory.
     fn found(dir: &Path) -> Result<Self, StoreError> {
-        let meta = std::fs::metadata(dir).map_err(StoreError::io(dir))?;
+        let found = stat(dir).map_err(StoreError::io(dir))?;
         Ok(Self {
             dir: dir.to_owned(),
-            identity: Some((meta.dev(), meta.ino())),
+            identity: Some(found.id),
         })
     }
 
@@ -93,8 +93,8 @@ impl Project {
         let Some(identity) = self.identity else {
             return Ok(true);
         };
-        match std::fs::metadata(&self.dir) {
-            Ok(meta) => Ok((meta.dev(), meta.ino()) == identity),
+        match stat(&self.dir) {
+            Ok(found) => Ok(found.id == identity),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(false),
             Err(error) => Err(error),
         }
@@ -167,6 +167,7 @@ impl Project {
             Err(_) => below_resolved(&absolute, &dir).unwrap_or(absolute),
         };
         match stored.to_str() {
+            Some(text) if stored.is_relative() => Ok(with_slashes(text.to_owned())),
             Some(text) => Ok(text.to_owned()),
             None => Err(StoreError::NotUtf8(stored)),
         }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
 use super::target_lock::{TargetLock, TargetLockError};
+use crate::platform::{canonicalize, exchange, sync_tree};
 
 /// The new content in the staging folder.
 const NEW: &str = "new";
@@ -115,7 +116,7 @@ impl ReplacementFolder {
             staging,
             lock,
         } = self;
-        sync(&new).map_err(at(&target))?;
+        sync_tree(&new).map_err(at(&target))?;
         if !exists(&target).map_err(at(&target))? {
             fs::rename(&new, &target).map_err(at(&target))?;
         } else if !exchange(&new, &target) {
@@ -156,32 +157,9 @@ fn exists(path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Syncs the file system of a folder to disk.
-#[cfg(target_os = "linux")]
-fn sync(folder: &Path) -> io::Result<()> {
-    Ok(rustix::fs::syncfs(fs::File::open(folder)?)?)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn sync(folder: &Path) -> io::Result<()> {
-    fs::File::open(folder)?.sync_all()
-}
-
-/// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
-#[cfg(target_os = "linux")]
-fn exchange(one: &Path, other: &Path) -> bool {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok()
-}
-
-#[cfg(not(target_os = "linux"))]
-fn exchange(_one: &Path, _other: &Path) -> bool {
-    false
-}
-
 /// Returns the parent and the name of a target.
 fn place(target: &Path) -> Result<(PathBuf, OsString), ReplaceError> {
-    let whole = match fs::canonicalize(target) {
+    let whole = match canonicalize(target) {
         Ok(whole) => whole,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             std::path::absolute(target).map_err(at(target))?

@@ -6,12 +6,12 @@
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::io::{Error, ErrorKind, Result};
-use std::os::unix::ffi::{OsStrExt as _, OsStringExt as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::lock_file::{LockAttempt, LockFile};
 use super::parent_folder::parent_folder;
+use crate::platform::file_name_of;
 
 /// End of the name of every staging folder.
 const SUFFIX: &str = ".mocban-partial";
@@ -169,12 +169,12 @@ pub(super) fn hidden_sibling(target: &Path, ending: &str) -> PathBuf {
         hidden.push(name);
     } else {
         let mut end = MAX_STEM;
-        let bytes = name.as_bytes();
+        let bytes = name.as_encoded_bytes();
         // Bytes of the form 10xxxxxx continue a character of UTF-8.
         while end > 0 && bytes[end] & 0xc0 == 0x80 {
             end -= 1;
         }
-        hidden.push(OsString::from_vec(bytes[..end].to_vec()));
+        hidden.push(file_name_of(&bytes[..end]));
         hidden.push(format!("-{}", &blake3::hash(bytes).to_hex()[..8]));
     }
     hidden.push(".");
@@ -185,8 +185,8 @@ pub(super) fn hidden_sibling(target: &Path, ending: &str) -> PathBuf {
 /// Returns whether a name is that of a staging folder: the prefix, a pid, a number and the suffix.
 fn is_staging_name(name: &OsStr, prefix: &OsStr) -> bool {
     let unique = name
-        .as_bytes()
-        .strip_prefix(prefix.as_bytes())
+        .as_encoded_bytes()
+        .strip_prefix(prefix.as_encoded_bytes())
         .and_then(|rest| rest.strip_suffix(SUFFIX.as_bytes()));
     let is_number = |text: &[u8]| !text.is_empty() && text.iter().all(u8::is_ascii_digit);
     unique.is_some_and(|unique| {

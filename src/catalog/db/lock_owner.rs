@@ -1,8 +1,9 @@
 //! Finds the process that holds the catalog's write lock.
 
 use std::fmt;
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
+
+use crate::platform::{DeviceNumber, device_number};
 
 /// Offset of the byte in the `-shm` file that a writer locks (see "WAL-index locks" in SQLite's file format).
 const WRITE_LOCK: &str = "120";
@@ -27,13 +28,15 @@ impl fmt::Display for LockOwner {
     }
 }
 
-/// Returns the process that holds the write lock, or `None` if no such process is found. Does not open the catalog's
+/// Returns the process that holds the write lock, or `None` if no such process is found, as on systems other than Linux. Does not open the catalog's
 /// files, because closing them again would drop the locks of this process's own connections.
 pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
-    let index = std::fs::metadata(sidecar(catalog, "-shm")).ok()?;
-    let device = index.dev();
-    let (major, minor) = (rustix::fs::major(device), rustix::fs::minor(device));
-    let file = format!("{major:02x}:{minor:02x}:{}", index.ino());
+    let DeviceNumber {
+        major,
+        minor,
+        inode,
+    } = device_number(&sidecar(catalog, "-shm"))?;
+    let file = format!("{major:02x}:{minor:02x}:{inode}");
     let locks = std::fs::read_to_string("/proc/locks").ok()?;
     let pid = locks.lines().find_map(|line| writer(line, &file))?;
     let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();

@@ -1,10 +1,9 @@
 //! Notices that another program deleted, replaced or cut the write-ahead log of an open catalog.
 //!
 //! SQLite does not notice this: the commits that follow go to a file without a name, or leave a hole in the log. The
-//! functions here never open the log, and compare only its inode and length.
+//! functions here never open the log, and compare only its identity and length.
 
 use std::io::ErrorKind;
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -13,6 +12,7 @@ use sqlx::SqliteConnection;
 use crate::catalog::db::error::{CatalogError, LogLoss, Result};
 use crate::catalog::db::lock_owner::sidecar;
 use crate::domain::UnixMillis;
+use crate::platform::{FileId, stat};
 
 /// Length of the log's header in bytes.
 const LOG_HEADER: u64 = 32;
@@ -24,8 +24,8 @@ type LogState = (i64, i64, i64);
 /// The log of the open write connection.
 #[derive(Debug)]
 pub(crate) struct LogWatch {
-    catalog: FileId,
-    log: FileId,
+    catalog: WatchedFile,
+    log: WatchedFile,
     /// Length of the log after the last commit, in bytes.
     length: u64,
     /// All commits before this time are in the catalog's main file.
@@ -33,11 +33,11 @@ pub(crate) struct LogWatch {
     loss: Option<LogLoss>,
 }
 
-/// Path of a file, with its device and inode, or `None` if these could not be read.
+/// Path of a file, with its identity, or `None` if this could not be read.
 #[derive(Debug)]
-struct FileId {
+struct WatchedFile {
     path: PathBuf,
-    number: Option<(u64, u64)>,
+    id: Option<FileId>,
 }
 
 /// How a file compares with its earlier state.
@@ -49,24 +49,17 @@ enum FileState {
     Unknown,
 }
 
-impl FileId {
+impl WatchedFile {
     fn of(path: PathBuf) -> Self {
-        let number = std::fs::metadata(&path).ok();
-        let number = number.map(|found| (found.dev(), found.ino()));
-        Self { path, number }
+        let id = stat(&path).ok().map(|found| found.id);
+        Self { path, id }
     }
 
     fn state(&self) -> FileState {
-        match std::fs::metadata(&self.path) {
-            Ok(found)
-                if self
-                    .number
-                    .is_none_or(|is| is == (found.dev(), found.ino())) =>
-            {
-                FileState::Same(found.len())
-            }
+        match stat(&self.path) {
+            Ok(found) if self.id.is_none_or(|id| id == found.id) => FileState::Same(found.len),
             Ok(_) => FileState::Gone,
-            Err(error) if error.kind() == ErrorKind::NotFound && self.number.is_some() => {
+            Err(error) if error.kind() == ErrorKind::NotFound && self.id.is_some() => {
                 FileState::Gone
             }
             Err(_) => FileState::Unknown,
@@ -77,13 +70,13 @@ impl FileId {
 impl LogWatch {
     /// Notes the log of a catalog that has just been opened for writing.
     pub(crate) fn new(catalog: &Path) -> Self {
-        let log = FileId::of(sidecar(catalog, "-wal"));
+        let log = WatchedFile::of(sidecar(catalog, "-wal"));
         let length = match log.state() {
             FileState::Same(length) => length,
             FileState::Gone | FileState::Unknown => 0,
         };
         Self {
-            catalog: FileId::of(catalog.to_owned()),
+            catalog: WatchedFile::of(catalog.to_owned()),
             log,
             length,
             saved_until: now(),
@@ -168,7 +161,7 @@ async fn checkpoint(conn: &mut SqliteConnection, pragma: &'static str) -> Result
 
 /// Returns whether a log that became shorter is too short for the pages that SQLite's index lists. Another process may
 /// have emptied the log properly, and then the index lists fewer pages.
-async fn is_cut(conn: &mut SqliteConnection, log: &FileId) -> bool {
+async fn is_cut(conn: &mut SqliteConnection, log: &WatchedFile) -> bool {
     let Ok(page_bytes) = sqlx::query_scalar::<_, i64>("PRAGMA page_size")
         .fetch_one(&mut *conn)
         .await

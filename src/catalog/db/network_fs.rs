@@ -1,8 +1,9 @@
 //! Detects network file systems. The write-ahead log needs shared memory, which does not work on them.
 
-use std::path::Path;
+use std::path::{Component, Path, Prefix};
 
 use crate::catalog::db::error::{CatalogError, Result};
+use crate::platform::{DeviceNumber, device_number, file_system_magic};
 
 /// Number (`f_type`) and name of each network file system, from statfs(2) and the kernel's `magic.h`.
 const MAGICS: [(u64, &str); 20] = [
@@ -51,25 +52,27 @@ pub(crate) fn refuse(catalog: &Path) -> Result<()> {
     }
 }
 
-#[cfg(target_os = "linux")]
 fn found(dir: &Path) -> Option<&'static str> {
-    let magic = rustix::fs::statfs(dir).ok()?.f_type;
-    let magic = u64::try_from(magic).ok()? & 0xffff_ffff;
+    if is_share(dir) {
+        return Some("a Windows share");
+    }
+    let magic = file_system_magic(dir)?;
     let mount = (magic == FUSE).then(|| mount_type(dir)).flatten();
     network_kind(magic, mount.as_deref())
 }
 
-#[cfg(not(target_os = "linux"))]
-fn found(_dir: &Path) -> Option<&'static str> {
-    None
+/// Returns whether a folder is below a share of another machine, as in `\\server\share`. Shares with a drive letter are not
+/// recognized. No path on Unix has such a prefix.
+fn is_share(dir: &Path) -> bool {
+    let dir = std::path::absolute(dir);
+    let first = dir.as_ref().ok().and_then(|dir| dir.components().next());
+    matches!(first, Some(Component::Prefix(prefix))
+        if matches!(prefix.kind(), Prefix::UNC(..) | Prefix::VerbatimUNC(..)))
 }
 
 /// Returns the file system type of a directory in the mount table.
-#[cfg(target_os = "linux")]
 fn mount_type(dir: &Path) -> Option<String> {
-    use std::os::unix::fs::MetadataExt as _;
-    let device = std::fs::metadata(dir).ok()?.dev();
-    let (major, minor) = (rustix::fs::major(device), rustix::fs::minor(device));
+    let DeviceNumber { major, minor, .. } = device_number(dir)?;
     let number = format!("{major}:{minor}");
     let table = std::fs::read_to_string("/proc/self/mountinfo").ok()?;
     type_of_device(&table, &number).map(ToOwned::to_owned)

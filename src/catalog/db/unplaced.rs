@@ -1,17 +1,18 @@
 //! The file of a catalog that is being created. It has a hidden name until the catalog is complete.
 //!
 //! Every creator holds a shared lock on the folder. A process that gets the exclusive lock knows that no creator works
-//! there, so all hidden files are left from creators that were killed.
+//! there, so all hidden files are left from creators that were killed. Where folders cannot be locked, as on Windows,
+//! these files stay.
 
-use std::fs::{File, Permissions};
+use std::fs::File;
 use std::io;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use tempfile::TempPath;
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::lock_owner::sidecar;
+use crate::platform::{let_all_read, open_folder, sync_file, sync_names};
 
 /// A catalog file under a hidden name. The file is removed when this value is dropped.
 #[derive(Debug)]
@@ -52,13 +53,14 @@ impl UnplacedFile {
             }
         }
         let not_created = || CatalogError::NotCreated(target.to_owned());
-        let folder = File::open(folder_of(target)).or(Err(not_created()))?;
+        let folder = open_folder(folder_of(target)).or(Err(not_created()))?;
         remove_if_stale(target, &folder);
         // A file system without locks also refuses the exclusive lock, so no process removes files there.
         let _ = folder.lock_shared();
-        let file = tempfile::Builder::new()
-            .prefix(&hidden_prefix(target))
-            .permissions(Permissions::from_mode(0o644))
+        let prefix = hidden_prefix(target);
+        let mut builder = tempfile::Builder::new();
+        let_all_read(builder.prefix(&prefix));
+        let file = builder
             .tempfile_in(folder_of(target))
             .or(Err(not_created()))?
             .into_temp_path();
@@ -90,8 +92,7 @@ impl UnplacedFile {
         if log.is_ok_and(|log| log.len() > 0) {
             return Err(CatalogError::NotCreated(target.clone()));
         }
-        let synced = File::open(file).and_then(|file| file.sync_all());
-        synced.map_err(io_error)?;
+        sync_file(file).map_err(io_error)?;
         let Self {
             file,
             sidecars: _sidecars,
@@ -104,7 +105,7 @@ impl UnplacedFile {
         };
         match file.persist_noclobber(&target) {
             Ok(()) => {
-                folder.sync_all().map_err(|error| {
+                sync_names(&folder).map_err(|error| {
                     let text = format!(
                         "the catalog is complete, but the disk did not confirm its name: {error}"
                     );
@@ -120,7 +121,7 @@ impl UnplacedFile {
 
 /// Removes the hidden files beside a catalog, if no process is creating a catalog there.
 pub(crate) fn remove_stale(catalog: &Path) {
-    if let Ok(folder) = File::open(folder_of(catalog)) {
+    if let Ok(folder) = open_folder(folder_of(catalog)) {
         remove_if_stale(catalog, &folder);
     }
 }

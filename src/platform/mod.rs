@@ -1,0 +1,40 @@
+//! Operations that differ between operating systems. No other production code names one, apart from `cfg` of Linux.
+//!
+//! `unix.rs` and `windows.rs` have the same functions.
+
+#[cfg(unix)]
+mod unix;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(unix)]
+pub(crate) use unix::*;
+#[cfg(windows)]
+pub(crate) use windows::*;
+
+/// Identifies a file or folder on this machine as long as it exists: device and inode, or volume and file index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct FileId {
+    device: u64,
+    inode: u64,
+}
+
+/// Identity and length of a file or folder.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileStat {
+    /// Its identity.
+    pub(crate) id: FileId,
+    /// Its length in bytes.
+    pub(crate) len: u64,
+}
+
+/// Device and inode of a file as Linux's tables in `/proc` show them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeviceNumber {
+    /// Major number of the device.
+    pub(crate) major: u32,
+    /// Minor number of the device.
+    pub(crate) minor: u32,
+    /// The inode.
+    pub(crate) inode: u64,
+}

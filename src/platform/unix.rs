@@ -1,0 +1,307 @@
+//! Operations on Unix. Those that only Linux has report elsewhere that they are missing.
+
+use std::ffi::OsString;
+use std::fs::{File, FileType, Metadata, OpenOptions, Permissions};
+use std::io;
+use std::os::unix::ffi::OsStringExt as _;
+use std::os::unix::fs::{
+    FileTypeExt as _, MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _,
+};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{OFlags, fcntl_setfl};
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::task::JoinHandle;
+
+use super::{DeviceNumber, FileId, FileStat};
+
+fn stat_of(meta: &Metadata) -> FileStat {
+    FileStat {
+        id: FileId {
+            device: meta.dev(),
+            inode: meta.ino(),
+        },
+        len: meta.len(),
+    }
+}
+
+/// Returns identity and length of a file or folder. Follows links.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
+    std::fs::metadata(path).map(|meta| stat_of(&meta))
+}
+
+/// Returns identity and length of a file or folder, or of a link.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
+    std::fs::symlink_metadata(path).map(|meta| stat_of(&meta))
+}
+
+/// Returns identity and length of an open file.
+///
+/// # Errors
+/// Returns an error if the system does not give them.
+pub(crate) fn stat_open(file: &File) -> io::Result<FileStat> {
+    file.metadata().map(|meta| stat_of(&meta))
+}
+
+/// Returns a number that changes if another file replaces this one at its path: the inode.
+pub(crate) fn generation(meta: &Metadata) -> u64 {
+    meta.ino()
+}
+
+/// Returns device and inode of a file as `/proc` shows them, or `None` on other systems than Linux.
+#[cfg(target_os = "linux")]
+pub(crate) fn device_number(path: &Path) -> Option<DeviceNumber> {
+    let meta = std::fs::metadata(path).ok()?;
+    Some(DeviceNumber {
+        major: rustix::fs::major(meta.dev()),
+        minor: rustix::fs::minor(meta.dev()),
+        inode: meta.ino(),
+    })
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn device_number(_path: &Path) -> Option<DeviceNumber> {
+    None
+}
+
+/// Returns the number of a folder's file system (`f_type` of statfs(2)), or `None` on other systems than Linux.
+#[cfg(target_os = "linux")]
+pub(crate) fn file_system_magic(folder: &Path) -> Option<u64> {
+    let magic = rustix::fs::statfs(folder).ok()?.f_type;
+    Some(u64::try_from(magic).ok()? & 0xffff_ffff)
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn file_system_magic(_folder: &Path) -> Option<u64> {
+    None
+}
+
+/// Returns the absolute path with all links resolved.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
+    std::fs::canonicalize(path)
+}
+
+/// Opens a file for reading. Does not wait for the writer of a pipe.
+///
+/// # Errors
+/// Returns an error if the file cannot be opened.
+pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    let without_waiting = OFlags::NONBLOCK | OFlags::NOCTTY;
+    options.custom_flags(without_waiting.bits().cast_signed());
+    options.open(path)
+}
+
+/// Lets reads of a file wait that [`open_without_waiting`] opened.
+///
+/// # Errors
+/// Returns an error if the system refuses it.
+pub(crate) fn let_reads_wait(file: &File) -> io::Result<()> {
+    Ok(fcntl_setfl(file, OFlags::empty())?)
+}
+
+/// Returns whether an entry is a pipe with a name.
+pub(crate) fn is_pipe(file_type: FileType) -> bool {
+    file_type.is_fifo()
+}
+
+/// Returns whether an entry is a socket.
+pub(crate) fn is_socket(file_type: FileType) -> bool {
+    file_type.is_socket()
+}
+
+/// Opens a folder, to lock it or to make the names in it durable.
+///
+/// # Errors
+/// Returns an error if the folder cannot be opened.
+pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
+    File::open(folder)
+}
+
+/// Makes the names in an open folder durable.
+///
+/// # Errors
+/// Returns an error if the disk fails.
+pub(crate) fn sync_names(folder: &File) -> io::Result<()> {
+    folder.sync_all()
+}
+
+/// Makes the content of a file durable.
+///
+/// # Errors
+/// Returns an error if the file cannot be opened or the disk fails.
+pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
+    File::open(path)?.sync_all()
+}
+
+/// Makes a folder with all its files durable: syncs its file system.
+///
+/// # Errors
+/// Returns an error if the folder cannot be opened or the disk fails.
+#[cfg(target_os = "linux")]
+pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+    Ok(rustix::fs::syncfs(File::open(folder)?)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+    File::open(folder)?.sync_all()
+}
+
+/// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
+#[cfg(target_os = "linux")]
+pub(crate) fn exchange(one: &Path, other: &Path) -> bool {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok()
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn exchange(_one: &Path, _other: &Path) -> bool {
+    false
+}
+
+/// Lets all users read the temporary files that a builder creates. By default, only their owner may.
+pub(crate) fn let_all_read(builder: &mut tempfile::Builder) {
+    builder.permissions(Permissions::from_mode(0o644));
+}
+
+/// Returns the file name with these bytes of an `OsStr`, which must end at the end of a character.
+pub(crate) fn file_name_of(bytes: &[u8]) -> OsString {
+    OsString::from_vec(bytes.to_vec())
+}
+
+/// Returns a path below a folder with slashes between its parts, so that all systems can read it.
+pub(crate) fn with_slashes(path: String) -> String {
+    path
+}
+
+/// Returns whether an error of a lock means that the file system has no locks.
+pub(crate) fn is_without_locks(error: &io::Error) -> bool {
+    let codes = [
+        Errno::NOTSUP,
+        Errno::NOSYS,
+        Errno::NOLCK,
+        Errno::INVAL,
+        Errno::BADF,
+    ];
+    codes.iter().any(|code| is_code(error, *code))
+}
+
+/// Returns whether this process has too many open files.
+pub(crate) fn is_out_of_files(error: &io::Error) -> bool {
+    is_code(error, Errno::MFILE)
+}
+
+/// Returns whether all processes together have too many open files.
+pub(crate) fn is_system_out_of_files(error: &io::Error) -> bool {
+    is_code(error, Errno::NFILE)
+}
+
+fn is_code(error: &io::Error, code: Errno) -> bool {
+    error.raw_os_error() == Some(code.raw_os_error())
+}
+
+/// Returns the number of files that this process may have open at the same time.
+pub(crate) fn max_open_files() -> u64 {
+    getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
+}
+
+/// Returns the name of this machine.
+pub(crate) fn host_name() -> String {
+    let system = rustix::system::uname();
+    system.nodename().to_string_lossy().into_owned()
+}
+
+/// Calls a function at each Ctrl-C, SIGTERM and SIGHUP until the handle is aborted. SIGHUP stays ignored if it was
+/// ignored when this process started, as under `nohup`.
+///
+/// # Errors
+/// Returns an error if the system refuses to watch a signal.
+pub(crate) fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
+    let is_ignored = IgnoredSignals::of_this_process().contains(SignalKind::hangup());
+    let hang_up = (!is_ignored).then(|| signal(SignalKind::hangup()));
+    let mut hang_up = hang_up.transpose()?;
+    let mut interrupt = Some(signal(SignalKind::interrupt())?);
+    let mut terminate = Some(signal(SignalKind::terminate())?);
+    Ok(tokio::spawn(async move {
+        loop {
+            tokio::select! {
+                () = next(&mut interrupt) => on_signal(),
+                () = next(&mut terminate) => on_signal(),
+                () = next(&mut hang_up) => on_signal(),
+            };
+        }
+    }))
+}
+
+/// Waits for a signal. Never returns if the signal is not watched.
+async fn next(signal: &mut Option<Signal>) {
+    let received = match signal {
+        Some(signal) => signal.recv().await,
+        None => None,
+    };
+    if received.is_none() {
+        std::future::pending::<()>().await;
+    }
+}
+
+/// The signals that this process ignores, as a bit mask in which bit 0 is signal 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct IgnoredSignals(u64);
+
+impl IgnoredSignals {
+    /// Reads the mask that Linux shows (`proc_pid_status(5)`). On other systems no signal counts as ignored.
+    fn of_this_process() -> Self {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        Self::parse(&status)
+    }
+
+    fn parse(status: &str) -> Self {
+        let mask = status
+            .lines()
+            .find_map(|line| line.strip_prefix("SigIgn:"))
+            .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        Self(mask.unwrap_or(0))
+    }
+
+    fn contains(self, kind: SignalKind) -> bool {
+        let bit = kind.as_raw_value() - 1;
+        self.0 >> bit & 1 == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::signal::unix::SignalKind;
+
+    use super::{Errno, IgnoredSignals, is_without_locks};
+
+    #[test]
+    fn ignored_signals_are_read_from_the_mask() {
+        let ignored =
+            IgnoredSignals::parse("SigBlk:\t0000000000000002\nSigIgn:\t0000000000001001\n");
+        assert!(ignored.contains(SignalKind::hangup()));
+        assert!(!ignored.contains(SignalKind::interrupt()));
+        assert!(!ignored.contains(SignalKind::terminate()));
+        assert_eq!(IgnoredSignals::parse("Name:\tmocban\n"), IgnoredSignals(0));
+    }
+
+    #[test]
+    fn missing_support_for_locks_differs_from_a_failing_disk() {
+        let error = |code: Errno| std::io::Error::from(code);
+        assert!(is_without_locks(&error(Errno::NOTSUP)));
+        assert!(!is_without_locks(&error(Errno::IO)));
+    }
+}

@@ -1,0 +1,226 @@
+//! Operations on Windows.
+
+use std::ffi::OsString;
+use std::fs::{File, FileType, Metadata, OpenOptions};
+use std::io;
+use std::os::windows::fs::{MetadataExt as _, OpenOptionsExt as _};
+use std::path::{Path, PathBuf};
+
+use tokio::signal::windows::{ctrl_break, ctrl_c, ctrl_close, ctrl_shutdown};
+use tokio::task::JoinHandle;
+
+use super::{DeviceNumber, FileId, FileStat};
+
+/// Opens a folder like a file (`FILE_FLAG_BACKUP_SEMANTICS` of `CreateFileW`).
+const FOLDERS_TOO: u32 = 0x0200_0000;
+/// Opens a link instead of its target (`FILE_FLAG_OPEN_REPARSE_POINT` of `CreateFileW`).
+const LINK_ITSELF: u32 = 0x0020_0000;
+const ERROR_INVALID_FUNCTION: i32 = 1;
+const ERROR_TOO_MANY_OPEN_FILES: i32 = 4;
+const ERROR_NOT_SUPPORTED: i32 = 50;
+
+/// Opens a file or folder to ask for its properties only, which no other process can prevent.
+fn open_for_stat(path: &Path, flags: u32) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.access_mode(0).custom_flags(FOLDERS_TOO | flags);
+    options.open(path)
+}
+
+/// Returns identity and length of a file or folder. Follows links.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
+    stat_open(&open_for_stat(path, 0)?)
+}
+
+/// Returns identity and length of a file or folder, or of a link.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
+    stat_open(&open_for_stat(path, LINK_ITSELF)?)
+}
+
+/// Returns identity and length of an open file.
+///
+/// # Errors
+/// Returns an error if the system does not give them.
+pub(crate) fn stat_open(file: &File) -> io::Result<FileStat> {
+    let found = winapi_util::file::information(file)?;
+    Ok(FileStat {
+        id: FileId {
+            device: found.volume_serial_number(),
+            inode: found.file_index(),
+        },
+        len: found.file_size(),
+    })
+}
+
+/// Returns a number that changes if another file replaces this one at its path: the time of its creation, in steps of
+/// 100 ns. The file index is only known after the file was opened.
+pub(crate) fn generation(meta: &Metadata) -> u64 {
+    meta.creation_time()
+}
+
+/// Returns `None`: Windows has no `/proc`.
+pub(crate) const fn device_number(_path: &Path) -> Option<DeviceNumber> {
+    None
+}
+
+/// Returns `None`: Windows does not number its file systems.
+pub(crate) const fn file_system_magic(_folder: &Path) -> Option<u64> {
+    None
+}
+
+/// Returns the absolute path with all links resolved. A short path has its usual form, without `\\?\`.
+///
+/// # Errors
+/// Returns an error if the path does not exist or may not be accessed.
+pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
+    dunce::canonicalize(path)
+}
+
+/// Opens a file for reading. Files on a disk never wait for a writer.
+///
+/// # Errors
+/// Returns an error if the file cannot be opened.
+pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
+    File::open(path)
+}
+
+/// Does nothing: see [`open_without_waiting`].
+///
+/// # Errors
+/// Returns no error.
+pub(crate) const fn let_reads_wait(_file: &File) -> io::Result<()> {
+    Ok(())
+}
+
+/// Returns `false`: pipes are not in folders.
+pub(crate) const fn is_pipe(_file_type: FileType) -> bool {
+    false
+}
+
+/// Returns `false`: sockets do not differ from files.
+pub(crate) const fn is_socket(_file_type: FileType) -> bool {
+    false
+}
+
+/// Opens a folder. Windows cannot lock it.
+///
+/// # Errors
+/// Returns an error if the folder cannot be opened.
+pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).custom_flags(FOLDERS_TOO);
+    options.open(folder)
+}
+
+/// Does nothing: Windows cannot sync a folder, and NTFS keeps its names consistent in a journal. A name may be lost in a
+/// power cut, as if the program had ended a few seconds earlier.
+///
+/// # Errors
+/// Returns no error.
+pub(crate) const fn sync_names(_folder: &File) -> io::Result<()> {
+    Ok(())
+}
+
+/// Makes the content of a file durable. Windows only syncs files that are open for writing.
+///
+/// # Errors
+/// Returns an error if the file cannot be opened or the disk fails.
+pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
+    OpenOptions::new().write(true).open(path)?.sync_all()
+}
+
+/// Makes a folder with all its files durable: syncs each file.
+///
+/// # Errors
+/// Returns an error if a file cannot be opened or the disk fails.
+pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_tree(&entry.path())?;
+        } else {
+            sync_file(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns `false`: Windows cannot swap two folders.
+pub(crate) const fn exchange(_one: &Path, _other: &Path) -> bool {
+    false
+}
+
+/// Does nothing: new files have the permissions of their folder.
+pub(crate) const fn let_all_read(_builder: &mut tempfile::Builder) {}
+
+/// Returns the file name with these bytes of an `OsStr`, which must end at the end of a character.
+pub(crate) fn file_name_of(bytes: &[u8]) -> OsString {
+    String::from_utf8_lossy(bytes).into_owned().into()
+}
+
+/// Returns a path below a folder with slashes between its parts, so that all systems can read it.
+pub(crate) fn with_slashes(path: String) -> String {
+    path.replace('\\', "/")
+}
+
+/// Returns whether an error of a lock means that the file system has no locks.
+pub(crate) fn is_without_locks(error: &io::Error) -> bool {
+    matches!(
+        error.raw_os_error(),
+        Some(ERROR_INVALID_FUNCTION | ERROR_NOT_SUPPORTED)
+    )
+}
+
+/// Returns whether this process has too many open files.
+pub(crate) fn is_out_of_files(error: &io::Error) -> bool {
+    error.raw_os_error() == Some(ERROR_TOO_MANY_OPEN_FILES)
+}
+
+/// Returns `false`: Windows has no limit for all processes.
+pub(crate) const fn is_system_out_of_files(_error: &io::Error) -> bool {
+    false
+}
+
+/// Returns the largest number: Windows limits open files by memory only.
+pub(crate) const fn max_open_files() -> u64 {
+    u64::MAX
+}
+
+/// Returns the name of this machine, or an empty text if the system does not give it.
+pub(crate) fn host_name() -> String {
+    use winapi_util::sysinfo::{ComputerNameKind, get_computer_name};
+    let name = get_computer_name(ComputerNameKind::PhysicalDnsHostname);
+    name.map_or_else(
+        |_| String::new(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// Calls a function at each Ctrl-C and Ctrl-Break, when the console is closed, and at a shutdown of the system, until
+/// the handle is aborted. Windows ends the process about five seconds after the console is closed.
+///
+/// # Errors
+/// Returns an error if the system refuses to watch them.
+pub(crate) fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
+    let (mut interrupt, mut end) = (ctrl_c()?, ctrl_break()?);
+    let (mut close, mut shutdown) = (ctrl_close()?, ctrl_shutdown()?);
+    Ok(tokio::spawn(async move {
+        loop {
+            let received = tokio::select! {
+                received = interrupt.recv() => received,
+                received = end.recv() => received,
+                received = close.recv() => received,
+                received = shutdown.recv() => received,
+            };
+            if received.is_none() {
+                return;
+            }
+            on_signal();
+        }
+    }))
+}
