@@ -187,6 +187,14 @@ pub(crate) fn with_slashes(path: String) -> String {
     path
 }
 
+/// Ends the lock of an open file.
+///
+/// # Errors
+/// Returns an error if the system refuses it.
+pub(crate) fn unlock(file: &File) -> io::Result<()> {
+    file.unlock()
+}
+
 /// Returns whether an error of a lock means that the file system has no locks.
 pub(crate) fn is_without_locks(error: &io::Error) -> bool {
     let codes = [

@@ -17,6 +17,7 @@ const FOLDERS_TOO: u32 = 0x0200_0000;
 const LINK_ITSELF: u32 = 0x0020_0000;
 const ERROR_INVALID_FUNCTION: i32 = 1;
 const ERROR_TOO_MANY_OPEN_FILES: i32 = 4;
+const ERROR_LOCK_VIOLATION: i32 = 33;
 const ERROR_NOT_SUPPORTED: i32 = 50;
 
 /// Opens a file or folder to ask for its properties only, which no other process can prevent.
@@ -166,6 +167,18 @@ pub(crate) fn file_name_of(bytes: &[u8]) -> OsString {
 /// Returns a path below a folder with slashes between its parts, so that all systems can read it.
 pub(crate) fn with_slashes(path: String) -> String {
     path.replace('\\', "/")
+}
+
+/// Ends the lock of an open file. The standard library unlocks twice, in case there are two locks, and Wine reports the
+/// second time as a lock violation.
+///
+/// # Errors
+/// Returns an error if the system refuses it.
+pub(crate) fn unlock(file: &File) -> io::Result<()> {
+    match file.unlock() {
+        Err(error) if error.raw_os_error() == Some(ERROR_LOCK_VIOLATION) => Ok(()),
+        unlocked => unlocked,
+    }
 }
 
 /// Returns whether an error of a lock means that the file system has no locks.

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use super::Project;
 use super::open_file::open_regular;
+use crate::platform::unlock;
 
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
@@ -129,7 +130,7 @@ impl RunLock {
     /// Returns an error if the file cannot be locked.
     pub fn downgrade(&mut self) -> Result<(), LockError> {
         if self.is_exclusive {
-            self.members.unlock().map_err(io(&self.path))?;
+            unlock(&self.members).map_err(io(&self.path))?;
             self.members.lock_shared().map_err(io(&self.path))?;
             self.is_exclusive = false;
         }
