@@ -10,6 +10,8 @@ use std::process::{Command, Stdio};
 pub(super) fn open(url: &str) -> Option<tempfile::NamedTempFile> {
     let program = if cfg!(target_os = "macos") {
         "open"
+    } else if cfg!(windows) {
+        "explorer"
     } else {
         let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"].map(std::env::var_os);
         has_screen.iter().flatten().next()?;

@@ -244,7 +244,7 @@ fn root_cause(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{ExitCode, Refusal, describe};
+    use super::{ExitCode, Refusal};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
     use crate::catalog::{CatalogError, LockOwner};
     use crate::export::ExportError;
@@ -267,6 +267,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn full_disk_or_quota_is_explained() {
+        use super::describe;
         use rustix::io::Errno;
         for code in [Errno::NOSPC, Errno::DQUOT, Errno::IO] {
             let io = std::io::Error::from_raw_os_error(code.raw_os_error());

@@ -90,16 +90,20 @@ fn kind(meta: &Metadata) -> &'static str {
 
 #[cfg(test)]
 mod tests {
+    #[cfg(unix)]
     use std::path::Path;
 
-    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    #[cfg(unix)]
+    use super::open_regular;
+    use super::read_file_or_pipe;
 
-    use super::{open_regular, read_file_or_pipe};
-
+    #[cfg(unix)]
     fn pipe(path: &Path) {
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
         mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("a pipe");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_pipe_or_a_device_is_refused_as_an_input_without_waiting() {
         let dir = tempfile::tempdir().expect("a temporary directory");
@@ -114,6 +118,7 @@ mod tests {
         assert_eq!(refused.to_string(), "/dev/zero is a device, not a file");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_list_may_come_from_a_pipe_but_not_from_a_device() {
         let dir = tempfile::tempdir().expect("a temporary directory");

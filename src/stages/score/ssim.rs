@@ -11,6 +11,17 @@ use crate::simd::dispatch;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
+/// `exp(-distance^2 / (2 * 1.5^2))` for distances from 0 to 5 px. Constants, because `exp` of some systems rounds
+/// differently, and scores must not depend on the system.
+const GAUSSIAN_WEIGHTS: [f64; 6] = [
+    1.0,
+    0.800_737_402_916_808_1,
+    0.411_112_290_507_187_45,
+    0.135_335_283_236_612_7,
+    0.028_565_500_784_550_377,
+    0.003_865_920_139_472_807_6,
+];
+
 /// The local window of SSIM.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -27,9 +38,8 @@ impl SsimWindow {
     fn weights(self) -> Vec<f64> {
         match self {
             Self::Gaussian => {
-                let raw: Vec<f64> = (-5..=5)
-                    .map(|i| (-f64::from(i * i) / (2.0 * 1.5 * 1.5)).exp())
-                    .collect();
+                let raw =
+                    [5, 4, 3, 2, 1, 0, 1, 2, 3, 4, 5].map(|distance| GAUSSIAN_WEIGHTS[distance]);
                 let sum: f64 = raw.iter().sum();
                 raw.iter().map(|w| w / sum).collect()
             }
@@ -319,8 +329,19 @@ fn weighted_sum<const HALF: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::{SsimReference, SsimWindow};
+    use super::{GAUSSIAN_WEIGHTS, SsimReference, SsimWindow};
     use crate::raster::Mask;
+
+    #[test]
+    fn weights_of_the_gaussian_follow_its_formula() {
+        for (distance, weight) in GAUSSIAN_WEIGHTS.into_iter().enumerate() {
+            let exact = (-((distance * distance) as f64) / (2.0 * 1.5 * 1.5)).exp();
+            assert!(
+                (weight - exact).abs() <= f64::EPSILON / 2.0 * exact,
+                "{distance}"
+            );
+        }
+    }
 
     /// Returns two masks that are easy to rebuild in another language: a disc and a rotated box, both with holes.
     fn reference_masks() -> (Mask, Mask) {
