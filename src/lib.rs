@@ -146,22 +146,23 @@
 //! | `domain` | ids, stages, job states, transforms, outcomes, verdicts | |
 //! | `simd` | runtime dispatch to the widest vector instructions of the processor | |
 //! | `raster` | grids, masks, depth maps, print images, warps; decoders of PNG, JPEG, TIFF | `domain`, `simd` |
+//! | `platform` | operations that differ between operating systems: identity of files, syncing, signals | |
 //! | `page_vec` | vectors on huge pages with a cache of freed pages | |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
-//! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain` |
+//! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
-//! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
-//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint` |
-//! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint` |
+//! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster`, `platform` |
+//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint`, `platform` |
+//! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
 //! | `view` | the page that shows one scan on its print in 3D | `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
-//! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner` |
+//! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner`, `platform` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
 //!
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;

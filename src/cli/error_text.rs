@@ -287,7 +287,7 @@ mod tests {
         assert!(is_damage(found));
         let text = explain_catalog(found, Path::new("nowhere")).expect("a sentence");
         assert!(
-            text.contains("nowhere/catalog.sqlite") && text.contains("`check`"),
+            text.replace('\\', "/").contains("nowhere/catalog.sqlite") && text.contains("`check`"),
             "{text}"
         );
         let plain = CatalogError::Missing("p/catalog.sqlite".into());

@@ -181,7 +181,7 @@ mod tests {
         }
         let found = foreign_entry(dir.path()).expect("readable")?;
         let below = found.strip_prefix(dir.path()).expect("below");
-        Some(below.to_string_lossy().into_owned())
+        Some(below.to_string_lossy().replace('\\', "/"))
     }
 
     #[test]

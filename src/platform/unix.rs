@@ -84,6 +84,11 @@ pub(crate) fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
+/// Returns `false`: only Windows names the shares of other machines in paths.
+pub(crate) const fn is_share(_folder: &Path) -> bool {
+    false
+}
+
 /// Returns the absolute path with all links resolved.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io;
 use std::os::windows::fs::{MetadataExt as _, OpenOptionsExt as _};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf, Prefix};
 
 use tokio::signal::windows::{ctrl_break, ctrl_c, ctrl_close, ctrl_shutdown};
 use tokio::task::JoinHandle;
@@ -72,6 +72,18 @@ pub(crate) const fn device_number(_path: &Path) -> Option<DeviceNumber> {
 /// Returns `None`: Windows does not number its file systems.
 pub(crate) const fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
+}
+
+/// Returns whether a folder is on a share of another machine, as in `\\server\share`. The resolved path of a drive letter
+/// that stands for a share names the share.
+pub(crate) fn is_share(folder: &Path) -> bool {
+    let whole = std::fs::canonicalize(folder).or_else(|_| std::path::absolute(folder));
+    let first = whole
+        .as_ref()
+        .ok()
+        .and_then(|path| path.components().next());
+    matches!(first, Some(Component::Prefix(prefix))
+        if matches!(prefix.kind(), Prefix::UNC(..) | Prefix::VerbatimUNC(..)))
 }
 
 /// Returns the absolute path with all links resolved. A short path has its usual form, without `\\?\`.

@@ -102,6 +102,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_name_of_the_greatest_length_can_be_written() {
         let dir = tempfile::tempdir().expect("a temporary directory");

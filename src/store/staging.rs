@@ -252,9 +252,11 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let longest = dir.path().join("a".repeat(255));
         drop(StagingFolder::beside(&longest).expect("a folder"));
-        let too_long = StagingFolder::beside(&dir.path().join("a".repeat(256)));
-        let error = too_long.expect_err("no such file can exist").to_string();
-        assert!(error.contains("name too long"), "{error}");
+        if cfg!(unix) {
+            let too_long = StagingFolder::beside(&dir.path().join("a".repeat(256)));
+            let error = too_long.expect_err("no such file can exist").to_string();
+            assert!(error.contains("name too long"), "{error}");
+        }
         assert_eq!(count(dir.path()), 0);
     }
 }

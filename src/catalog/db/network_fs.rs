@@ -1,9 +1,9 @@
 //! Detects network file systems. The write-ahead log needs shared memory, which does not work on them.
 
-use std::path::{Component, Path, Prefix};
+use std::path::Path;
 
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::platform::{DeviceNumber, device_number, file_system_magic};
+use crate::platform::{DeviceNumber, device_number, file_system_magic, is_share};
 
 /// Number (`f_type`) and name of each network file system, from statfs(2) and the kernel's `magic.h`.
 const MAGICS: [(u64, &str); 20] = [
@@ -59,15 +59,6 @@ fn found(dir: &Path) -> Option<&'static str> {
     let magic = file_system_magic(dir)?;
     let mount = (magic == FUSE).then(|| mount_type(dir)).flatten();
     network_kind(magic, mount.as_deref())
-}
-
-/// Returns whether a folder is below a share of another machine, as in `\\server\share`. Shares with a drive letter are not
-/// recognized. No path on Unix has such a prefix.
-fn is_share(dir: &Path) -> bool {
-    let dir = std::path::absolute(dir);
-    let first = dir.as_ref().ok().and_then(|dir| dir.components().next());
-    matches!(first, Some(Component::Prefix(prefix))
-        if matches!(prefix.kind(), Prefix::UNC(..) | Prefix::VerbatimUNC(..)))
 }
 
 /// Returns the file system type of a directory in the mount table.
