@@ -165,6 +165,14 @@ pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
+/// Renames a file or folder; replaces an existing file atomically.
+///
+/// # Errors
+/// Returns an error if the system refuses it.
+pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    std::fs::rename(from, to)
+}
+
 /// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
 #[cfg(target_os = "linux")]
 pub(crate) fn exchange(one: &Path, other: &Path) -> bool {

@@ -5,6 +5,7 @@ use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io;
 use std::os::windows::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Component, Path, PathBuf, Prefix};
+use std::time::Duration;
 
 use tokio::signal::windows::{ctrl_break, ctrl_c, ctrl_close, ctrl_shutdown};
 use tokio::task::JoinHandle;
@@ -15,8 +16,13 @@ use super::{DeviceNumber, FileId, FileStat};
 const FOLDERS_TOO: u32 = 0x0200_0000;
 /// Opens a link instead of its target (`FILE_FLAG_OPEN_REPARSE_POINT` of `CreateFileW`).
 const LINK_ITSELF: u32 = 0x0020_0000;
+/// Number of attempts to rename a file that is in use, before the last one.
+const RENAME_ATTEMPTS: u32 = 200;
+const RETRY_RENAME_AFTER: Duration = Duration::from_millis(5);
 const ERROR_INVALID_FUNCTION: i32 = 1;
 const ERROR_TOO_MANY_OPEN_FILES: i32 = 4;
+const ERROR_ACCESS_DENIED: i32 = 5;
+const ERROR_SHARING_VIOLATION: i32 = 32;
 const ERROR_LOCK_VIOLATION: i32 = 33;
 const ERROR_NOT_SUPPORTED: i32 = 50;
 
@@ -161,6 +167,28 @@ pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Renames a file or folder; replaces an existing file atomically. Tries again for a second while another program has
+/// the file or a file in the folder open, such as a virus scanner.
+///
+/// # Errors
+/// Returns an error if the system refuses it.
+pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    for _ in 0..RENAME_ATTEMPTS {
+        match std::fs::rename(from, to) {
+            Err(error) if is_in_use(&error) => std::thread::sleep(RETRY_RENAME_AFTER),
+            renamed => return renamed,
+        }
+    }
+    std::fs::rename(from, to)
+}
+
+fn is_in_use(error: &io::Error) -> bool {
+    matches!(
+        error.raw_os_error(),
+        Some(ERROR_ACCESS_DENIED | ERROR_SHARING_VIOLATION)
+    )
 }
 
 /// Returns `false`: Windows cannot swap two folders.

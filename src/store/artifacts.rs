@@ -13,6 +13,7 @@ use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
 use super::parent_folder::{parent_folder, sync_folder};
 use crate::domain::{ArtifactRef, ContentHash};
+use crate::platform::rename;
 
 /// An artifact that is not on disk yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -239,7 +240,7 @@ impl Project {
         let outcome = written
             .and_then(|()| {
                 on_written();
-                std::fs::rename(&temporary, path)
+                rename(&temporary, path)
             })
             .map_err(ArtifactError::io(path));
         if outcome.is_err() {

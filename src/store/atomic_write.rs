@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
-use crate::platform::{canonicalize, sync_file};
+use crate::platform::{canonicalize, rename, sync_file};
 
 /// Name of the new file in its staging folder.
 const NEW: &str = "new";
@@ -61,7 +61,7 @@ pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     if let Some(earlier) = metadata(path)? {
         std::fs::set_permissions(partial, earlier.permissions())?;
     }
-    std::fs::rename(partial, path)?;
+    rename(partial, path)?;
     sync_folder(&parent_folder(path)).map_err(|error| {
         let text = format!("the file is complete, but the disk did not confirm its name: {error}");
         std::io::Error::new(error.kind(), text)

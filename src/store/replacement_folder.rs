@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
 use super::target_lock::{TargetLock, TargetLockError};
-use crate::platform::{canonicalize, exchange, sync_tree};
+use crate::platform::{canonicalize, exchange, rename, sync_tree};
 
 /// The new content in the staging folder.
 const NEW: &str = "new";
@@ -80,7 +80,7 @@ impl ReplacementFolder {
             let earlier = stale.path().join(EARLIER);
             let is_displaced = exists(&earlier).and_then(|is| Ok(is && !exists(&target)?));
             if is_displaced.map_err(at(&target))? {
-                fs::rename(&earlier, &target).map_err(at(&earlier))?;
+                rename(&earlier, &target).map_err(at(&earlier))?;
             }
         }
         let staging = StagingFolder::beside(&target).map_err(at(&target))?;
@@ -118,12 +118,12 @@ impl ReplacementFolder {
         } = self;
         sync_tree(&new).map_err(at(&target))?;
         if !exists(&target).map_err(at(&target))? {
-            fs::rename(&new, &target).map_err(at(&target))?;
+            rename(&new, &target).map_err(at(&target))?;
         } else if !exchange(&new, &target) {
             let earlier = staging.path().join(EARLIER);
-            fs::rename(&target, &earlier).map_err(at(&target))?;
-            if let Err(source) = fs::rename(&new, &target) {
-                if fs::rename(&earlier, &target).is_ok() {
+            rename(&target, &earlier).map_err(at(&target))?;
+            if let Err(source) = rename(&new, &target) {
+                if rename(&earlier, &target).is_ok() {
                     return Err(at(&target)(source));
                 }
                 staging.keep();
