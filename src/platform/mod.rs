@@ -5,6 +5,11 @@
 #[cfg(unix)]
 mod unix;
 #[cfg(windows)]
+#[allow(
+    clippy::unnecessary_wraps,
+    clippy::needless_pass_by_value,
+    reason = "the signatures are those of `unix.rs`"
+)]
 mod windows;
 
 #[cfg(unix)]
