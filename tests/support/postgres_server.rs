@@ -76,12 +76,7 @@ impl Server {
         };
         let dir = tempfile::Builder::new().prefix("mocban-pg-").tempdir();
         let dir = dir.expect("a temporary directory").keep();
-        let mut user = "";
-        if rustix::process::geteuid().is_root() {
-            let nobody = Some(65534);
-            std::os::unix::fs::chown(&dir, nobody, nobody).expect("root may change the owner");
-            user = "setpriv --reuid=65534 --regid=65534 --clear-groups";
-        }
+        let user = other_user(&dir);
         // It ends with this process, so nobody waits for it.
         #[allow(clippy::zombie_processes, reason = "the script ends with this process")]
         let mut script = Command::new("sh")
@@ -141,7 +136,27 @@ impl Server {
     }
 }
 
+/// Returns a command that changes the user if this process is root's, and gives the folder to that user.
+#[cfg(unix)]
+fn other_user(dir: &Path) -> &'static str {
+    if !rustix::process::geteuid().is_root() {
+        return "";
+    }
+    let nobody = Some(65534);
+    std::os::unix::fs::chown(dir, nobody, nobody).expect("root may change the owner");
+    "setpriv --reuid=65534 --regid=65534 --clear-groups"
+}
+
+#[cfg(not(unix))]
+const fn other_user(_dir: &Path) -> &'static str {
+    ""
+}
+
+/// Returns the folder of the server's programs. On Windows, the script would need a shell, so there is none.
 fn programs() -> Option<PathBuf> {
+    if cfg!(windows) {
+        return None;
+    }
     let path = std::env::var_os("PATH").unwrap_or_default();
     let folders = std::env::split_paths(&path).collect::<Vec<_>>();
     let folders = folders.iter().map(PathBuf::as_path);
