@@ -26,7 +26,7 @@ pub(super) struct Options {
     /// Program of benches/peers-queue to compare with
     #[arg(long, value_name = "FILE")]
     pub(super) peer: Option<PathBuf>,
-    /// Address of a PostgreSQL database, such as postgres://me@localhost/bench: measures only that
+    /// Address of a PostgreSQL database, such as `postgres://me@localhost/bench`: measures only that
     #[arg(long, value_name = "URL")]
     pub(super) postgres: Option<String>,
     /// Pairs of the demo that are run with real stages, for the catalog's share; 0 for none [default: 12, and none

@@ -1,5 +1,6 @@
 //! Statements that store finished stages if the lease is still valid.
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::catalog::db::dialect::Sql;
@@ -9,7 +10,9 @@ use crate::catalog::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
-use crate::domain::{JobStatus, PairId, Stage, ThresholdMetric};
+use crate::domain::{
+    ContentHash, JobStatus, MetricOutcome, PairId, Stage, ThresholdMetric, WorkerId,
+};
 use crate::failpoint::{self, Point};
 
 /// A lease, and the finished stages to store under it, in the order they were computed.
@@ -44,14 +47,14 @@ WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.tok
 RETURNING job.pair, job.token",
 );
 
-/// Items: pair, index of the stage, worker, [`StageCheckpoint`].
+/// Items: [`ResultItem`].
 const RESULT: Sql = Sql::pair(
     "
 INSERT INTO stage_result
     (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
-SELECT value ->> 0, value ->> 1, value ->> 2, value ->> '$[3].fingerprint', unhex(value ->> '$[3].mesh_hash'),
-    unhex(value ->> '$[3].print_hash'), value ->> '$[3].attributes', value ->> '$[3].outcome', value -> '$[3].files',
-    unhex(value ->> '$[3].result_hash'), value ->> '$[3].ms', value ->> '$[3].at'
+SELECT value ->> 'pair', value ->> 'index', value ->> 'worker', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
+    unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'outcome', value -> 'files',
+    unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'at'
 FROM jsonb_each(?) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
@@ -59,13 +62,13 @@ ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh
     "
 INSERT INTO stage_result
     (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
-SELECT DISTINCT ON (1, 2) CAST(item.value ->> 0 AS bigint), CAST(item.value ->> 1 AS bigint),
-    CAST(item.value ->> 2 AS bigint), r.fingerprint, decode(r.mesh_hash, 'hex'), decode(r.print_hash, 'hex'),
-    r.attributes, r.outcome, CAST(r.files AS text), decode(r.result_hash, 'hex'), r.ms, r.at
-FROM json_array_elements(CAST(? AS json)) WITH ORDINALITY AS item (value, position),
-    json_to_record(item.value -> 3) AS r (fingerprint bigint, mesh_hash text, print_hash text, attributes text,
-        outcome text, files json, result_hash text, ms bigint, at bigint)
-ORDER BY 1, 2, item.position DESC
+SELECT DISTINCT ON (r.pair, r.index) r.pair, r.index, r.worker, r.fingerprint, decode(r.mesh_hash, 'hex'),
+    decode(r.print_hash, 'hex'), r.attributes, r.outcome, CAST(r.files AS text), decode(r.result_hash, 'hex'), r.ms, r.at
+FROM ROWS FROM (json_to_recordset(CAST(? AS json)) AS (pair bigint, index bigint, worker bigint, fingerprint bigint,
+        mesh_hash text, print_hash text, attributes text, outcome text, files json, result_hash text, ms bigint, at bigint))
+    WITH ORDINALITY AS r (pair, index, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files,
+        result_hash, ms, at, position)
+ORDER BY r.pair, r.index, r.position DESC
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
@@ -76,39 +79,39 @@ const CLEAR_METRICS: Sql = Sql::pair(
     "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
     "
-DELETE FROM metric_result WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json)))",
+DELETE FROM metric_result WHERE pair = ANY (ARRAY(
+    SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json))))",
 );
 
-/// Items: pair, outcome of the metric, hash of its result.
+/// Items: [`MetricItem`].
 const METRICS: Sql = Sql::pair(
     "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
      missing_wood, margin, confidence, at_bound, result_hash)
-SELECT value ->> 0, value ->> '$[1].metric', value ->> '$[1].threshold_level',
-    value ->> '$[1].threshold_depth', value -> '$[1].print_from_depth', value ->> '$[1].angle_deg',
-    value ->> '$[1].scale', value ->> '$[1].shift_px[0]', value ->> '$[1].shift_px[1]',
-    value ->> '$[1].scores.ssim', value ->> '$[1].scores.nl_ssim', value ->> '$[1].scores.iou',
-    value ->> '$[1].scores.iou_box', value ->> '$[1].scores.dice', value ->> '$[1].scores.density_print',
-    value ->> '$[1].scores.density_depth', value ->> '$[1].disagreement.pieces',
-    value ->> '$[1].disagreement.missing_ink', value ->> '$[1].disagreement.missing_wood',
-    value ->> '$[1].margin', value ->> '$[1].confidence', value ->> '$[1].at_bound', unhex(value ->> 2)
+SELECT value ->> 'pair', value ->> 'metric', value ->> 'threshold_level',
+    value ->> 'threshold_depth', value -> 'print_from_depth', value ->> 'angle_deg',
+    value ->> 'scale', value ->> '$.shift_px[0]', value ->> '$.shift_px[1]',
+    value ->> '$.scores.ssim', value ->> '$.scores.nl_ssim', value ->> '$.scores.iou',
+    value ->> '$.scores.iou_box', value ->> '$.scores.dice', value ->> '$.scores.density_print',
+    value ->> '$.scores.density_depth', value ->> '$.disagreement.pieces',
+    value ->> '$.disagreement.missing_ink', value ->> '$.disagreement.missing_wood',
+    value ->> 'margin', value ->> 'confidence', value ->> 'at_bound', unhex(value ->> 'hash')
 FROM jsonb_each(?)",
     "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
      missing_wood, margin, confidence, at_bound, result_hash)
-SELECT CAST(item.value ->> 0 AS bigint), m.metric, m.threshold_level, m.threshold_depth,
-    CAST(m.print_from_depth AS text), m.angle_deg, m.scale,
+SELECT m.pair, m.metric, m.threshold_level, m.threshold_depth, CAST(m.print_from_depth AS text), m.angle_deg, m.scale,
     CAST(m.shift_px ->> 0 AS double precision), CAST(m.shift_px ->> 1 AS double precision),
     s.ssim, s.nl_ssim, s.iou, s.iou_box, s.dice, s.density_print, s.density_depth,
-    d.pieces, d.missing_ink, d.missing_wood, m.margin, m.confidence, CAST(m.at_bound AS int), decode(item.value ->> 2, 'hex')
-FROM json_array_elements(CAST(? AS json)) AS item (value),
-    json_to_record(item.value -> 1) AS m (metric text, threshold_level bigint, threshold_depth double precision,
-        print_from_depth json, angle_deg double precision, scale double precision, shift_px json, scores json,
-        disagreement json, margin double precision, confidence double precision, at_bound boolean),
+    d.pieces, d.missing_ink, d.missing_wood, m.margin, m.confidence, CAST(m.at_bound AS int), decode(m.hash, 'hex')
+FROM json_to_recordset(CAST(? AS json)) AS m (pair bigint, metric text, threshold_level bigint,
+        threshold_depth double precision, print_from_depth json, angle_deg double precision, scale double precision,
+        shift_px json, scores json, disagreement json, margin double precision, confidence double precision,
+        at_bound boolean, hash text),
     json_to_record(m.scores) AS s (ssim double precision, nl_ssim double precision, iou double precision,
         iou_box double precision, dice double precision, density_print double precision, density_depth double precision),
     json_to_record(m.disagreement) AS d (pieces bigint, missing_ink double precision, missing_wood double precision)",
@@ -125,30 +128,32 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 
     CAST(value ->> 3 AS bigint), CAST(value ->> 4 AS bigint) FROM json_array_elements(CAST(? AS json))",
 );
 
-/// Updates the input files of pairs. Items: pair, [`InputVersions`].
+/// Updates the input files of pairs. Items: see [`input_item`].
 pub(crate) const UPDATE_INPUTS: Sql = Sql::pair(
     "
 UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
     print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
 FROM (
-    SELECT value ->> 0 AS id, unhex(value ->> '$[1].mesh.hash') AS mesh_hash, value ->> '$[1].mesh.stat' AS mesh_stat,
-        unhex(value ->> '$[1].print.hash') AS print_hash, value ->> '$[1].print.stat' AS print_stat FROM jsonb_each(?)) AS new
+    SELECT value ->> 'pair' AS id, unhex(value ->> 'mesh_hash') AS mesh_hash, value ->> 'mesh_stat' AS mesh_stat,
+        unhex(value ->> 'print_hash') AS print_hash, value ->> 'print_stat' AS print_stat FROM jsonb_each(?)) AS new
 WHERE pair.id = new.id AND (pair.mesh_hash IS NOT new.mesh_hash OR pair.mesh_stat IS NOT new.mesh_stat
     OR pair.print_hash IS NOT new.print_hash OR pair.print_stat IS NOT new.print_stat)",
     "
 UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
     print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
 FROM (
-    SELECT CAST(value ->> 0 AS bigint) AS id, decode(value -> 1 -> 'mesh' ->> 'hash', 'hex') AS mesh_hash,
-        value -> 1 -> 'mesh' ->> 'stat' AS mesh_stat, decode(value -> 1 -> 'print' ->> 'hash', 'hex') AS print_hash,
-        value -> 1 -> 'print' ->> 'stat' AS print_stat FROM json_array_elements(CAST(? AS json))) AS new
+    SELECT pair AS id, decode(mesh_hash, 'hex') AS mesh_hash, mesh_stat, decode(print_hash, 'hex') AS print_hash,
+        print_stat
+    FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, mesh_hash text, mesh_stat text, print_hash text,
+        print_stat text)) AS new
 WHERE pair.id = new.id AND (pair.mesh_hash IS DISTINCT FROM new.mesh_hash OR pair.mesh_stat IS DISTINCT FROM new.mesh_stat
     OR pair.print_hash IS DISTINCT FROM new.print_hash OR pair.print_stat IS DISTINCT FROM new.print_stat)",
 );
 
 const CLEAR_FAILURE: Sql = Sql::pair(
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
-    "DELETE FROM failure WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json)))",
+    "DELETE FROM failure WHERE pair = ANY (ARRAY(
+    SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json))))",
 );
 
 /// The statements of [`add_results`].
@@ -188,22 +193,37 @@ pub(crate) fn add_results<'i>(
         let stored = advanced.iter();
         stored.flat_map(|(lease, stages)| stages.iter().map(move |one| (lease, one)))
     };
-    let rows = |(lease, one): (&Lease, &'i StageCheckpoint)| {
-        (lease.pair, one.stage.index(), lease.worker, one)
+    let rows = |(lease, one): (&Lease, &'i StageCheckpoint)| ResultItem {
+        pair: lease.pair,
+        index: one.stage.index(),
+        worker: lease.worker,
+        result: one,
     };
     script.execute_over(RESULT, each().map(rows))?;
     let attempts = each().map(rows);
-    let attempts = attempts.map(|(pair, stage, worker, one)| (pair, stage, worker, one.ms, one.at));
+    let attempts = attempts.map(|row| {
+        (
+            row.pair,
+            row.index,
+            row.worker,
+            row.result.ms,
+            row.result.at,
+        )
+    });
     script.execute_over(ATTEMPT, attempts)?;
     let uncleared = advanced.iter().filter(|(lease, _)| !lease.cleared);
     script.execute_over(CLEAR_FAILURE, uncleared.map(|(lease, _)| [lease.pair]))?;
     let metrics = || {
         each().flat_map(|(lease, one)| {
             let metrics = one.metrics.iter();
-            metrics.map(|metric| (lease.pair, &metric.outcome, metric.result_hash))
+            metrics.map(|metric| MetricItem {
+                pair: lease.pair,
+                hash: metric.result_hash,
+                outcome: &metric.outcome,
+            })
         })
     };
-    script.execute_over(CLEAR_METRICS, metrics().map(|(pair, ..)| [pair]))?;
+    script.execute_over(CLEAR_METRICS, metrics().map(|metric| [metric.pair]))?;
     script.execute_over(METRICS, metrics())?;
     let inputs = advanced.iter().filter_map(|(lease, stages)| {
         // The last stage with inputs also lists the inputs of all earlier stages.
@@ -211,6 +231,34 @@ pub(crate) fn add_results<'i>(
         Some((lease.pair, inputs.find(|inputs| !inputs.is_empty())?))
     });
     add_inputs(script, inputs)
+}
+
+/// An item of [`RESULT`].
+#[derive(Serialize)]
+struct ResultItem<'i> {
+    pair: PairId,
+    index: usize,
+    worker: WorkerId,
+    #[serde(flatten)]
+    result: &'i StageCheckpoint,
+}
+
+/// An item of [`METRICS`].
+#[derive(Serialize)]
+struct MetricItem<'i> {
+    pair: PairId,
+    hash: ContentHash,
+    #[serde(flatten)]
+    outcome: &'i MetricOutcome,
+}
+
+/// Builds an item of [`UPDATE_INPUTS`].
+pub(crate) fn input_item((pair, inputs): (PairId, &InputVersions)) -> Value {
+    let (mesh, print) = (inputs.mesh.as_ref(), inputs.print.as_ref());
+    json!({
+        "pair": pair, "mesh_hash": mesh.map(|seen| seen.hash), "mesh_stat": mesh.map(|seen| &seen.stat),
+        "print_hash": print.map(|seen| seen.hash), "print_stat": print.map(|seen| &seen.stat),
+    })
 }
 
 /// Returns the counter key of a job after a stage is stored.
@@ -265,8 +313,6 @@ pub(crate) fn add_inputs<'a>(
     script: &mut Script,
     inputs: impl Iterator<Item = (PairId, &'a InputVersions)>,
 ) -> Result<()> {
-    script.execute_over(
-        UPDATE_INPUTS,
-        inputs.filter(|(_, inputs)| !inputs.is_empty()),
-    )
+    let known = inputs.filter(|(_, inputs)| !inputs.is_empty());
+    script.execute_over(UPDATE_INPUTS, known.map(input_item))
 }

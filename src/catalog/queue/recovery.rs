@@ -9,7 +9,7 @@ use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
-use crate::catalog::queue::checkpoint::UPDATE_INPUTS;
+use crate::catalog::queue::checkpoint::{UPDATE_INPUTS, input_item};
 use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::queue::lease::InputVersions;
 use crate::catalog::{Catalog, Result};
@@ -110,9 +110,9 @@ INSERT INTO attempt (pair, stage, worker, class, message, at)
 SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), CAST(value ->> 'worker' AS bigint), value ->> 'class', value ->> 'message', CAST(value ->> 'at' AS bigint) FROM json_each(?1)";
 
 const FATAL_INPUTS: &str = "
-UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value -> 1 -> 'mesh' ->> 'hash')),
-    print_hash = coalesce(failure.print_hash, unhex(item.value -> 1 -> 'print' ->> 'hash'))
-FROM json_each(?) AS item WHERE failure.pair = CAST(item.value ->> 0 AS bigint)";
+UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 'mesh_hash')),
+    print_hash = coalesce(failure.print_hash, unhex(item.value ->> 'print_hash'))
+FROM json_each(?) AS item WHERE failure.pair = CAST(item.value ->> 'pair' AS bigint)";
 
 /// A row of [`RECOVER`] or [`OVERDUE`].
 struct RecoveredJob {
@@ -164,8 +164,12 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
-                script.execute_over(UPDATE_INPUTS, seen.iter())?;
-                script.execute_over(FATAL_INPUTS, seen.iter())?;
+                let items = || {
+                    seen.iter()
+                        .map(|(pair, inputs)| input_item((*pair, inputs)))
+                };
+                script.execute_over(UPDATE_INPUTS, items())?;
+                script.execute_over(FATAL_INPUTS, items())?;
                 script.run(conn).await?;
                 Ok(())
             })
