@@ -54,6 +54,19 @@
 //! text of a cell).
 //! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
+//! ## Two databases
+//!
+//! The catalog is a file of SQLite, or in PostgreSQL so that several computers can share it. `db/conn.rs` holds a connection
+//! to either, `db/query.rs` and `db/script.rs` run statements, and `db/value.rs` and `db/row.rs` read values, the same for
+//! both. Most statements have one text: `db/dialect.rs` translates it, and `migrations/postgres` creates the functions of
+//! SQLite that it uses. The statements of claims and checkpoints have two. All writes except group commits hold one lock,
+//! so they run one after another in both databases. Every test of the catalog runs on both.
+//!
+//! If the server is away, the writer task connects again and repeats its commit (`db/write_connection.rs`). What an earlier
+//! attempt had stored, although its answer was lost, is found by the fencing token and the position of the job; leases of
+//! which this process never heard are found too (`db/known_leases.rs`). Reads and other writes of a run are repeated by
+//! `Catalog::patiently`. `runner/run_guard.rs` keeps runs with other settings apart.
+//!
 //! ## A lost lease
 //!
 //! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the
@@ -154,7 +167,7 @@
 //! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
 //! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster`, `platform` |
-//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint`, `platform` |
+//! | `catalog` | SQLite or PostgreSQL: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint`, `platform` |
 //! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
