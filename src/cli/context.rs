@@ -14,7 +14,7 @@ use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
 use crate::catalog::{Catalog, has_password};
-use crate::config::{BaseLayer, Loaded, Sources, load};
+use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
 use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE};
@@ -164,7 +164,8 @@ impl Context {
                 let url = settings.config.storage.catalog;
                 Ok(Some(url).filter(|url| !url.is_empty()))
             }
-            Err(_) if self.dir().join(CATALOG_FILE).exists() => Ok(None),
+            // Commands that need no settings work with invalid ones, but not with a file that cannot be read.
+            Err(error) if self.dir().join(CATALOG_FILE).exists() && !is_unread(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
@@ -225,6 +226,11 @@ impl Context {
     pub(super) fn program_with(&self, tail: &str) -> String {
         format!("{} {tail}", self.program)
     }
+}
+
+/// Returns whether the settings could not be read.
+fn is_unread(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(ConfigError::Read { .. }))
 }
 
 /// Refuses an address of PostgreSQL with a password, which other users of the machine could read.

@@ -88,6 +88,21 @@ impl CatalogError {
         self.kind() == Some(CatalogErrorKind::Away)
     }
 
+    /// Returns whether a statement that this connection prepared is unknown, because a connection pooler has changed the
+    /// connection to the server.
+    pub fn is_of_pooler(&self) -> bool {
+        match self {
+            Self::Database(error) => {
+                let code = error
+                    .as_database_error()
+                    .and_then(sqlx::error::DatabaseError::code);
+                matches!(code.as_deref(), Some("26000" | "42P05"))
+            }
+            Self::Shared(error) => error.is_of_pooler(),
+            _ => false,
+        }
+    }
+
     /// Returns whether a database server reported the error.
     pub fn is_of_server(&self) -> bool {
         match self {

@@ -227,19 +227,22 @@ pub(crate) fn without_password(url: &str) -> String {
 
 /// Describes why a connection failed, with what to do.
 fn connection_error(error: &sqlx::Error) -> String {
-    let code = error
-        .as_database_error()
-        .and_then(sqlx::error::DatabaseError::code);
-    match code.as_deref() {
+    let Some(refused) = error.as_database_error() else {
+        return match CatalogErrorKind::of(error) {
+            Some(CatalogErrorKind::Away) => {
+                format!("{error}; check the host, the port and that PostgreSQL runs")
+            }
+            _ => error.to_string(),
+        };
+    };
+    let text = refused.message();
+    match refused.code().as_deref() {
         Some("28P01" | "28000") => {
-            format!("{error}; check the user and the password in ~/.pgpass or PGPASSWORD")
+            format!("{text}; check the user and the password in ~/.pgpass or PGPASSWORD")
         }
-        Some("3D000") => format!("{error}; create it with `createdb`, or correct the address"),
-        Some("53300") => format!("{error}; close other programs, or raise max_connections"),
-        None if CatalogErrorKind::of(error) == Some(CatalogErrorKind::Away) => {
-            format!("{error}; check the host, the port and that PostgreSQL runs")
-        }
-        Some(_) | None => error.to_string(),
+        Some("3D000") => format!("{text}; create it with `createdb`, or correct the address"),
+        Some("53300") => format!("{text}; close other programs, or raise max_connections"),
+        _ => text.to_owned(),
     }
 }
 
