@@ -65,7 +65,7 @@
 //! If the server is away, the writer task connects again and repeats its commit (`db/write_connection.rs`). What an earlier
 //! attempt had stored, although its answer was lost, is found by the fencing token and the position of the job; leases of
 //! which this process never heard are found too (`db/known_leases.rs`). Reads and other writes of a run are repeated by
-//! `Catalog::patiently`. `runner/run_guard.rs` keeps runs with other settings apart.
+//! `Catalog::retry_while_unavailable`. `runner/run_guard.rs` keeps runs with other settings apart.
 //!
 //! ## A lost lease
 //!

@@ -10,9 +10,9 @@ use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
-use crate::catalog::db::patience::Patience;
-use crate::catalog::db::postgres::PostgresPlace;
+use crate::catalog::db::postgres::PostgresAddress;
 use crate::catalog::db::request::{Message, Reply};
+use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::db::write_connection::{Work, WriteConnection};
 use crate::catalog::db::writer;
 
@@ -34,7 +34,7 @@ pub struct Catalog {
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
     /// Whether this process waits for a server that is away.
-    pub(crate) patience: Arc<Patience>,
+    pub(crate) retry_wait: Arc<RetryWait>,
     /// Path of the file, or the URL of a PostgreSQL catalog without the password.
     pub(crate) path: Arc<Path>,
 }
@@ -57,7 +57,7 @@ impl Catalog {
             readers: ReaderPool::Sqlite(open::reader_pool(path).await?),
             inbox: None,
             delay: CommitDelay::new(),
-            patience: Arc::default(),
+            retry_wait: Arc::default(),
             path: path.into(),
         })
     }
@@ -88,12 +88,12 @@ impl Catalog {
         may_create: bool,
         delay: Arc<CommitDelay>,
     ) -> Result<Self> {
-        let place = PostgresPlace::parse(url)?;
-        let conn = place.connect(may_create).await?;
-        let readers = ReaderPool::Postgres(place.reader_pool().await?);
-        let patience: Arc<Patience> = Arc::default();
-        let writer = WriteConnection::to_server(conn, place, Arc::clone(&patience));
-        Ok(Self::start(readers, writer, delay, patience))
+        let address = PostgresAddress::parse(url)?;
+        let conn = address.connect(may_create).await?;
+        let readers = ReaderPool::Postgres(address.reader_pool().await?);
+        let retry_wait: Arc<RetryWait> = Arc::default();
+        let writer = WriteConnection::to_server(conn, address, Arc::clone(&retry_wait));
+        Ok(Self::start(readers, writer, delay, retry_wait))
     }
 
     /// Opens the catalog at a URL of PostgreSQL read-only.
@@ -101,13 +101,13 @@ impl Catalog {
     /// # Errors
     /// As for [`Self::connect`].
     pub async fn connect_read_only(url: &str) -> Result<Self> {
-        let place = PostgresPlace::parse(url)?;
+        let address = PostgresAddress::parse(url)?;
         Ok(Self {
-            readers: ReaderPool::Postgres(place.reader_pool().await?),
+            readers: ReaderPool::Postgres(address.reader_pool().await?),
             inbox: None,
             delay: CommitDelay::new(),
-            patience: Arc::default(),
-            path: Path::new(&place.text()).into(),
+            retry_wait: Arc::default(),
+            path: Path::new(&address.text()).into(),
         })
     }
 
@@ -116,7 +116,7 @@ impl Catalog {
         readers: ReaderPool,
         writer: WriteConnection,
         delay: Arc<CommitDelay>,
-        patience: Arc<Patience>,
+        retry_wait: Arc<RetryWait>,
     ) -> Self {
         let (sender, inbox) = mpsc::channel(INBOX);
         let path = Arc::clone(&writer.path);
@@ -125,7 +125,7 @@ impl Catalog {
             readers,
             inbox: Some(sender),
             delay,
-            patience,
+            retry_wait,
             path,
         }
     }

@@ -14,12 +14,12 @@ mod new_catalog;
 mod query_plans;
 mod queue;
 mod records;
+mod retry;
 #[cfg(test)]
 mod test_helpers;
 #[cfg(test)]
 mod tests;
 mod transfer;
-mod waiting;
 // The same tests on PostgreSQL.
 #[cfg(test)]
 #[path = "tests/mod.rs"]

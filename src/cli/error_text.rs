@@ -195,10 +195,12 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             "{path}: the disk reported an error ({}), or another program changed the catalog's files; check the disk, then run `check`",
             root_cause(error)
         ),
-        Some(CatalogErrorKind::Away) if matches!(error, CatalogError::NotConnected { .. }) => {
+        Some(CatalogErrorKind::Unavailable)
+            if matches!(error, CatalogError::NotConnected { .. }) =>
+        {
             return None;
         }
-        Some(CatalogErrorKind::Away) => format!(
+        Some(CatalogErrorKind::Unavailable) => format!(
             "the catalog's database server cannot be reached ({}); check that it runs, then start the command again: nothing stored is lost",
             root_cause(error)
         ),

@@ -21,7 +21,8 @@ pub(super) async fn store_changes(
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
     let read = async |after| {
-        let page = catalog.patiently(async || catalog.known_inputs(after, PAGE, among).await);
+        let page = catalog
+            .retry_while_unavailable(async || catalog.known_inputs(after, PAGE, among).await);
         page.await
     };
     let mut page = read(None).await?;
@@ -37,7 +38,8 @@ pub(super) async fn store_changes(
         let (changed, next) = tokio::join!(read_each(compared.collect(), limits), read(after));
         let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
         if !changed.is_empty() {
-            let stored = catalog.patiently(async || catalog.store_inputs(changed.clone()).await);
+            let stored = catalog
+                .retry_while_unavailable(async || catalog.store_inputs(changed.clone()).await);
             stored.await?;
         }
         page = next?;
@@ -57,8 +59,9 @@ pub(super) async fn store_inputs_of_quarantined(
         return Ok(());
     }
     let among = PairSelection::of(pairs);
-    let known =
-        catalog.patiently(async || catalog.known_inputs(None, pairs.len(), Some(&among)).await);
+    let known = catalog.retry_while_unavailable(async || {
+        catalog.known_inputs(None, pairs.len(), Some(&among)).await
+    });
     let known = known.await?;
     let unread = known.into_iter().map(|known| UnreadInputs {
         project: project.clone(),
@@ -66,7 +69,8 @@ pub(super) async fn store_inputs_of_quarantined(
     });
     let inputs = read_each(unread.collect(), limits).await;
     let inputs: Vec<_> = inputs.into_iter().flatten().collect();
-    let stored = catalog.patiently(async || catalog.record_poisoned_inputs(inputs.clone()).await);
+    let stored = catalog
+        .retry_while_unavailable(async || catalog.record_poisoned_inputs(inputs.clone()).await);
     Ok(stored.await?)
 }
 

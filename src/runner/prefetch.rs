@@ -226,7 +226,7 @@ impl Prefetch {
             return Ok(());
         }
         let catalog = &context.catalog;
-        let works = catalog.patiently(async || catalog.work(&leases).await);
+        let works = catalog.retry_while_unavailable(async || catalog.work(&leases).await);
         let works = works.await?;
         let leased = self.estimate(leases.into_iter().zip(works)).await;
         self.queue.extend(leased);

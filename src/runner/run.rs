@@ -153,7 +153,8 @@ pub(super) async fn run_with(
     let counts = scheduler.run(&mut received, &mut on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let worker = scheduler.worker();
-    let ended = catalog.patiently(async || catalog.end_worker(worker, clock.now()).await);
+    let ended =
+        catalog.retry_while_unavailable(async || catalog.end_worker(worker, clock.now()).await);
     let ended = ended.await;
     given_up.abort();
     // A lost log explains other errors.
@@ -226,9 +227,10 @@ impl RunStart<'_> {
                 .requeue_stale(fingerprints, selection, options.rerun)
                 .await
         };
-        catalog.patiently(requeued).await?;
+        catalog.retry_while_unavailable(requeued).await?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        let ended = catalog.patiently(async || catalog.release_due_backoffs(now, longest).await);
+        let ended = catalog
+            .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
         Ok(())
     }

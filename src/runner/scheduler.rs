@@ -180,7 +180,8 @@ impl Scheduler {
         let until = self.context.until;
         let catalog = &self.context.catalog;
         let selection = self.selection.as_ref();
-        let left = catalog.patiently(async || catalog.outstanding(until, selection).await);
+        let left =
+            catalog.retry_while_unavailable(async || catalog.outstanding(until, selection).await);
         Ok(left.await?)
     }
 
@@ -244,7 +245,7 @@ impl Scheduler {
             let longest = policy::longest_backoff_ms();
             let catalog = &self.context.catalog;
             catalog
-                .patiently(async || catalog.release_due_backoffs(now, longest).await)
+                .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await)
                 .await?;
         }
         self.prefetch.expect_more();

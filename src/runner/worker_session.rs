@@ -77,11 +77,11 @@ impl WorkerSession {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let expired = self.worker;
         catalog
-            .patiently(async || catalog.end_worker(expired, now).await)
+            .retry_while_unavailable(async || catalog.end_worker(expired, now).await)
             .await?;
         let fingerprints = context.fingerprints;
         self.worker = catalog
-            .patiently(async || {
+            .retry_while_unavailable(async || {
                 catalog
                     .register_worker(this_process(), fingerprints, now)
                     .await
@@ -90,7 +90,7 @@ impl WorkerSession {
         self.last_heartbeat = now;
         let dead = DeadWorker::Workers(vec![expired]);
         catalog
-            .patiently(async || catalog.recover(dead.clone(), now).await)
+            .retry_while_unavailable(async || catalog.recover(dead.clone(), now).await)
             .await?;
         Ok(())
     }
@@ -99,13 +99,14 @@ impl WorkerSession {
     /// many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
-        let holders = catalog.patiently(async || catalog.lease_holders().await);
+        let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
         let holders = holders.await?;
         let dead = self.liveness.observe(&holders, self.worker, now);
         let (mut ready, mut poisoned) = (0, Vec::new());
         if !dead.is_empty() {
             let dead = DeadWorker::Workers(dead);
-            let recovered = catalog.patiently(async || catalog.recover(dead.clone(), now).await);
+            let recovered =
+                catalog.retry_while_unavailable(async || catalog.recover(dead.clone(), now).await);
             let recovered = recovered.await?;
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
@@ -113,8 +114,8 @@ impl WorkerSession {
         if holders.iter().any(|holder| holder.worker != self.worker) {
             let margin = context.timing.deadline_margin.as_millis() as i64;
             let me = self.worker;
-            let overdue =
-                catalog.patiently(async || catalog.recover_overdue(me, margin, now).await);
+            let overdue = catalog
+                .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await);
             let overdue = overdue.await?;
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);

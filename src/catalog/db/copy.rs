@@ -32,7 +32,7 @@ impl Catalog {
         // `VACUUM INTO` fails under `query_only`. The connection is taken out of the pool before this setting is turned
         // off, so that the pool keeps only read connections.
         let Conn::Sqlite(Held::Pooled(conn)) = self.read_conn().await? else {
-            return self.back_up_server(file, settings).await;
+            return self.back_up_from_server(file, settings).await;
         };
         let mut conn = conn.detach();
         sqlx::query("PRAGMA query_only = 0")
@@ -47,7 +47,7 @@ impl Catalog {
     }
 
     /// Like [`Self::back_up`], for a catalog in PostgreSQL.
-    async fn back_up_server(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
+    async fn back_up_from_server(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
         let copy = Self::create(file).await?;
         let copied = self.copy_to(&copy, |_, _| {}).await;
         copy.close().await;

@@ -92,14 +92,14 @@ pub enum CatalogError {
     #[error("{0}")]
     CatalogUrl(String),
     /// The PostgreSQL server cannot be reached, or refuses the connection.
-    #[error("cannot connect to {place}: {reason}")]
+    #[error("cannot connect to {address}: {reason}")]
     NotConnected {
         /// The address without the password.
-        place: String,
+        address: String,
         /// Why, with what to do.
         reason: String,
         /// Whether the server may answer later.
-        is_away: bool,
+        is_unavailable: bool,
     },
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]

@@ -22,7 +22,7 @@ pub enum CatalogErrorKind {
     /// An I/O error.
     Disk,
     /// The database server cannot be reached at the moment.
-    Away,
+    Unavailable,
     /// A write violated a constraint, or the counters disagree with the jobs.
     Contradiction,
     /// A statement failed. All statements are tested, so a check concludes that the schema or a stored JSON text is
@@ -51,7 +51,7 @@ impl CatalogErrorKind {
     pub(crate) fn of(error: &sqlx::Error) -> Option<Self> {
         let database = match error {
             sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut | sqlx::Error::Protocol(_) => {
-                return Some(Self::Away);
+                return Some(Self::Unavailable);
             }
             error => error.as_database_error()?,
         };
@@ -70,9 +70,9 @@ impl CatalogErrorKind {
             "25006" | "42501" => Self::ReadOnly,
             "53100" => Self::Full,
             "58030" => Self::Disk,
-            "57P01" | "57P02" | "57P03" | "25P03" | "53300" => Self::Away,
+            "57P01" | "57P02" | "57P03" | "25P03" | "53300" => Self::Unavailable,
             _ => match &code[..2] {
-                "08" => Self::Away,
+                "08" => Self::Unavailable,
                 "23" => Self::Contradiction,
                 "XX" => Self::Damaged,
                 "42" | "22" => Self::Statement,
@@ -84,8 +84,8 @@ impl CatalogErrorKind {
 
 impl CatalogError {
     /// Returns whether the database server cannot be reached at the moment.
-    pub fn is_away(&self) -> bool {
-        self.kind() == Some(CatalogErrorKind::Away)
+    pub fn is_unavailable(&self) -> bool {
+        self.kind() == Some(CatalogErrorKind::Unavailable)
     }
 
     /// Returns whether a statement that this connection prepared is unknown, because a connection pooler has changed the
@@ -122,7 +122,10 @@ impl CatalogError {
                 CatalogErrorKind::of(error)
             }
             Self::WrongCounters { .. } => Some(CatalogErrorKind::Contradiction),
-            Self::NotConnected { is_away: true, .. } => Some(CatalogErrorKind::Away),
+            Self::NotConnected {
+                is_unavailable: true,
+                ..
+            } => Some(CatalogErrorKind::Unavailable),
             Self::Shared(error) => error.kind(),
             _ => None,
         }

@@ -36,7 +36,7 @@ pub(crate) struct KnownLeases {
 }
 
 /// The state of a job.
-struct JobState {
+struct StoredJob {
     pair: i64,
     token: i64,
     stage: i64,
@@ -44,7 +44,7 @@ struct JobState {
     worker: Option<i64>,
 }
 
-from_row! { JobState { pair, token, stage, status, worker } }
+from_row! { StoredJob { pair, token, stage, status, worker } }
 
 impl KnownLeases {
     /// Notes that answers may have been lost.
@@ -98,8 +98,8 @@ pub(crate) async fn stored_before<'i>(
         return Ok(Vec::new());
     }
     let jobs = query_as(JOBS).bind(json_array(pairs)).fetch_all(conn);
-    let jobs: Vec<JobState> = jobs.await?;
-    let is_stored = |job: &JobState| {
+    let jobs: Vec<StoredJob> = jobs.await?;
+    let is_stored = |job: &StoredJob| {
         if let Some((lease, (stage, status))) = checkpoints.get(&job.pair) {
             let worker = (*status == JobStatus::Leased).then_some(lease.worker.0);
             return job.token == lease.token

@@ -27,12 +27,12 @@ static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
 
 /// Where a catalog is: a server, a database and a schema.
 #[derive(Debug, Clone)]
-pub(crate) struct PostgresPlace {
+pub(crate) struct PostgresAddress {
     options: PgConnectOptions,
     schema: String,
 }
 
-impl PostgresPlace {
+impl PostgresAddress {
     /// Parses a URL such as `postgres://user@host/database`. The password may also come from the environment variable
     /// `PGPASSWORD` or the file `.pgpass`.
     ///
@@ -77,7 +77,7 @@ impl PostgresPlace {
         Ok(Self { options, schema })
     }
 
-    /// Returns the place as text, without the password.
+    /// Returns the address as text, without the password.
     pub(crate) fn text(&self) -> String {
         let options = &self.options;
         let database = options.get_database().unwrap_or_default();
@@ -130,16 +130,16 @@ impl PostgresPlace {
             Err(sqlx::Error::Io(error))
         });
         let conn = connected.map_err(|error| CatalogError::NotConnected {
-            place: self.text(),
+            address: self.text(),
             reason: connection_error(&error),
-            is_away: CatalogErrorKind::of(&error) == Some(CatalogErrorKind::Away),
+            is_unavailable: CatalogErrorKind::of(&error) == Some(CatalogErrorKind::Unavailable),
         })?;
         let version = conn.server_version_num().unwrap_or(0) / 10_000;
         if version < OLDEST_SERVER {
             return Err(CatalogError::NotConnected {
-                place: self.text(),
+                address: self.text(),
                 reason: format!("it is PostgreSQL {version}; {OLDEST_SERVER} or later is needed"),
-                is_away: false,
+                is_unavailable: false,
             });
         }
         Ok(conn)
@@ -229,7 +229,7 @@ pub(crate) fn without_password(url: &str) -> String {
 fn connection_error(error: &sqlx::Error) -> String {
     let Some(refused) = error.as_database_error() else {
         return match CatalogErrorKind::of(error) {
-            Some(CatalogErrorKind::Away) => {
+            Some(CatalogErrorKind::Unavailable) => {
                 format!("{error}; check the host, the port and that PostgreSQL runs")
             }
             _ => error.to_string(),
@@ -248,7 +248,7 @@ fn connection_error(error: &sqlx::Error) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{PostgresPlace, without_password};
+    use super::{PostgresAddress, without_password};
 
     #[test]
     fn passwords_are_not_shown() {
@@ -259,23 +259,24 @@ mod tests {
         ] {
             assert!(!without_password(url).contains("cret"), "{url}");
         }
-        let place = PostgresPlace::parse("postgres://me:secret@localhost/lab").expect("a place");
+        let address =
+            PostgresAddress::parse("postgres://me:secret@localhost/lab").expect("an address");
         assert_eq!(
-            place.text(),
+            address.text(),
             "postgres://me@localhost:5432/lab?schema=mocban"
         );
     }
 
     #[test]
     fn connections_to_other_machines_are_encrypted() {
-        let refused = PostgresPlace::parse("postgres://me@db.example/lab?sslmode=disable");
+        let refused = PostgresAddress::parse("postgres://me@db.example/lab?sslmode=disable");
         assert!(
             refused
                 .expect_err("no encryption")
                 .to_string()
                 .contains("verify-full")
         );
-        PostgresPlace::parse("postgres://me@db.example/lab?sslmode=require").expect("encrypted");
-        PostgresPlace::parse("postgres://me@localhost/lab?sslmode=disable").expect("local");
+        PostgresAddress::parse("postgres://me@db.example/lab?sslmode=require").expect("encrypted");
+        PostgresAddress::parse("postgres://me@localhost/lab?sslmode=disable").expect("local");
     }
 }

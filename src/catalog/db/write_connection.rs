@@ -13,9 +13,9 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::known_leases::KnownLeases;
 use crate::catalog::db::log_watch::LogWatch;
-use crate::catalog::db::patience::Patience;
-use crate::catalog::db::postgres::{LOCK, PostgresPlace};
+use crate::catalog::db::postgres::{LOCK, PostgresAddress};
 use crate::catalog::db::query::query;
+use crate::catalog::db::retry_wait::RetryWait;
 
 /// Begins a transaction.
 pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
@@ -37,8 +37,8 @@ pub(crate) struct WriteConnection {
 
 /// The server of a catalog in PostgreSQL.
 struct Server {
-    place: PostgresPlace,
-    patience: Arc<Patience>,
+    address: PostgresAddress,
+    retry_wait: Arc<RetryWait>,
     leases: KnownLeases,
 }
 
@@ -57,16 +57,16 @@ impl WriteConnection {
     /// A connection to a server.
     pub(crate) fn to_server(
         conn: PgConnection,
-        place: PostgresPlace,
-        patience: Arc<Patience>,
+        address: PostgresAddress,
+        retry_wait: Arc<RetryWait>,
     ) -> Self {
         Self {
             conn: Conn::Postgres(Held::Owned(conn)),
-            path: Path::new(&place.text()).into(),
+            path: Path::new(&address.text()).into(),
             log: None,
             server: Some(Server {
-                place,
-                patience,
+                address,
+                retry_wait,
                 leases: KnownLeases::default(),
             }),
             is_broken: false,
@@ -80,7 +80,7 @@ impl WriteConnection {
     }
 
     /// Connects again if the state of the connection is unknown.
-    pub(crate) async fn mend(&mut self) {
+    pub(crate) async fn reconnect_if_broken(&mut self) {
         if self.is_broken {
             self.reconnect().await;
         }
@@ -94,7 +94,7 @@ impl WriteConnection {
         };
         let mut attempt = 0;
         loop {
-            match server.place.connect(false).await {
+            match server.address.connect(false).await {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;
@@ -102,11 +102,11 @@ impl WriteConnection {
                     tracing::info!("connected to the database server again");
                     return true;
                 }
-                Err(error) if error.is_away() => {
+                Err(error) if error.is_unavailable() => {
                     if attempt == 0 {
                         tracing::warn!(%error, "the database server is away, waiting for it");
                     }
-                    if !server.patience.wait(attempt).await {
+                    if !server.retry_wait.wait(attempt).await {
                         return false;
                     }
                     attempt += 1;
@@ -136,11 +136,11 @@ impl WriteConnection {
         work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>>,
     ) -> Result<T> {
         self.check_log().await?;
-        self.mend().await;
+        self.reconnect_if_broken().await;
         loop {
             let (conn, path, _) = self.parts();
             match retry_while_busy!(path, begin(conn).await) {
-                Err(error) if error.is_away() && self.reconnect().await => {
+                Err(error) if error.is_unavailable() && self.reconnect().await => {
                     tracing::debug!(%error, "the transaction begins again");
                 }
                 begun => break begun?,
@@ -155,7 +155,7 @@ impl WriteConnection {
         {
             outcome = Err(error);
         }
-        *is_broken = outcome.as_ref().is_err_and(CatalogError::is_away);
+        *is_broken = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
         if outcome.is_err() && !*is_broken {
             rollback(conn).await;
         }

@@ -91,19 +91,19 @@ async fn commit(writer: &mut WriteConnection, batch: Batch) {
 
 async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply> {
     writer.check_log().await?;
-    writer.mend().await;
+    writer.reconnect_if_broken().await;
     let reply = loop {
         let (conn, path, mut leases) = writer.parts();
         let reply = retry_while_busy!(path, {
             let outcome = batch.apply(conn, leases.as_deref_mut()).await;
-            if outcome.as_ref().is_err_and(|error| !error.is_away()) {
+            if outcome.as_ref().is_err_and(|error| !error.is_unavailable()) {
                 rollback(conn).await;
             }
             outcome
         });
         match reply {
             // What was stored before the connection broke is found when the batch is applied again.
-            Err(error) if error.is_away() && writer.reconnect().await => {
+            Err(error) if error.is_unavailable() && writer.reconnect().await => {
                 tracing::debug!(%error, "the commit is tried again");
             }
             reply => break reply,

@@ -49,9 +49,12 @@ mod tests {
     use proptest::prelude::*;
 
     /// Stage, status, fingerprint, number of jobs.
-    type Row = (i64, i64, i64, i64);
+    type CountRow = (i64, i64, i64, i64);
 
-    async fn at_once_and_by_ranges(jobs: &[(i64, i64)], range: i64) -> (Vec<Row>, Vec<Row>) {
+    async fn at_once_and_by_ranges(
+        jobs: &[(i64, i64)],
+        range: i64,
+    ) -> (Vec<CountRow>, Vec<CountRow>) {
         let mut conn = Conn::in_memory().await;
         let table = "CREATE TABLE job (pair INTEGER PRIMARY KEY, stage, status, fingerprint)";
         query(table).execute(&mut conn).await.expect("a table");

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::open;
-use crate::catalog::db::postgres::PostgresPlace;
+use crate::catalog::db::postgres::PostgresAddress;
 use crate::catalog::{Catalog, Result};
 use crate::postgres_server;
 
@@ -76,7 +76,7 @@ impl Place {
                 Conn::Sqlite(Held::Owned(conn.expect("a connection")))
             }
             Self::Url(url) => {
-                let place = PostgresPlace::parse(url).expect("a place");
+                let place = PostgresAddress::parse(url).expect("a place");
                 let conn = place.connect(false).await;
                 Conn::Postgres(Held::Owned(conn.expect("a connection")))
             }

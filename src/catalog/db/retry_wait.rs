@@ -13,12 +13,12 @@ const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
 /// Whether a process still waits for its server.
 #[derive(Debug, Default)]
-pub(crate) struct Patience {
+pub(crate) struct RetryWait {
     is_given_up: AtomicBool,
     given_up: Notify,
 }
 
-impl Patience {
+impl RetryWait {
     /// Ends all waits, now and later.
     pub(crate) fn give_up(&self) {
         self.is_given_up.store(true, Ordering::Release);

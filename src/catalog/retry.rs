@@ -8,15 +8,18 @@ impl Catalog {
     ///
     /// # Errors
     /// Returns the error of the operation, also that the server is away after [`Catalog::stop_waiting`].
-    pub async fn patiently<T>(&self, operation: impl AsyncFn() -> Result<T>) -> Result<T> {
+    pub async fn retry_while_unavailable<T>(
+        &self,
+        operation: impl AsyncFn() -> Result<T>,
+    ) -> Result<T> {
         let mut attempt = 0;
         loop {
             match operation().await {
-                Err(error) if error.is_away() => {
+                Err(error) if error.is_unavailable() => {
                     if attempt == 0 {
                         tracing::warn!(%error, "the database server is away, waiting for it");
                     }
-                    if !self.patience.wait(attempt).await {
+                    if !self.retry_wait.wait(attempt).await {
                         return Err(error);
                     }
                     attempt += 1;
@@ -28,6 +31,6 @@ impl Catalog {
 
     /// Ends all waits for a database server that is away. Operations then fail while it is.
     pub fn stop_waiting(&self) {
-        self.patience.give_up();
+        self.retry_wait.give_up();
     }
 }
