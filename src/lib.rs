@@ -62,10 +62,10 @@
 //! SQLite that it uses. The statements of claims and checkpoints have two. All writes except group commits hold one lock,
 //! so they run one after another in both databases. Every test of the catalog runs on both.
 //!
-//! If the server is away, the writer task connects again and repeats its commit (`db/write_connection.rs`). What an earlier
-//! attempt had stored, although its answer was lost, is found by the fencing token and the position of the job; leases of
-//! which this process never heard are found too (`db/known_leases.rs`). Reads and other writes of a run are repeated by
-//! `Catalog::retry_while_unavailable`. `runner/run_guard.rs` keeps runs with other settings apart.
+//! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`). If an earlier
+//! attempt was stored but its reply was lost, the fencing token and the position of the job show it; leases whose claim had
+//! no reply are searched for too (`db/known_leases.rs`). `Catalog::retry_while_unavailable` repeats the reads and other
+//! writes of a run. `runner/run_guard.rs` refuses runs with other settings.
 //!
 //! ## A lost lease
 //!

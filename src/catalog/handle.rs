@@ -33,7 +33,7 @@ pub struct Catalog {
     /// `None` for a read-only catalog.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
-    /// Whether this process waits for a server that is away.
+    /// Waits while a server is unavailable.
     pub(crate) retry_wait: Arc<RetryWait>,
     /// Path of the file, or the URL of a PostgreSQL catalog without the password.
     pub(crate) path: Arc<Path>,
@@ -130,8 +130,8 @@ impl Catalog {
         }
     }
 
-    /// Returns whether the catalog is in a database server.
-    pub(crate) const fn is_on_server(&self) -> bool {
+    /// Returns whether the catalog is on a database server, which several machines can share.
+    pub const fn is_shared(&self) -> bool {
         matches!(self.readers, ReaderPool::Postgres(_))
     }
 

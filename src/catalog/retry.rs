@@ -1,13 +1,14 @@
-//! Operations that wait for a database server that is away.
+//! Retries operations while the database server is unavailable.
 
 use crate::catalog::{Catalog, Result};
 
 impl Catalog {
-    /// Calls `operation` again while the database server is away. The operation must have the same effect if an earlier
-    /// call was stored although its answer was lost.
+    /// Calls `operation` again while the database server is unavailable. The operation must be idempotent, because an
+    /// earlier call may have been stored although its reply was lost.
     ///
     /// # Errors
-    /// Returns the error of the operation, also that the server is away after [`Catalog::stop_waiting`].
+    /// Returns the error of the operation. After [`Catalog::stop_waiting`], also returns the error of an unavailable
+    /// server.
     pub async fn retry_while_unavailable<T>(
         &self,
         operation: impl AsyncFn() -> Result<T>,
@@ -15,13 +16,9 @@ impl Catalog {
         let mut attempt = 0;
         loop {
             match operation().await {
-                Err(error) if error.is_unavailable() => {
-                    if attempt == 0 {
-                        tracing::warn!(%error, "the database server is away, waiting for it");
-                    }
-                    if !self.retry_wait.wait(attempt).await {
-                        return Err(error);
-                    }
+                Err(error)
+                    if error.is_unavailable() && self.retry_wait.wait(attempt, &error).await =>
+                {
                     attempt += 1;
                 }
                 outcome => return outcome,
@@ -29,8 +26,8 @@ impl Catalog {
         }
     }
 
-    /// Ends all waits for a database server that is away. Operations then fail while it is.
+    /// Ends all waits for an unavailable database server. Operations then fail while it is unavailable.
     pub fn stop_waiting(&self) {
-        self.retry_wait.give_up();
+        self.retry_wait.stop();
     }
 }

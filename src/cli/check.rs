@@ -107,14 +107,15 @@ fn exclusive_lock(
     catalog: &Catalog,
     running: bool,
 ) -> Result<Option<RunLock>, RunError> {
-    if catalog.is_shared() && !running {
-        return Ok(None);
+    let in_use = || RunError::from(LockError::InUse { pid: None });
+    if catalog.is_shared() {
+        return if running { Err(in_use()) } else { Ok(None) };
     }
     let lock = RunLock::acquire(project, false)?;
-    if lock.is_exclusive() && !catalog.is_shared() {
+    if lock.is_exclusive() {
         Ok(Some(lock))
     } else {
-        Err(LockError::InUse { pid: None }.into())
+        Err(in_use())
     }
 }
 

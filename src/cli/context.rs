@@ -127,26 +127,32 @@ impl Context {
 
     /// Opens the project and its catalog for reading; works during a run.
     pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
-        if let Some(url) = self.catalog_url()? {
-            let project = Project::open_directory(&self.dir())?;
-            Ok((project, Catalog::connect_read_only(&url).await?))
-        } else {
-            let project = Project::open(&self.dir())?;
-            let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
-            Ok((project, catalog))
-        }
+        let (project, url) = self.project()?;
+        let catalog = match url {
+            Some(url) => Catalog::connect_read_only(&url).await?,
+            None => Catalog::open_read_only(&project.catalog_path()).await?,
+        };
+        Ok((project, catalog))
     }
 
     /// Opens the project and its catalog for reading and writing.
     pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
-        if let Some(url) = self.catalog_url()? {
-            let project = Project::open_directory(&self.dir())?;
-            Ok((project, Catalog::connect(&url, false).await?))
-        } else {
-            let project = Project::open(&self.dir())?;
-            let catalog = Catalog::open(&project.catalog_path()).await?;
-            Ok((project, catalog))
-        }
+        let (project, url) = self.project()?;
+        let catalog = match url {
+            Some(url) => Catalog::connect(&url, false).await?,
+            None => Catalog::open(&project.catalog_path()).await?,
+        };
+        Ok((project, catalog))
+    }
+
+    /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
+    fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
+        let url = self.catalog_url()?;
+        let project = match url {
+            Some(_) => Project::open_directory(&self.dir())?,
+            None => Project::open(&self.dir())?,
+        };
+        Ok((project, url))
     }
 
     /// Returns the URL of the catalog in PostgreSQL, or `None` if the catalog is a file in the project.

@@ -18,8 +18,8 @@ use crate::store::Project;
 pub(super) struct CopyArgs {
     /// The catalog to copy: a project folder, or an address such as <postgres://me@db.example/lab>
     pub(super) from: String,
-    /// Where to copy it: a project folder without a catalog, or an address of PostgreSQL without one; an interrupted copy
-    /// goes on where it stopped
+    /// Where to copy it: a project folder without a catalog, or an address of PostgreSQL without one; the same
+    /// command continues an interrupted copy
     pub(super) to: String,
 }
 

@@ -201,7 +201,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             return None;
         }
         Some(CatalogErrorKind::Unavailable) => format!(
-            "the catalog's database server cannot be reached ({}); check that it runs, then start the command again: nothing stored is lost",
+            "the database server of the catalog is unavailable ({}); check that it runs, and start the command again: nothing stored is lost",
             root_cause(error)
         ),
         Some(CatalogErrorKind::Contradiction) => format!(

@@ -1,4 +1,4 @@
-//! Operations on Unix. Those that only Linux has report elsewhere that they are missing.
+//! Operations on Unix. Functions that need Linux return `None` on other systems.
 
 use std::ffi::OsString;
 use std::fs::{File, FileType, Metadata, OpenOptions, Permissions};

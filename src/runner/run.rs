@@ -27,8 +27,8 @@ use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::Project;
 
-/// How long a run that is asked to stop waits for a database server that is away.
-const GIVE_UP_AFTER: Duration = Duration::from_secs(2);
+/// Time after a stop request during which a run still waits for an unavailable database server.
+const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
@@ -120,18 +120,8 @@ pub(super) async fn run_with(
         catalog.end_worker(worker, clock.now()).await?;
         let status = catalog.status(fingerprints).await?;
         let left = catalog.work_left(options.until, selection.as_ref()).await?;
-        return Ok(RunSummary {
-            done: 0,
-            failed: 0,
-            stages: 0,
-            left: left.pairs,
-            failed_in_all: left.quarantined,
-            stopped: false,
-            too_many_failures: false,
-            compute_time: Duration::ZERO,
-            elapsed_ms: clock.elapsed_ms(),
-            status,
-        });
+        let counts = RunCounts::default();
+        return Ok(summary(&counts, left, status, stop, clock, Duration::ZERO));
     }
     let (events, mut received) = mpsc::unbounded_channel();
     let context = Arc::new(RunContext {
@@ -149,14 +139,14 @@ pub(super) async fn run_with(
         compute_us: AtomicU64::new(0),
     });
     let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
-    let given_up = tokio::spawn(give_up_after_stop(catalog.clone(), stop.clone()));
+    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counts = scheduler.run(&mut received, &mut on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let worker = scheduler.worker();
     let ended =
         catalog.retry_while_unavailable(async || catalog.end_worker(worker, clock.now()).await);
     let ended = ended.await;
-    given_up.abort();
+    stop_waiting.abort();
     // A lost log explains other errors.
     let ended = match ended {
         Err(error) if error.log_loss().is_some() => return Err(error.into()),
@@ -166,14 +156,14 @@ pub(super) async fn run_with(
     ended?;
     let status = catalog.status(fingerprints).await?;
     let left = catalog.work_left(options.until, selection.as_ref()).await?;
-    Ok(summary(&counts, left, status, &context))
+    let compute_time = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
+    Ok(summary(&counts, left, status, stop, clock, compute_time))
 }
 
-/// Stops waiting for a database server that is away when the run is asked to stop, after a short time in which the server
-/// may take the leases back.
-async fn give_up_after_stop(catalog: Catalog, stop: Stop) {
+/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database server.
+async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
     stop.reached(StopLevel::Drain).await;
-    tokio::time::sleep(GIVE_UP_AFTER).await;
+    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
     catalog.stop_waiting();
 }
 
@@ -281,7 +271,9 @@ fn summary(
     counts: &RunCounts,
     left: WorkLeft,
     status: StatusCounts,
-    context: &RunContext,
+    stop: &Stop,
+    clock: Clock,
+    compute_time: Duration,
 ) -> RunSummary {
     RunSummary {
         done: counts.done,
@@ -289,10 +281,10 @@ fn summary(
         stages: counts.stages,
         left: left.pairs,
         failed_in_all: left.quarantined,
-        stopped: left.pairs > 0 && context.stop.level() > StopLevel::Go,
+        stopped: left.pairs > 0 && stop.level() > StopLevel::Go,
         too_many_failures: counts.too_many_failures,
-        compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
-        elapsed_ms: context.clock.elapsed_ms(),
+        compute_time,
+        elapsed_ms: clock.elapsed_ms(),
         status,
     }
 }

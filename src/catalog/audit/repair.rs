@@ -112,12 +112,10 @@ impl Catalog {
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                query(Sql::pair("REINDEX", "SELECT 1"))
-                    .execute(&mut *conn)
-                    .await?;
                 let Conn::Sqlite(conn) = conn else {
                     return Ok(Vec::new());
                 };
+                sqlx::query("REINDEX").execute(&mut **conn).await?;
                 integrity(conn, false).await
             })
         })

@@ -11,7 +11,7 @@ pub(crate) enum Conn {
     Postgres(Held<Postgres>),
 }
 
-/// A connection that belongs to its holder or to a pool. A snapshot ends when it is dropped.
+/// A connection that is owned or belongs to a pool. A snapshot ends when it is dropped.
 pub(crate) enum Held<D: Database> {
     Owned(D::Connection),
     Pooled(PoolConnection<D>),

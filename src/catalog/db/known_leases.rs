@@ -1,10 +1,8 @@
-//! The leases that this process knows of, on a server. The answer to a claim can be lost after its commit. Then the
-//! catalog has leases that nobody works on, while the worker's heartbeats keep them valid.
+//! Leases that this process has received from a server. The reply to a claim can be lost after its commit. Then the
+//! catalog contains leases that this process has not received, and its heartbeats keep them valid.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
-
-use serde_json::json;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
@@ -15,7 +13,7 @@ use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::domain::{JobStatus, PairId, WorkerId};
 
-/// How long after a reconnection unknown leases are looked for. A server may execute a commit of the broken connection
+/// Time after a reconnection during which unknown leases are searched for. A server may execute a commit of the broken connection
 /// until it notices that the connection is broken.
 const SEARCH_TIME: Duration = Duration::from_mins(2);
 
@@ -23,10 +21,10 @@ const SEARCH_TIME: Duration = Duration::from_mins(2);
 const LEASES: &str = "
 SELECT pair, worker, token, stage, fingerprint, attempt, exclusive FROM job WHERE status = 1 AND worker = ?1";
 
-/// Selects the jobs of a JSON array of `[pair]`.
+/// Selects jobs by pair.
 const JOBS: &str = "
-SELECT j.pair, j.token, j.stage, j.status, j.worker FROM json_each(?1) AS item
-    CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
+SELECT j.pair, j.token, j.stage, j.status, j.worker FROM json_each(?1) AS wanted
+    CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)";
 
 /// Tokens of known leases by pair.
 #[derive(Debug, Default)]
@@ -47,8 +45,8 @@ struct StoredJob {
 from_row! { StoredJob { pair, token, stage, status, worker } }
 
 impl KnownLeases {
-    /// Notes that answers may have been lost.
-    pub(crate) fn answers_may_be_lost(&mut self) {
+    /// Records that replies may have been lost.
+    pub(crate) fn replies_may_be_lost(&mut self) {
         self.search_until = Some(Instant::now() + SEARCH_TIME);
     }
 
@@ -65,8 +63,8 @@ impl KnownLeases {
         }
     }
 
-    /// Returns the leases of a worker that this process does not know of. Asks the server only for some time after a
-    /// reconnection.
+    /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
+    /// a reconnection.
     pub(crate) async fn unknown(
         &mut self,
         conn: &mut Conn,
@@ -93,7 +91,7 @@ pub(crate) async fn stored_before<'i>(
         .collect();
     let ended: BTreeMap<_, _> = ended.map(|lease| (lease.pair.0, lease)).collect();
     let pairs = checkpoints.keys().chain(ended.keys());
-    let pairs: Vec<_> = pairs.map(|pair| json!([pair])).collect();
+    let pairs: Vec<_> = pairs.copied().collect();
     if pairs.is_empty() {
         return Ok(Vec::new());
     }

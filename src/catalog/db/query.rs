@@ -6,13 +6,17 @@ use std::time::Duration;
 
 use sqlx::postgres::PgArguments;
 use sqlx::sqlite::SqliteArguments;
-use sqlx::{Arguments as _, AssertSqlSafe};
+use sqlx::{Arguments as _, AssertSqlSafe, Database, Encode, Postgres, Sqlite, Type};
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::{Argument, FromValue};
+
+/// Longest time for one statement on a server. Without a limit, a statement on a connection that broke silently would
+/// wait forever.
+const STATEMENT_LIMIT: Duration = Duration::from_mins(1);
 
 /// A statement with its parameters `?1`, `?2` and so on. `R` says what each row becomes.
 #[derive(Debug)]
@@ -92,19 +96,26 @@ impl<R> Query<R> {
         self
     }
 
+    fn sqlite(self) -> Result<sqlx::query::Query<'static, Sqlite, SqliteArguments>> {
+        let arguments = converted::<Sqlite>(self.arguments)?;
+        Ok(sqlx::query_with(self.sql.sqlite, arguments))
+    }
+
+    fn postgres(self) -> Result<sqlx::query::Query<'static, Postgres, PgArguments>> {
+        let arguments = converted::<Postgres>(self.arguments)?;
+        // A constant, in which parameters were written differently.
+        let sql = AssertSqlSafe(self.sql.postgres_query());
+        Ok(sqlx::query_with(sql, arguments))
+    }
+
     /// Runs the statement and ignores its rows.
     pub(crate) async fn execute(self, conn: &mut Conn) -> Result<()> {
         match conn {
             Conn::Sqlite(conn) => {
-                let arguments = sqlite_arguments(self.arguments)?;
-                let query = sqlx::query_with(self.sql.sqlite, arguments);
-                query.execute(&mut **conn).await?;
+                self.sqlite()?.execute(&mut **conn).await?;
             }
             Conn::Postgres(conn) => {
-                let arguments = postgres_arguments(self.arguments)?;
-                let sql = AssertSqlSafe(self.sql.postgres_query());
-                let query = sqlx::query_with(sql, arguments);
-                limited(query.execute(&mut **conn)).await?;
+                limited(self.postgres()?.execute(&mut **conn)).await?;
             }
         }
         Ok(())
@@ -116,16 +127,13 @@ impl<R: Rows> Query<R> {
     pub(crate) async fn fetch_all(self, conn: &mut Conn) -> Result<Vec<R::Value>> {
         match conn {
             Conn::Sqlite(conn) => {
-                let arguments = sqlite_arguments(self.arguments)?;
-                let rows = sqlx::query_with(self.sql.sqlite, arguments).fetch_all(&mut **conn);
-                let rows = rows.await?.into_iter();
+                let rows = self.sqlite()?.fetch_all(&mut **conn).await?.into_iter();
                 rows.map(|row| R::value(Row::Sqlite(row))).collect()
             }
             Conn::Postgres(conn) => {
-                let arguments = postgres_arguments(self.arguments)?;
-                let sql = AssertSqlSafe(self.sql.postgres_query());
-                let rows = sqlx::query_with(sql, arguments).fetch_all(&mut **conn);
-                let rows = limited(rows).await?.into_iter();
+                let rows = limited(self.postgres()?.fetch_all(&mut **conn))
+                    .await?
+                    .into_iter();
                 rows.map(|row| R::value(Row::Postgres(row))).collect()
             }
         }
@@ -135,16 +143,12 @@ impl<R: Rows> Query<R> {
     pub(crate) async fn fetch_optional(self, conn: &mut Conn) -> Result<Option<R::Value>> {
         match conn {
             Conn::Sqlite(conn) => {
-                let arguments = sqlite_arguments(self.arguments)?;
-                let row = sqlx::query_with(self.sql.sqlite, arguments).fetch_optional(&mut **conn);
-                row.await?.map(|row| R::value(Row::Sqlite(row))).transpose()
+                let row = self.sqlite()?.fetch_optional(&mut **conn).await?;
+                row.map(|row| R::value(Row::Sqlite(row))).transpose()
             }
             Conn::Postgres(conn) => {
-                let arguments = postgres_arguments(self.arguments)?;
-                let sql = AssertSqlSafe(self.sql.postgres_query());
-                let row = sqlx::query_with(sql, arguments).fetch_optional(&mut **conn);
-                let row = limited(row).await?.map(Row::Postgres);
-                row.map(R::value).transpose()
+                let row = limited(self.postgres()?.fetch_optional(&mut **conn)).await?;
+                row.map(|row| R::value(Row::Postgres(row))).transpose()
             }
         }
     }
@@ -159,11 +163,21 @@ impl<R: Rows> Query<R> {
     }
 }
 
-/// Converts parameters for SQLite.
-pub(crate) fn sqlite_arguments(
+/// Converts parameters for a database.
+pub(crate) fn converted<D: Database>(
     arguments: impl IntoIterator<Item = Argument>,
-) -> Result<SqliteArguments> {
-    let mut converted = SqliteArguments::default();
+) -> Result<D::Arguments>
+where
+    i64: Encode<'static, D> + Type<D>,
+    f64: Encode<'static, D> + Type<D>,
+    String: Encode<'static, D> + Type<D>,
+    Vec<u8>: Encode<'static, D> + Type<D>,
+    Option<i64>: Encode<'static, D> + Type<D>,
+    Option<f64>: Encode<'static, D> + Type<D>,
+    Option<String>: Encode<'static, D> + Type<D>,
+    Option<Vec<u8>>: Encode<'static, D> + Type<D>,
+{
+    let mut converted = D::Arguments::default();
     for argument in arguments {
         let added = match argument {
             Argument::Null => converted.add(None::<i64>),
@@ -176,26 +190,6 @@ pub(crate) fn sqlite_arguments(
     }
     Ok(converted)
 }
-
-/// Converts parameters for PostgreSQL.
-fn postgres_arguments(arguments: Vec<Argument>) -> Result<PgArguments> {
-    let mut converted = PgArguments::default();
-    for argument in arguments {
-        let added = match argument {
-            Argument::Null => converted.add(None::<i64>),
-            Argument::Integer(value) => converted.add(value),
-            Argument::Real(value) => converted.add(value),
-            Argument::Text(value) => converted.add(value),
-            Argument::Blob(value) => converted.add(value),
-        };
-        added.map_err(sqlx::Error::Encode)?;
-    }
-    Ok(converted)
-}
-
-/// Longest time for one statement on a server. A connection that broke without a message would otherwise be waited for
-/// without end.
-const STATEMENT_LIMIT: Duration = Duration::from_mins(1);
 
 /// Limits the time of a statement on a server. After an error the connection cannot be used again.
 pub(crate) async fn limited<T>(
@@ -203,10 +197,8 @@ pub(crate) async fn limited<T>(
 ) -> sqlx::Result<T> {
     let limited = tokio::time::timeout(STATEMENT_LIMIT, statement).await;
     limited.unwrap_or_else(|_| {
-        let text = format!("no answer for {} s", STATEMENT_LIMIT.as_secs());
-        Err(sqlx::Error::Io(io::Error::new(
-            io::ErrorKind::TimedOut,
-            text,
-        )))
+        let text = format!("no reply for {} s", STATEMENT_LIMIT.as_secs());
+        let error = io::Error::new(io::ErrorKind::TimedOut, text);
+        Err(sqlx::Error::Io(error))
     })
 }

@@ -82,11 +82,15 @@ impl Row {
     }
 
     /// Returns the value of a column.
-    pub(crate) fn value(&self, column: impl Column) -> Result<Value<'_>, BoxDynError> {
-        match self {
+    ///
+    /// # Errors
+    /// Returns an error if there is no such column, or if the database stores another type than it declares.
+    pub(crate) fn value(&self, column: impl Column) -> Result<Value<'_>> {
+        let value = match self {
             Self::Sqlite(row) => column.of_sqlite(row),
             Self::Postgres(row) => column.of_postgres(row),
-        }
+        };
+        value.map_err(|error| invalid(column, &error))
     }
 
     /// Reads a column.
@@ -94,9 +98,12 @@ impl Row {
     /// # Errors
     /// Returns an error if the value cannot be read as a `T`.
     pub(crate) fn get<T: FromValue>(&self, column: impl Column) -> Result<T> {
-        let value = self.value(column).and_then(T::from_value);
-        value.map_err(|error| CatalogError::Corrupt(format!("column {column}: {error}")))
+        T::from_value(self.value(column)?).map_err(|error| invalid(column, &error))
     }
+}
+
+fn invalid(column: impl Column, error: &BoxDynError) -> CatalogError {
+    CatalogError::Corrupt(format!("column {column}: {error}"))
 }
 
 /// A type that is read from a row.

@@ -6,12 +6,12 @@ use std::marker::PhantomData;
 
 use futures_util::{Stream, TryStreamExt as _};
 use serde::Serialize;
-use sqlx::{AssertSqlSafe, Either, Executor as _};
+use sqlx::{AssertSqlSafe, Either, Executor as _, Sqlite};
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::query::{limited, sqlite_arguments};
+use crate::catalog::db::query::{converted, limited};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Argument;
 
@@ -95,7 +95,8 @@ impl Script {
                     sql.push_str(";\n");
                 }
                 let arguments = self.statements.into_iter();
-                let arguments = sqlite_arguments(arguments.flat_map(|(_, arguments)| arguments))?;
+                let arguments = arguments.flat_map(|(_, arguments)| arguments);
+                let arguments = converted::<Sqlite>(arguments)?;
                 // Concatenated constants only.
                 let query = sqlx::query_with(AssertSqlSafe(sql), arguments);
                 let results = conn.fetch_many(query);

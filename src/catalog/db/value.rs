@@ -27,6 +27,20 @@ impl Value<'_> {
             Self::Blob(_) => "BLOB",
         }
     }
+
+    /// Passes the type, the length and the bytes of the value to `add`, to hash them. They are the same in both databases.
+    pub(crate) fn hash_into(&self, mut add: impl FnMut(&[u8])) {
+        add(self.type_name().as_bytes());
+        match self {
+            Self::Null => {}
+            Self::Integer(number) => add(&number.to_le_bytes()),
+            Self::Real(number) => add(&number.to_le_bytes()),
+            Self::Text(content) | Self::Blob(content) => {
+                add(&(content.len() as u64).to_le_bytes());
+                add(content);
+            }
+        }
+    }
 }
 
 /// A type that a column can be read as.

@@ -1,5 +1,5 @@
-//! The write connection of a catalog. Before and after each commit, it checks whether another program deleted, replaced
-//! or cut the write-ahead log.
+//! The write connection of a catalog. In SQLite, it checks before and after each commit whether another program deleted,
+//! replaced or cut the write-ahead log. In PostgreSQL, it reconnects when the server was unavailable.
 
 use std::path::Path;
 use std::pin::Pin;
@@ -31,7 +31,7 @@ pub(crate) struct WriteConnection {
     log: Option<LogWatch>,
     /// What is needed to connect again, in PostgreSQL.
     server: Option<Server>,
-    /// Whether a statement got no answer, so that the state of the connection is unknown.
+    /// Whether a statement got no reply, so that the state of the connection is unknown.
     is_broken: bool,
 }
 
@@ -73,7 +73,7 @@ impl WriteConnection {
         }
     }
 
-    /// Returns the connection, and the leases that this process knows of if the catalog is on a server.
+    /// Returns the connection, the path, and the known leases if the catalog is on a server.
     pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut KnownLeases>) {
         let leases = self.server.as_mut().map(|server| &mut server.leases);
         (&mut self.conn, &self.path, leases)
@@ -86,8 +86,8 @@ impl WriteConnection {
         }
     }
 
-    /// Connects again after an error that the server is away, and waits for it. Returns `false` if the catalog is not
-    /// on a server, if nobody waits any more, or if the server answers with another error.
+    /// Connects again after the server was unavailable, and waits until it is available. Returns `false` if the catalog
+    /// is not on a server, if waits were ended, or if the server refuses the connection.
     pub(crate) async fn reconnect(&mut self) -> bool {
         let Some(server) = &mut self.server else {
             return false;
@@ -98,17 +98,13 @@ impl WriteConnection {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;
-                    server.leases.answers_may_be_lost();
+                    server.leases.replies_may_be_lost();
                     tracing::info!("connected to the database server again");
                     return true;
                 }
-                Err(error) if error.is_unavailable() => {
-                    if attempt == 0 {
-                        tracing::warn!(%error, "the database server is away, waiting for it");
-                    }
-                    if !server.retry_wait.wait(attempt).await {
-                        return false;
-                    }
+                Err(error)
+                    if error.is_unavailable() && server.retry_wait.wait(attempt, &error).await =>
+                {
                     attempt += 1;
                 }
                 Err(error) => {
@@ -190,14 +186,13 @@ impl WriteConnection {
     }
 }
 
-/// Begins a transaction that no other such transaction runs beside.
+/// Begins a transaction. On a server, waits until no other such transaction is open.
 async fn begin(conn: &mut Conn) -> Result<()> {
-    let is_sqlite = matches!(conn, Conn::Sqlite(_));
     execute(conn, BEGIN).await?;
-    if is_sqlite {
-        return Ok(());
+    match conn {
+        Conn::Sqlite(_) => Ok(()),
+        Conn::Postgres(_) => execute(conn, LOCK).await,
     }
-    execute(conn, LOCK).await
 }
 
 /// Rolls the current transaction back.

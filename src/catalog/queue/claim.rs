@@ -54,12 +54,34 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
+/// Builds the text of a claim for PostgreSQL from the tables of the jobs to choose among. It skips jobs that another process is about
+/// to lease. An exclusive job excludes only leases on the same host. A worker whose settings are not those of the last
+/// plan gets nothing.
+macro_rules! claim_in_postgres {
+    ($ready:literal) => {
+        concat!(
+            "
+UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
+FROM worker AS me
+WHERE job.pair = ANY (ARRAY(
+        SELECT j.pair FROM ",
+            $ready,
+            "
+        WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
+        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
+    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
+    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
+    AND NOT EXISTS (
+        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
+        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
+RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive"
+        )
+    };
+}
+
 /// Leases the first ready jobs in the order of the index `job_ready`. While an exclusive job is leased, no worker holds
 /// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
 /// prepare the statement again each time.
-///
-/// PostgreSQL skips jobs that another process is about to lease. An exclusive job excludes only leases on the same host. A
-/// worker whose settings are not those of the last plan gets nothing.
 pub(crate) const CLAIM: Sql = Sql::pair(
     "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
@@ -69,18 +91,7 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    "
-UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
-FROM worker AS me
-WHERE job.pair = ANY (ARRAY(
-        SELECT j.pair FROM job AS j WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
-        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
-    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
-    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
-    AND NOT EXISTS (
-        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
-        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
-RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive",
+    claim_in_postgres!("job AS j"),
 );
 
 /// Like [`CLAIM`], but leases only selected pairs.
@@ -94,19 +105,9 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    "
-UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
-FROM worker AS me
-WHERE job.pair = ANY (ARRAY(
-        SELECT j.pair FROM json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
-    WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
-        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
-    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
-    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
-    AND NOT EXISTS (
-        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
-        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
-RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive",
+    claim_in_postgres!(
+        "json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)"
+    ),
 );
 
 /// Gives leases back. Their attempts do not count.

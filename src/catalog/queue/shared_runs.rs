@@ -15,7 +15,7 @@ use crate::domain::{Stage, UnixMillis};
 /// the clocks of two machines may differ.
 const SHOWN_ACTIVE_MS: i64 = 60_000;
 
-/// The fingerprints of a leased job's worker that differ from those given.
+/// Selects the fingerprints of a worker that holds leases and has other settings.
 const OTHERS: &str = "
 SELECT w.fingerprints FROM worker AS w
 WHERE w.fingerprints <> ?1 AND w.id IN (SELECT worker FROM job WHERE status = 1) ORDER BY w.id LIMIT 1";
@@ -32,7 +32,7 @@ const TRY_LOCK: &str =
 const UNLOCK: &str =
     "SELECT pg_advisory_unlock(hashtextextended(current_setting('search_path'), 1))";
 
-/// Whether a run may use its settings.
+/// Result of comparing the settings of a run with those of other workers.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SharedSettings {
     /// All workers use them.
@@ -42,11 +42,6 @@ pub enum SharedSettings {
 }
 
 impl Catalog {
-    /// Returns whether several machines can share the catalog.
-    pub const fn is_shared(&self) -> bool {
-        self.is_on_server()
-    }
-
     /// Makes these the settings of all workers, unless pairs are leased by workers with other settings. Workers with
     /// other settings get no more pairs.
     ///

@@ -9,7 +9,6 @@
 use serde_json::json;
 
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
@@ -196,12 +195,7 @@ ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
 const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
 
 /// Selects the largest row number that a log has ever had, if it exceeds ?2.
-///
-/// A sequence of PostgreSQL also counts rows that were rolled back, so nothing is known there.
-const CUT_OFF: Sql = Sql::pair(
-    "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2",
-    "SELECT ?2 FROM pair WHERE ?1 = ''",
-);
+const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
 
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
 pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]) -> Result<()> {
@@ -234,28 +228,11 @@ fn checksum(table: ChecksummedTable, row: &Row, before: Option<i64>) -> Result<i
     bytes.extend(row.get::<i64>(0)?.to_le_bytes());
     bytes.extend(before.unwrap_or(0).to_le_bytes());
     for column in COVERED..row.len() {
-        let value = row.value(column);
-        let value =
-            value.map_err(|error| CatalogError::Corrupt(format!("column {column}: {error}")))?;
-        add_value(&mut bytes, &value);
+        row.value(column)?.hash_into(|part| bytes.extend(part));
     }
     let hash = ContentHash::of(&bytes);
     let (first, _) = hash.as_bytes().split_at(8);
     Ok(i64::from_le_bytes(first.try_into().unwrap_or_default()))
-}
-
-/// Appends the type, the length and the bytes of a stored value. Text may be invalid UTF-8.
-fn add_value(bytes: &mut Vec<u8>, value: &Value<'_>) {
-    bytes.extend(value.type_name().as_bytes());
-    match value {
-        Value::Null => {}
-        Value::Integer(number) => bytes.extend(number.to_le_bytes()),
-        Value::Real(number) => bytes.extend(number.to_le_bytes()),
-        Value::Text(content) | Value::Blob(content) => {
-            bytes.extend((content.len() as u64).to_le_bytes());
-            bytes.extend(&**content);
-        }
-    }
 }
 
 impl Catalog {
@@ -323,7 +300,8 @@ async fn faulty_rows(
             .into_iter()
             .map(|row| fault(row, None, RowFault::Removed)),
     );
-    if statements.is_chained {
+    // A sequence of PostgreSQL also counts rows that were rolled back, so it does not show whether rows are missing.
+    if statements.is_chained && matches!(conn, Conn::Sqlite(_)) {
         let last: Option<i64> = query_scalar(LAST_ROW)
             .bind(table.code())
             .fetch_one(&mut *conn)

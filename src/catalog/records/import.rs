@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
@@ -71,8 +70,8 @@ ON CONFLICT (name) DO UPDATE SET
     block = excluded.block, meta = excluded.meta, attributes = excluded.attributes
 RETURNING id";
 
-/// Tells PostgreSQL's planner how large the tables are now.
-const ANALYZE: Sql = Sql::pair("SELECT 1", "ANALYZE pair, job");
+/// Updates the statistics of PostgreSQL's planner.
+const ANALYZE: &str = "ANALYZE pair, job";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
@@ -111,7 +110,9 @@ impl Catalog {
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
                 let stored = ground_truth::set(conn, &truths).await?;
-                query(ANALYZE).execute(conn).await?;
+                if let Conn::Postgres(_) = conn {
+                    query(ANALYZE).execute(conn).await?;
+                }
                 Ok((summary, stored))
             })
         })

@@ -1,16 +1,16 @@
-//! Copies a catalog to another one, between a file and PostgreSQL or the same kind. An interrupted copy goes on where it
-//! stopped. At the end, the rows of both catalogs are compared.
+//! Copies a catalog to another one, between a file and PostgreSQL or the same kind. A repeated call continues an
+//! interrupted copy. At the end, the rows of both catalogs are compared.
 
 mod tables;
 
 use std::fmt::Write as _;
 
-use sqlx::AssertSqlSafe;
+use sqlx::{AssertSqlSafe, Sqlite};
 
 use self::tables::{CopyTable, TABLES};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::add_literal;
-use crate::catalog::db::query::{query, query_scalar, sqlite_arguments};
+use crate::catalog::db::query::{converted, query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::value::{Argument, Value};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -103,17 +103,14 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         match query(table.last).fetch_optional(&mut conn).await? {
             Some(row) => key(&row, table.keys),
-            None if table.name == "metric_result" => {
-                Ok(vec![Argument::from(i64::MIN), Argument::from("")])
-            }
-            None => Ok(vec![Argument::from(i64::MIN); table.keys]),
+            None => Ok(table.key_before_all()),
         }
     }
 
     /// Recounts the counters, and sets the numbers of new rows.
     async fn finish_copy(&self) -> Result<()> {
         self.rebuild_counters().await?;
-        if !self.is_on_server() {
+        if !self.is_shared() {
             return Ok(());
         }
         self.in_transaction(|conn| {
@@ -143,7 +140,7 @@ fn key(row: &Row, keys: usize) -> Result<Vec<Argument>> {
 }
 
 fn argument(row: &Row, column: usize) -> Result<Argument> {
-    Ok(match value(row, column)? {
+    Ok(match row.value(column)? {
         Value::Null => Argument::Null,
         Value::Integer(number) => Argument::Integer(Some(number)),
         Value::Real(number) => Argument::Real(Some(number)),
@@ -153,11 +150,6 @@ fn argument(row: &Row, column: usize) -> Result<Argument> {
         )),
         Value::Blob(bytes) => Argument::Blob(Some(bytes.into_owned())),
     })
-}
-
-fn value(row: &Row, column: usize) -> Result<Value<'_>> {
-    let value = row.value(column);
-    value.map_err(|error| CatalogError::Corrupt(format!("column {column}: {error}")))
 }
 
 /// Inserts rows in one statement. A row that is there already is kept.
@@ -187,7 +179,7 @@ async fn insert(conn: &mut Conn, table: &CopyTable, rows: &[Row]) -> Result<()> 
     let sql = AssertSqlSafe(sql);
     match conn {
         Conn::Sqlite(conn) => {
-            let query = sqlx::query_with(sql, sqlite_arguments(arguments)?);
+            let query = sqlx::query_with(sql, converted::<Sqlite>(arguments)?);
             query.execute(&mut **conn).await?;
         }
         Conn::Postgres(conn) => {
@@ -199,10 +191,7 @@ async fn insert(conn: &mut Conn, table: &CopyTable, rows: &[Row]) -> Result<()> 
 
 /// Counts and hashes the rows of a table, in the order of their keys.
 async fn content(conn: &mut Conn, table: &CopyTable) -> Result<CopiedTable> {
-    let mut after = vec![Argument::from(i64::MIN); table.keys];
-    if table.name == "metric_result" {
-        after[1] = Argument::from("");
-    }
+    let mut after = table.key_before_all();
     let (mut rows, mut hasher) = (0, blake3::Hasher::new());
     loop {
         let page = page(conn, table, &after).await?;
@@ -211,7 +200,9 @@ async fn content(conn: &mut Conn, table: &CopyTable) -> Result<CopiedTable> {
         rows += page.len() as u64;
         for row in &page {
             for column in 0..table.columns {
-                add_value(&mut hasher, &value(row, column)?);
+                row.value(column)?.hash_into(|part| {
+                    hasher.update(part);
+                });
             }
         }
     }
@@ -220,22 +211,4 @@ async fn content(conn: &mut Conn, table: &CopyTable) -> Result<CopiedTable> {
         rows,
         hash: ContentHash::from_bytes(*hasher.finalize().as_bytes()),
     })
-}
-
-/// Adds the type, the length and the bytes of a value to a hash.
-fn add_value(hasher: &mut blake3::Hasher, value: &Value<'_>) {
-    hasher.update(value.type_name().as_bytes());
-    match value {
-        Value::Null => {}
-        Value::Integer(number) => {
-            hasher.update(&number.to_le_bytes());
-        }
-        Value::Real(number) => {
-            hasher.update(&number.to_le_bytes());
-        }
-        Value::Text(content) | Value::Blob(content) => {
-            hasher.update(&(content.len() as u64).to_le_bytes());
-            hasher.update(content);
-        }
-    }
 }

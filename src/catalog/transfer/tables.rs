@@ -1,6 +1,7 @@
 //! The tables that a copy of a catalog contains, with their columns.
 
 use crate::catalog::db::dialect::Sql;
+use crate::catalog::db::value::Argument;
 
 /// A table of a catalog.
 #[derive(Debug)]
@@ -16,8 +17,21 @@ pub(super) struct CopyTable {
     pub(super) page: Sql,
     /// Selects the largest key.
     pub(super) last: &'static str,
+    /// Whether the last key is a text, not a number.
+    ends_with_text: bool,
     /// Sets the next id in PostgreSQL, where ids are numbered by a sequence.
     pub(super) renumber: Option<&'static str>,
+}
+
+impl CopyTable {
+    /// Returns a key that sorts before all rows.
+    pub(super) fn key_before_all(&self) -> Vec<Argument> {
+        let mut key = vec![Argument::from(i64::MIN); self.keys];
+        if self.ends_with_text {
+            key[self.keys - 1] = Argument::from("");
+        }
+        key
+    }
 }
 
 /// Describes a table with a numeric key, whose new rows the database numbers if `numbered` is given.
@@ -32,6 +46,7 @@ macro_rules! table {
                 "SELECT ", $key $(, ", ", $rest)*, " FROM ", $name, " WHERE ", $key, " > ?1 ORDER BY 1 LIMIT ?2"
             )),
             last: concat!("SELECT ", $key, " FROM ", $name, " ORDER BY 1 DESC LIMIT 1"),
+            ends_with_text: false,
             renumber: table!(@renumber $name $(, $numbered)?),
         }
     };
@@ -46,7 +61,7 @@ macro_rules! table {
 
 /// Describes a table with two key columns.
 macro_rules! table_by_two {
-    ($name:literal, $columns:literal, $first:literal, $second:literal $(, $rest:literal)*) => {
+    ($name:literal, $columns:literal, $first:literal, $second:literal $(, $rest:literal)*; $ends_with_text:literal) => {
         CopyTable {
             name: $name,
             keys: 2,
@@ -57,6 +72,7 @@ macro_rules! table_by_two {
                 " WHERE (", $first, ", ", $second, ") > (?1, ?2) ORDER BY 1, 2 LIMIT ?3"
             )),
             last: concat!("SELECT ", $first, ", ", $second, " FROM ", $name, " ORDER BY 1 DESC, 2 DESC LIMIT 1"),
+            ends_with_text: $ends_with_text,
             renumber: None,
         }
     };
@@ -116,7 +132,7 @@ pub(super) const TABLES: [CopyTable; 17] = [
         "result_hash",
         "ms",
         "worker",
-        "at"
+        "at"; false
     ),
     table_by_two!(
         "metric_result",
@@ -143,7 +159,7 @@ pub(super) const TABLES: [CopyTable; 17] = [
         "margin",
         "confidence",
         "at_bound",
-        "result_hash"
+        "result_hash"; true
     ),
     table!("verdict", 15, "id", "act", "pair", "metric", "result_hash", "verdict", "reviewer", "reason", "note", "at", "event",
         "seen", "shown_ms", "angle_read_deg", "review_order"; numbered),
@@ -155,7 +171,7 @@ pub(super) const TABLES: [CopyTable; 17] = [
     table!("manual_alignment", 14, "id", "event", "pair", "mesh_hash", "print_hash", "depth_hash", "seen", "print_from_depth",
         "print_from_mesh", "iou", "dice", "reviewer", "note", "at"; numbered),
     table!("manual_alignment_undo", 2, "alignment", "at"),
-    table_by_two!("checksum", 3, "record", "row", "value"),
+    table_by_two!("checksum", 3, "record", "row", "value"; false),
 ];
 
 #[cfg(test)]
