@@ -82,13 +82,13 @@ impl Worker {
             &self.options.mesh_limits,
             &self.options.image_limits,
         );
-        let path = self.project.input_path(&pair.mesh_path);
-        let mut file = open_input(&path, meshes.max_bytes, "limits.mesh.max_bytes")?;
+        let input = self.project.input(&pair.mesh_path);
+        let mut file = open_input(&input, meshes.max_bytes, "limits.mesh.max_bytes")?;
         let size = file.size();
         let scan: Scan = mesh::read_from(&mut file, size, &pair.mesh_path, meshes)?.into();
         file.finish()?;
-        let path = self.project.input_path(&pair.print_path);
-        let print = read_input(&path, images.max_bytes, "limits.image.max_bytes")?;
+        let input = self.project.input(&pair.print_path);
+        let print = read_input(&input, images.max_bytes, "limits.image.max_bytes")?;
         let print = Print::from(raster::decode(&print.bytes, images)?);
         let fit = pipeline::fit(&scan, Some(&print), pair.scanned_face_down, settings)?;
         let depth = depth::depth(&scan, &fit, pair.unit, &settings.depth)?;

@@ -157,7 +157,7 @@ impl Fake {
 }
 
 fn input(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
-    Ok(hash_input(&project.dir().join(name))?.into())
+    Ok(hash_input(&project.input(name))?.into())
 }
 
 /// Returns a result of each metric, all with a high confidence.

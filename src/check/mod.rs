@@ -10,12 +10,14 @@ mod summary;
 pub use finding::{Finding, Kind};
 pub use summary::{CheckSummary, Found, Notes, Repaired, Unreferenced};
 
+use std::time::Duration;
+
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
 };
-use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
+use crate::store::{ArtifactError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
 /// Number of pairs in memory at a time.
@@ -31,6 +33,8 @@ pub struct CheckOptions {
     pub repair: bool,
     /// Whether a run may be writing artifacts. If so, unreferenced files are not reported.
     pub in_use: bool,
+    /// Remove unreferenced files and packs of at least this age, also while a run may be writing artifacts.
+    pub collect: Option<Duration>,
 }
 
 /// Why a check could not be completed. Damage is not an error, because the summary lists it.
@@ -47,6 +51,9 @@ pub enum CheckError {
         /// The cause.
         source: std::io::Error,
     },
+    /// An artifact folder or object store failed while unreferenced artifacts were collected.
+    #[error("{0}")]
+    Collect(#[from] ArtifactError),
     /// A worker thread panicked or was cancelled.
     #[error("the check stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
@@ -151,8 +158,8 @@ async fn rows_and_files(
         let checks = check_page(project, page.pairs, options.quick).await?;
         repair_pairs(catalog, options, &checks, summary).await?;
         for check in checks {
-            for hash in &check.named {
-                named.add(hash);
+            for artifact in &check.named {
+                named.add(artifact);
             }
             summary.count(check, options.repair);
         }
@@ -161,7 +168,12 @@ async fn rows_and_files(
         catalog.remove_stale_files();
     }
     // The files of a pair that cannot be read would look unreferenced.
-    if !options.in_use && is_readable {
+    if !is_readable {
+        return Ok(());
+    }
+    if let Some(age) = options.collect {
+        collect(project, named, age, summary).await?;
+    } else if !options.in_use {
         unreferenced_files(project, named, options.repair, summary).await?;
     }
     Ok(())
@@ -250,6 +262,23 @@ async fn repair_pairs(
         summary.repaired.requeued += back.len() as u64;
         catalog.restore(back).await?;
     }
+    Ok(())
+}
+
+/// Counts unreferenced files and packs, and removes those of at least this age.
+async fn collect(
+    project: &Project,
+    named: ReferencedArtifacts,
+    age: Duration,
+    summary: &mut CheckSummary,
+) -> Result<(), CheckError> {
+    let project = project.clone();
+    let work = move || {
+        let mut found = Unreferenced::default();
+        let collected = named.collect(&project, age, |file, removed| found.count(file, removed));
+        collected.map(|()| found)
+    };
+    summary.unreferenced = Some(tokio::task::spawn_blocking(work).await??);
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::finding::{Finding, Kind};
 use crate::catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
 use crate::domain::{
-    ArtifactSet, ContentHash, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
+    ArtifactRef, ArtifactSet, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
     ThresholdMetric,
 };
 use crate::runner::{metric_results, result_hash};
@@ -20,7 +20,7 @@ pub(super) struct PairCheck {
     pub(super) pair: PairId,
     pub(super) damage: Vec<Finding>,
     /// Hashes of all artifacts that the pair's rows reference, including rows of stages that will run again.
-    pub(super) named: Vec<ContentHash>,
+    pub(super) named: Vec<ArtifactRef>,
     /// Number of files checked.
     pub(super) files: u64,
     pub(super) inputs_missing: Vec<String>,
@@ -60,9 +60,7 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
     for (stage, result) in &pair.results {
         let files: Option<ArtifactSet> = serde_json::from_str(&result.files).ok();
         let files = files.unwrap_or_default();
-        check
-            .named
-            .extend(files.values().map(|artifact| artifact.hash));
+        check.named.extend(files.values().cloned());
         if !is_before_cursor(pair, *stage) {
             continue;
         }
@@ -72,7 +70,10 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
                 let kind = match error {
                     ArtifactError::Missing(_) => Kind::FileMissing,
                     ArtifactError::Changed(_) => Kind::FileChanged,
-                    ArtifactError::Io { .. } | ArtifactError::Moved(_) => Kind::FileUnreadable,
+                    ArtifactError::Io { .. }
+                    | ArtifactError::Moved(_)
+                    | ArtifactError::NoStore(_)
+                    | ArtifactError::Bucket(_) => Kind::FileUnreadable,
                 };
                 let finding = damage(pair, kind, *stage, error.to_string());
                 check.damage.push(finding);
@@ -219,15 +220,15 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
         (&known.mesh_path, known.mesh.as_ref()),
         (&known.print_path, known.print.as_ref()),
     ] {
-        let path = project.input_path(stored);
-        let note = || format!("{} of {}", path.display(), pair.name);
-        match stat_input(&path) {
+        let input = project.input(stored);
+        let note = || format!("{} of {}", input.path().display(), pair.name);
+        match stat_input(&input) {
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(_) => check.inputs_changed.push(note()),
             Ok(stat) => {
                 let moved = |seen: &&InputVersion| seen.stat != stat;
                 let changed = seen.filter(moved).is_some_and(|seen| {
-                    hash_input(&path).map_or(true, |found| found.hash != seen.hash)
+                    hash_input(&input).map_or(true, |found| found.hash != seen.hash)
                 });
                 if changed {
                     check.inputs_changed.push(note());

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io;
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -30,6 +31,10 @@ pub(super) struct CheckArgs {
     /// Compare only the lengths of files instead of every byte
     #[arg(long)]
     pub(super) quick: bool,
+    /// Remove result files that no result references and that are older than this, also during a run [default: 24]
+    #[arg(long, value_name = "HOURS", num_args = 0..=1, default_missing_value = "24", require_equals = true,
+          value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub(super) collect: Option<u64>,
 }
 
 /// Findings of each kind, and inputs, that are listed.
@@ -51,7 +56,7 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
         Ok(summary) => summary,
         Err(error) => return report_unreadable(error, context),
     };
-    context.print(&summary, || text(&summary, args.repair, context.stdout))?;
+    context.print(&summary, || text(&summary, &args, context.stdout))?;
     for command in next_steps(&summary, args.repair) {
         context.next(command);
     }
@@ -80,6 +85,7 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
         quick: args.quick,
         repair: args.repair,
         in_use: !args.repair && running,
+        collect: args.collect.map(|hours| Duration::from_secs(hours * 3600)),
     };
     let summary = check_project(&project, &catalog, options).await;
     catalog.close().await;
@@ -149,7 +155,7 @@ fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
     }
 }
 
-fn text(summary: &CheckSummary, repaired: bool, palette: Palette) -> String {
+fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     let mut lines = vec![headline(summary, palette)];
     for (kind, found) in &summary.damage {
         let tone = if found.left > 0 {
@@ -168,13 +174,13 @@ fn text(summary: &CheckSummary, repaired: bool, palette: Palette) -> String {
                 .to_owned(),
         );
     }
-    lines.extend(repairs(summary, repaired));
+    lines.extend(repairs(summary, args.repair));
     lines.extend(notes(&summary.inputs_missing, "missing"));
     lines.extend(notes(
         &summary.inputs_changed,
         "changed since they were read",
     ));
-    lines.extend(unreferenced(summary.unreferenced.as_ref(), repaired));
+    lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
     lines.collect::<Vec<_>>().join("\n") + "\n"
@@ -261,7 +267,7 @@ fn notes(notes: &Notes, problem: &str) -> Option<String> {
     })
 }
 
-fn unreferenced(found: Option<&Unreferenced>, repaired: bool) -> Option<String> {
+fn unreferenced(found: Option<&Unreferenced>, args: &CheckArgs) -> Option<String> {
     let Some(found) = found else {
         let text = "unreferenced files were not searched for, because a run may be writing";
         return Some(text.to_owned());
@@ -269,7 +275,12 @@ fn unreferenced(found: Option<&Unreferenced>, repaired: bool) -> Option<String> 
     let artifacts = (found.files > 0).then(|| {
         let (removed, megabytes) = (found.removed, found.bytes as f64 / 1e6);
         let files = count(found.files, "file");
-        if repaired {
+        if let Some(hours) = args.collect {
+            format!(
+                "removed {removed} of {files} not referenced by any result, {megabytes:.1} MB in all; the others are less than \
+                 {hours} h old"
+            )
+        } else if args.repair {
             format!("removed {removed} of {files} not referenced by any result, {megabytes:.1} MB")
         } else {
             format!("{files} of {megabytes:.1} MB not referenced by any result; `check --repair` removes them")

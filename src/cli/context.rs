@@ -17,7 +17,7 @@ use crate::catalog::{Catalog, has_password};
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
-use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE};
+use crate::store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
@@ -147,12 +147,44 @@ impl Context {
 
     /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
     fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
-        let url = self.catalog_url()?;
+        let settings = self.settings();
+        let storage = Self::storage(settings.as_ref().ok())?;
+        let url = self.catalog_of(settings)?;
         let project = match url {
             Some(_) => Project::open_directory(&self.dir())?,
             None => Project::open(&self.dir())?,
         };
-        Ok((project, url))
+        Ok((project.with_storage(storage), url))
+    }
+
+    /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer.
+    pub(super) async fn open_for_run(&self) -> anyhow::Result<(Project, Catalog)> {
+        let (project, catalog) = self.open().await?;
+        if project.storage().is_none() {
+            return Ok((project, catalog));
+        }
+        let checked = project.clone();
+        let check = move || checked.storage().map_or(Ok(()), ProjectStorage::check);
+        if let Err(error) = tokio::task::spawn_blocking(check).await? {
+            catalog.close().await;
+            return Err(error.into());
+        }
+        Ok((project, catalog))
+    }
+
+    /// Returns the named roots and the object store of the settings. Sends no request. Returns `None` if the settings
+    /// name none, or are invalid.
+    pub(super) fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
+        let Some(settings) = settings.map(|settings| &settings.config.storage) else {
+            return Ok(None);
+        };
+        let options = StorageOptions {
+            artifacts: settings.artifacts.clone(),
+            roots: settings.roots.clone(),
+            cache: settings.cache.clone(),
+            cache_bytes: settings.cache_gb.saturating_mul(1_000_000_000),
+        };
+        Ok(ProjectStorage::open(&options)?)
     }
 
     /// Returns the URL of the catalog in PostgreSQL, or `None` if the catalog is a file in the project.
@@ -161,11 +193,15 @@ impl Context {
     /// Returns an error if the URL on the command line has a password, or if the settings are invalid and no catalog
     /// file shows where the catalog is.
     pub(super) fn catalog_url(&self) -> anyhow::Result<Option<String>> {
+        self.catalog_of(self.settings())
+    }
+
+    fn catalog_of(&self, settings: anyhow::Result<Loaded>) -> anyhow::Result<Option<String>> {
         if let Some(url) = &self.global.catalog {
             refuse_password(url)?;
             return Ok(Some(url.clone()).filter(|url| !url.is_empty()));
         }
-        match self.settings() {
+        match settings {
             Ok(settings) => {
                 let url = settings.config.storage.catalog;
                 Ok(Some(url).filter(|url| !url.is_empty()))

@@ -10,7 +10,7 @@ use crate::config::ConfigError;
 use crate::export::FolderError;
 use crate::platform;
 use crate::runner::RunError;
-use crate::store::{CATALOG_FILE, StoreError, TargetLockError};
+use crate::store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 
 /// Returns the exit code of an error.
 pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
@@ -24,6 +24,13 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     if cause.is::<ConfigError>() {
         return Some(ExitCode::Usage);
+    }
+    if let Some(error) = cause.downcast_ref::<StorageError>() {
+        return Some(if error.is_unavailable() {
+            ExitCode::Error
+        } else {
+            ExitCode::Usage
+        });
     }
     if let Some(TargetLockError::InUse { .. }) = cause.downcast_ref() {
         return Some(ExitCode::InUse);

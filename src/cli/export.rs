@@ -151,7 +151,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         images: args.images,
         shard_mib: args.shard_mib,
         license: args.license.clone(),
-        settings: serde_json::to_value(config)?,
+        settings: config.that_change_results()?,
         limits: InputFileLimits {
             mesh: config.limits.mesh,
             image: config.limits.image,

@@ -89,7 +89,8 @@ pub(super) async fn import_pairs(
         Some(file) => read_truths(file, &listing.ids, context).await?,
         None => Vec::new(),
     };
-    let project = Project::at(&dir);
+    let storage = Context::storage(context.settings().ok().as_ref())?;
+    let project = Project::at(&dir).with_storage(storage);
     let truths = stored_truths(truths, &project)?;
     let list = Arc::new(ImportList {
         listing,
@@ -209,7 +210,7 @@ fn send_rows(
 ) -> anyhow::Result<MissingFiles> {
     let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
     let mut outcome = Ok(());
-    list.listing.rows(|row, lines| {
+    list.listing.rows(project, |row, lines| {
         for line in lines {
             missing.add(line);
         }

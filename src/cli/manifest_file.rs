@@ -8,6 +8,7 @@ use super::files;
 use super::input_paths::on_disk;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
+use crate::store::Project;
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]
@@ -109,14 +110,21 @@ impl Listing {
     }
 
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
-    pub(super) fn rows(&self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+    /// Paths below a named root of `project` stay as they are.
+    pub(super) fn rows(&self, project: &Project, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+        let is_below_root = |path: &Path| {
+            path.to_str()
+                .is_some_and(|path| project.is_below_root(path))
+        };
         let mut each = |mut row: ManifestRow| {
             for path in [&mut row.mesh, &mut row.print] {
-                if let Some(found) = on_disk(path) {
+                if !is_below_root(path)
+                    && let Some(found) = on_disk(path)
+                {
                     *path = found;
                 }
             }
-            let missing = missing_files(&self.row_label, &row);
+            let missing = missing_files(&self.row_label, &row, project);
             each(row, missing);
         };
         match &self.source {
@@ -127,8 +135,11 @@ impl Listing {
                 folder,
             } => {
                 let parsed = parse(bytes, &mut |mut row| {
-                    row.mesh = folder.join(&row.mesh);
-                    row.print = folder.join(&row.print);
+                    for path in [&mut row.mesh, &mut row.print] {
+                        if !is_below_root(path) {
+                            *path = folder.join(&*path);
+                        }
+                    }
                     each(row);
                 });
                 parsed.expect("the same bytes were parsed before");
@@ -174,10 +185,14 @@ impl SimilarIds {
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
 
-fn missing_files(label: &str, row: &ManifestRow) -> Vec<String> {
+fn missing_files(label: &str, row: &ManifestRow, project: &Project) -> Vec<String> {
     let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
     let line = |(kind, path): (&str, &PathBuf)| {
-        let problem = match path.try_exists() {
+        let exists = match path.to_str() {
+            Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
+            _ => path.try_exists(),
+        };
+        let problem = match exists {
             Ok(true) => return None,
             Ok(false) => "does not exist".to_owned(),
             Err(error) => format!("cannot be read: {error}"),
@@ -210,7 +225,7 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::Listing;
+    use super::{Listing, Project};
 
     #[test]
     fn ids_that_differ_only_in_case_are_reported() {
@@ -234,7 +249,7 @@ mod tests {
         std::fs::write(&file, format!("id,mesh,print\na,{path}a,{path}b\n")).expect("written");
         let listing = Listing::from_file(&file).expect("valid");
         let mut missing = Vec::new();
-        listing.rows(|_, lines| missing.extend(lines));
+        listing.rows(&Project::at(dir.path()), |_, lines| missing.extend(lines));
         assert_eq!(missing.len(), 2);
         for line in missing {
             assert!(line.len() < 600 && line.contains("... of a "), "{line}");
@@ -248,7 +263,7 @@ mod tests {
         std::fs::write(&file, "id,mesh,print\na,a.stl,pairs.csv\n").expect("a small file");
         let listing = Listing::from_file(&file).expect("valid");
         let (mut meshes, mut missing) = (Vec::new(), Vec::new());
-        listing.rows(|row, lines| {
+        listing.rows(&Project::at(dir.path()), |row, lines| {
             meshes.push(row.mesh);
             missing.extend(lines);
         });

@@ -68,7 +68,7 @@ pub(super) async fn execute(
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
-    let (project, catalog) = context.open().await?;
+    let (project, catalog) = context.open_for_run().await?;
     let options = options(&args, &config, &catalog, part).await?;
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;

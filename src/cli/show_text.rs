@@ -76,13 +76,13 @@ impl PairPage<'_> {
     }
 
     fn input(&self, stored: &str, note: &str) -> String {
-        let path = self.project.input_path(stored);
-        let missing = if path.exists() {
+        let input = self.project.input(stored);
+        let missing = if input.exists() {
             String::new()
         } else {
             self.palette.paint(Tone::Bad, "  missing")
         };
-        format!("{}{note}{missing}", path.display())
+        format!("{}{note}{missing}", input.path().display())
     }
 
     fn state(&self) -> String {

@@ -46,7 +46,7 @@ pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
         ..RunArgs::default()
     };
     let config = context.settings()?.config;
-    let (project, catalog) = context.open().await?;
+    let (project, catalog) = context.open_for_run().await?;
     let options = run::options(&args, &config, &catalog, RunPart::Plan).await?;
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;

@@ -28,6 +28,22 @@ pub struct Config {
     pub review: ReviewSettings,
 }
 
+impl Config {
+    /// Returns the settings without those of a computer: its resources, and where the data is.
+    ///
+    /// # Errors
+    /// Returns an error if a value has no JSON form.
+    pub fn that_change_results(&self) -> Result<serde_json::Value, serde_json::Error> {
+        let mut settings = serde_json::to_value(self)?;
+        if let Some(sections) = settings.as_object_mut() {
+            for section in ["run", "storage"] {
+                sections.remove(section);
+            }
+        }
+        Ok(settings)
+    }
+}
+
 /// Size limits above which an input file is refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +72,14 @@ pub struct RunSettings {
 pub struct StorageSettings {
     /// URL of the catalog in PostgreSQL. Empty for a file in the project.
     pub catalog: String,
+    /// Address of the artifacts in an object store. Empty for the project's folder.
+    pub artifacts: String,
+    /// Folders or addresses of inputs by the name that stored paths begin with.
+    pub roots: BTreeMap<String, String>,
+    /// Folder for local copies of inputs. Empty for the user's cache folder.
+    pub cache: String,
+    /// Space for local copies in GB (1e9 bytes).
+    pub cache_gb: u64,
 }
 
 /// The review page.

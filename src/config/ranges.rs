@@ -17,6 +17,7 @@ const RANGES: &[(&str, RangeInclusive<f64>)] = &[
     ("run.workers", 0.0..=1024.0),
     ("run.memory_mib", 0.0..=1e9),
     ("run.stage_timeout_s", 1.0..=86_400.0),
+    ("storage.cache_gb", 1.0..=1e6),
     ("fit.seed", 0.0..=f64::INFINITY),
     ("fit.spaced_points", 3.0..=100_000.0),
     ("fit.spacing", 1e-6..=1.0),

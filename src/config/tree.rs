@@ -6,6 +6,9 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, hint, quote};
 
+/// A table with names of the user's choice.
+const ROOTS: &str = "storage.roots";
+
 /// The merged settings. `changed` maps the dotted key of each changed setting to the layer that changed it.
 #[derive(Debug, Clone)]
 pub struct Tree {
@@ -102,7 +105,15 @@ impl Tree {
                 Some(_) | None => return,
             }
         }
-        table.insert(last.to_owned(), change.value.clone());
+        match (table.get_mut(last), &change.value) {
+            // Layers add names to these tables.
+            (Some(Value::Table(names)), Value::Table(more)) if change.key == ROOTS => {
+                names.extend(more.clone());
+            }
+            _ => {
+                table.insert(last.to_owned(), change.value.clone());
+            }
+        }
         self.changed
             .retain(|key, _| !key.starts_with(&format!("{}.", change.key)));
         self.changed

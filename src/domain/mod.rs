@@ -25,7 +25,7 @@ mod unique_keys;
 mod unit;
 mod verdict;
 
-pub use artifact::{ArtifactRef, ArtifactSet};
+pub use artifact::{ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
 pub(crate) use enum_names::enum_names;
 pub use failure::{Failure, FailureClass};

@@ -54,7 +54,7 @@ pub struct ExportOptions {
     pub shard_mib: Option<u64>,
     /// Licence of the data, for the dataset card.
     pub license: Option<String>,
-    /// All settings of the project, for the manifest of the export.
+    /// The settings that may change results, for the manifest of the export.
     #[serde(skip)]
     pub settings: Value,
     /// Limits of the input files.

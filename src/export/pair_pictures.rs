@@ -253,8 +253,8 @@ impl<'a> PairPictures<'a> {
     /// Reads the mesh file, and checks that it is the one that was aligned.
     pub(super) fn mesh(&self) -> Result<Mesh, PictureError> {
         let stored = &self.pair.attributes.mesh_path;
-        let (path, limits) = (self.project.input_path(stored), &self.limits.mesh);
-        let mut file = open_input(&path, limits.max_bytes, "limits.mesh.max_bytes")?;
+        let (input, limits) = (self.project.input(stored), &self.limits.mesh);
+        let mut file = open_input(&input, limits.max_bytes, "limits.mesh.max_bytes")?;
         let size = file.size();
         let mesh = match mesh::read_from(&mut file, size, stored, limits) {
             Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
@@ -264,8 +264,9 @@ impl<'a> PairPictures<'a> {
         let digest = file.finish()?;
         let aligned = self.pair.stage(Stage::Fit).map(|record| record.mesh_hash);
         if aligned.is_some_and(|hash| hash != digest.hash) {
-            return Err(PictureError::MeshChanged(path));
+            return Err(PictureError::MeshChanged(input.path().to_owned()));
         }
+        let path = input.path().to_owned();
         mesh.map_err(|source| PictureError::Mesh { path, source })
     }
 }

@@ -47,8 +47,9 @@ impl SourcePrint {
         pair: &PairResults,
         limits: &ImageLimits,
     ) -> Result<Self, SourcePrintError> {
-        let path = project.input_path(&pair.attributes.print_path);
-        let file = read_input(&path, limits.max_bytes, "limits.image.max_bytes")?;
+        let input = project.input(&pair.attributes.print_path);
+        let path = input.path().to_owned();
+        let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")?;
         let normalized = pair.stage(Stage::Normalize);
         let aligned = normalized.and_then(|record| record.print_hash);
         if aligned.is_some_and(|hash| hash != file.digest.hash) {

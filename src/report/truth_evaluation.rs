@@ -132,10 +132,10 @@ fn read_tops_and_depth(
 
 /// Reads the grey values of a tops mask, whatever its image format.
 fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
-    let path = project.input_path(path);
-    let refused = |why: String| TruthError::Mask(format!("{}: {why}", path.display()));
+    let input = project.input(path);
+    let refused = |why: String| TruthError::Mask(format!("{}: {why}", input.path().display()));
     let limits = ImageLimits::SUGGESTED;
-    let file = read_input(&path, limits.max_bytes, "a constant for masks")
+    let file = read_input(&input, limits.max_bytes, "a constant for masks")
         .map_err(|error| TruthError::Mask(error.to_string()))?;
     let picture =
         raster::decode(&file.bytes, &limits).map_err(|error| refused(error.to_string()))?;

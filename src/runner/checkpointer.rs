@@ -2,21 +2,19 @@
 //! not wait for the disk. The files of a stage are on the disk before the stage's row is stored. Stages that arrive
 //! during a transaction share the next transaction. At its end, the task returns the lease.
 
-use std::io;
 use std::sync::Arc;
 
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::compute_thread::{ComputedStage, run_blocking, task_result};
+use super::compute_thread::{ComputedStage, task_result};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::run_context::{PairEnd, PairReport, RunContext};
-use super::stop::StopLevel;
-use crate::catalog::{CheckpointOutcome, Lease, StageCheckpoint};
+use super::stage_files::write_batch;
+use crate::catalog::{CheckpointOutcome, Lease};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
-use crate::store::{ArtifactError, NewArtifact};
 
 /// The task that holds a pair's lease and stores its stages.
 pub(super) struct Checkpointer {
@@ -141,76 +139,6 @@ async fn store_stages(
         stages: count,
         is_complete,
     })
-}
-
-/// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
-/// and `false` if an immediate stop left a stage unwritten.
-async fn write_batch(
-    context: &RunContext,
-    pair: &PairName,
-    first: ComputedStage,
-    stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
-) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
-    let (mut batch, mut next) = (Vec::new(), Some(first));
-    while let Some(stage) = next {
-        match write_stage(context, pair, stage).await? {
-            Some(done) => batch.push(done),
-            None => return Ok((batch, false)),
-        }
-        next = stages.try_recv().ok();
-    }
-    Ok((batch, true))
-}
-
-/// Writes the files of a stage, and returns the row that names them. Returns `None` if the run must stop at once.
-async fn write_stage(
-    context: &RunContext,
-    pair: &PairName,
-    (stage, files): ComputedStage,
-) -> Result<Option<StageCheckpoint>, RunError> {
-    if !write_files(context, pair, stage.stage, files).await? {
-        return Ok(None);
-    }
-    // Take the times after the slow write, because the lease must still be valid at this point.
-    Ok(Some(StageCheckpoint {
-        at: context.clock.now(),
-        next_deadline: context.deadline(),
-        alive_since: context.alive_since(),
-        ..stage
-    }))
-}
-
-/// Writes a stage's files durably, on a thread for blocking calls. If an immediate stop is requested, returns `false`
-/// without waiting for the disk.
-///
-/// # Errors
-/// Returns an error if the disk fails, or does not finish within the time limit.
-async fn write_files(
-    context: &RunContext,
-    pair: &PairName,
-    stage: Stage,
-    files: Vec<NewArtifact>,
-) -> Result<bool, ArtifactError> {
-    let (project, name) = (context.project.clone(), pair.clone());
-    let timeout = context.stage_timeout;
-    let writing = run_blocking(move || {
-        let on_written = || failpoint::hit(stage, Point::Written, Some(&name));
-        project.write_artifacts(&files, &on_written)?;
-        failpoint::hit(stage, Point::Synced, Some(&name));
-        Ok(true)
-    });
-    tokio::select! {
-        biased;
-        written = writing => written,
-        () = context.stop.reached(StopLevel::Now) => Ok(false),
-        () = tokio::time::sleep(timeout) => {
-            let text = format!("the disk took longer than {} s", timeout.as_secs_f64());
-            Err(ArtifactError::Io {
-                path: context.project.artifacts_dir(),
-                source: io::Error::new(io::ErrorKind::TimedOut, text),
-            })
-        }
-    }
 }
 
 fn report_stored(context: &RunContext, pair: PairName, stage: Stage, ms: u64) {

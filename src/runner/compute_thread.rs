@@ -19,7 +19,7 @@ use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, StageCheckpoint};
 use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
-use crate::store::NewArtifact;
+use crate::store::{ArtifactError, NewArtifact};
 
 /// A computed stage: its catalog row, and the files that must be on the disk before the row is stored.
 pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);
@@ -40,6 +40,8 @@ pub(super) enum ComputeEvent {
         inputs: InputVersions,
         ms: u64,
     },
+    /// An object store failed; this is the last event.
+    StoreFailed(ArtifactError),
     /// A stage panicked; the pair's data is lost.
     Panicked(String),
     /// A stage took too long; its thread is abandoned.
@@ -106,6 +108,7 @@ fn run_stages(
                 None => break ComputeEvent::Finished(Box::new(computed), None),
             },
             Ok(Err(ExecutionError::RerunFrom(earlier))) => stage = earlier,
+            Ok(Err(ExecutionError::Store(error))) => break ComputeEvent::StoreFailed(error),
             Ok(Err(ExecutionError::Failed {
                 failure,
                 is_transient,

@@ -1,13 +1,13 @@
 //! Finds input files that have changed since they were read. A file is hashed only if its size, modification time or
 //! inode has changed.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use crate::domain::{ContentHash, PairId};
-use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
+use crate::store::{Input, InputDigest, InputError, Project, hash_input, stat_input};
 
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
@@ -76,10 +76,10 @@ pub(super) async fn store_inputs_of_quarantined(
 
 /// Returns the current versions of two files. Returns `None` for a file if reading it fails or is ended by `limits`.
 pub(super) async fn current_of_both(
-    paths: [PathBuf; 2],
+    inputs: [Input; 2],
     limits: &ReadLimits,
 ) -> [Option<InputVersion>; 2] {
-    let files = paths.into_iter().map(CurrentInput).collect();
+    let files = inputs.into_iter().map(CurrentInput).collect();
     let mut found = read_each(files, limits)
         .await
         .into_iter()
@@ -124,7 +124,7 @@ impl ReadItem for UnreadInputs {
 }
 
 /// A file that is hashed.
-struct CurrentInput(PathBuf);
+struct CurrentInput(Input);
 
 impl ReadItem for CurrentInput {
     type Output = Option<InputVersion>;
@@ -134,7 +134,7 @@ impl ReadItem for CurrentInput {
     }
 
     fn path(&self) -> PathBuf {
-        self.0.clone()
+        self.0.path().to_owned()
     }
 }
 
@@ -142,7 +142,7 @@ impl ReadItem for CurrentInput {
 fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
     let current = |known: Option<&InputVersion>, stored: &str| match known {
         Some(_) => None,
-        None => current(&project.input_path(stored)),
+        None => current(&project.input(stored)),
     };
     InputVersions {
         mesh: current(known.mesh.as_ref(), &known.mesh_path),
@@ -163,10 +163,10 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
 /// if an import has changed its path since the last read.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
-    let path = project.input_path(stored);
-    match stat_input(&path) {
+    let input = project.input(stored);
+    match stat_input(&input) {
         Ok(stat) if stat == known.stat => None,
-        Ok(_) => current(&path),
+        Ok(_) => current(&input),
         Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
             hash: ContentHash::of(b""),
             stat: "gone".to_owned(),
@@ -176,8 +176,8 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
 }
 
 /// Returns the current version of a file, or `None` if the file cannot be read.
-fn current(path: &Path) -> Option<InputVersion> {
-    hash_input(path).ok().map(Into::into)
+fn current(input: &Input) -> Option<InputVersion> {
+    hash_input(input).ok().map(Into::into)
 }
 
 impl From<InputDigest> for InputVersion {

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::catalog::PairAttributes;
 use crate::domain::Stage;
 use crate::raster;
-use crate::store::{Project, open_regular};
+use crate::store::{Input, Project};
 
 /// Bytes reserved for each pair's maps and masks, in addition to its mesh and print.
 pub(super) const PAIR_BYTES: u64 = 32 << 20;
@@ -70,41 +70,37 @@ pub(super) fn estimated_bytes(
     images: &raster::ImageLimits,
 ) -> u64 {
     let mesh = match from {
-        Stage::Fit | Stage::Depth => mesh_bytes(&project.input_path(&pair.mesh_path)),
+        Stage::Fit | Stage::Depth => mesh_bytes(&project.input(&pair.mesh_path)),
         Stage::Normalize | Stage::Register => 0,
     };
     let print = match from {
         Stage::Fit | Stage::Depth | Stage::Normalize => {
-            print_bytes(&project.input_path(&pair.print_path), images)
+            print_bytes(&project.input(&pair.print_path), images)
         }
         Stage::Register => 0,
     };
     PAIR_BYTES.saturating_add(mesh).saturating_add(print)
 }
 
-fn size(path: &Path) -> u64 {
-    std::fs::metadata(path).map_or(0, |meta| meta.len())
-}
-
-fn mesh_bytes(path: &Path) -> u64 {
-    let factor = match extension(path).as_str() {
+fn mesh_bytes(mesh: &Input) -> u64 {
+    let factor = match extension(mesh.path()).as_str() {
         "obj" => OBJ_FACTOR,
         _ => MESH_FACTOR,
     };
-    (size(path) as f64 * factor) as u64
+    (mesh.size() as f64 * factor) as u64
 }
 
 /// Estimates the memory in bytes for a print from the pixel count in its header, because a small file may hold many
 /// pixels. If the header cannot be read, the file size decides. At most `images.max_pixels` pixels count.
-fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
-    let Ok((file, meta)) = open_regular(path) else {
+fn print_bytes(print: &Input, images: &raster::ImageLimits) -> u64 {
+    let Ok(file) = print.open() else {
         return 0;
     };
-    let size = meta.len();
+    let size = file.metadata().map_or(0, |meta| meta.len());
     let pixels = Some(file)
         .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
         .unwrap_or_else(|| {
-            size.saturating_mul(match extension(path).as_str() {
+            size.saturating_mul(match extension(print.path()).as_str() {
                 "jpg" | "jpeg" => JPEG_PIXELS_PER_BYTE,
                 _ => PIXELS_PER_BYTE,
             })
@@ -124,7 +120,7 @@ mod tests {
     use crate::domain::Stage;
     use crate::raster;
     use crate::runner::tests::values;
-    use crate::store::Project;
+    use crate::store::{Input, Project};
 
     #[test]
     fn reservations_stay_within_the_limit_except_for_one_pair_that_exceeds_it() {
@@ -156,7 +152,7 @@ mod tests {
         white.save(&path).expect("a file");
         let size = std::fs::metadata(&path).expect("a file").len();
         assert!(size < 100_000);
-        let bytes = print_bytes(&path, &raster::ImageLimits::SUGGESTED);
+        let bytes = print_bytes(&Input::file(path), &raster::ImageLimits::SUGGESTED);
         assert_eq!(bytes, 6_000_000 * PIXEL_BYTES + size);
     }
 

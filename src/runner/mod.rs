@@ -6,6 +6,7 @@
 //! follows a failure. The code map in `lib.rs` says where a lost lease is noticed.
 
 mod checkpointer;
+mod claim_size;
 mod compute_thread;
 mod error;
 mod events;
@@ -23,6 +24,7 @@ mod run_context;
 mod run_guard;
 mod scheduler;
 mod stage_executor;
+mod stage_files;
 mod stage_inputs;
 mod stage_output;
 mod stop;

@@ -18,6 +18,7 @@ use super::stop::StopLevel;
 use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
 use crate::domain::{Failure, FailureClass, Stage};
 use crate::failpoint::{self, Point};
+use crate::store::ArtifactError;
 
 /// What is left to do for a pair when its stages are computed.
 pub(super) enum PairOutcome {
@@ -91,6 +92,9 @@ async fn compute(
                     ms: Some(ms),
                 };
             }
+            ComputeEvent::StoreFailed(error) => {
+                return PairOutcome::Ended(end_without_store(checkpointer, error).await);
+            }
             ComputeEvent::Panicked(text) => {
                 break FailedStage::without_pair(FailureClass::Bug, text);
             }
@@ -116,6 +120,20 @@ fn timeout_text(stage: Stage, timeout: Duration, reading: Option<PathBuf>) -> St
             path.display()
         ),
         None => text,
+    }
+}
+
+/// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again later.
+/// Any other error, such as refused credentials, concerns all pairs and ends the run.
+async fn end_without_store(checkpointer: Checkpointer, error: ArtifactError) -> PairReport {
+    let report = checkpointer.finish(PairEnd::Released).await;
+    if error.is_unavailable() {
+        tracing::warn!("{error}; the pair is tried again");
+        return report;
+    }
+    PairReport {
+        end: report.end.and(Err(error.into())),
+        ..report
     }
 }
 
@@ -230,7 +248,7 @@ impl PairSummary {
             return read;
         }
         let paths = [&self.attributes.mesh_path, &self.attributes.print_path];
-        let paths = paths.map(|path| context.project.input_path(path));
+        let paths = paths.map(|path| context.project.input(path));
         let limits = ReadLimits {
             timeout: context.stage_timeout.min(MAX_REREAD),
             stop: context.stop.clone(),

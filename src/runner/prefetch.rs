@@ -4,8 +4,11 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use tokio::task::JoinHandle;
+
+use super::claim_size::{CLAIM_AHEAD, DurationEstimate, FETCH_AHEAD, Load};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
@@ -17,11 +20,6 @@ use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWor
 use crate::domain::{PairName, Stage, WorkerId};
 use crate::raster;
 use crate::store::Project;
-
-/// Pairs are claimed ahead to keep each slot busy for this time. One claim then covers several short pairs.
-const CLAIM_AHEAD: Duration = Duration::from_millis(250);
-/// Most pairs claimed ahead for one slot, however short they are.
-const MAX_AHEAD_PER_SLOT: u128 = 16;
 
 /// Identifies a task that occupies a slot. A pair may occupy two slots: after its lease was lost, the process may lease
 /// the pair again while the earlier task still computes.
@@ -46,6 +44,8 @@ pub(super) struct Prefetch {
     slots: usize,
     /// Leased pairs that have not started, in the order of their claim.
     queue: VecDeque<LeasedPair>,
+    /// Leased pairs whose inputs are read from an object store, in the order of their claim.
+    arriving: VecDeque<ArrivingPairs>,
     running: BTreeMap<SlotId, RunningPair>,
     next_slot: SlotId,
     durations: DurationEstimate,
@@ -56,6 +56,12 @@ pub(super) struct Prefetch {
     is_exclusive: bool,
     /// A claim may find pairs that the last one did not find.
     may_find_more: bool,
+}
+
+/// Pairs of one claim, whose estimates a task makes. With remote inputs, this reads the inputs into the local cache.
+struct ArrivingPairs {
+    leased: Vec<(Lease, PairWork)>,
+    estimates: JoinHandle<Vec<Option<u64>>>,
 }
 
 /// A pair in a slot.
@@ -80,6 +86,7 @@ impl Prefetch {
             image_limits: options.image_limits,
             slots: options.workers.max(1),
             queue: VecDeque::new(),
+            arriving: VecDeque::new(),
             running: BTreeMap::new(),
             next_slot: SlotId(0),
             durations: DurationEstimate::default(),
@@ -129,7 +136,12 @@ impl Prefetch {
     /// Claims pairs for slots that are free or soon become free. Returns `false`, and claims nothing, if no pair is
     /// needed, if none may start yet, or if nothing has changed since the last claim.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
-        let wanted = self.load().pairs_to_claim(self.durations.pairs_ahead());
+        let load = self.load();
+        let wanted = if self.context.project.has_remote_inputs() {
+            load.pairs_to_fetch(self.durations.pairs_within(FETCH_AHEAD))
+        } else {
+            load.pairs_to_claim(self.durations.pairs_within(CLAIM_AHEAD))
+        };
         let is_blocked = self.is_exclusive || self.waits_for_memory;
         if is_blocked || !self.may_find_more || wanted == 0 {
             return Ok(false);
@@ -142,7 +154,7 @@ impl Prefetch {
     /// Claims one of the pairs that must run with no other beside them.
     pub(super) async fn claim_exclusive(&mut self, worker: WorkerId) -> Result<(), RunError> {
         self.lease(worker, 1, true).await?;
-        self.is_exclusive = !self.queue.is_empty();
+        self.is_exclusive = !self.queue.is_empty() || self.arriving_pairs() > 0;
         Ok(())
     }
 
@@ -178,8 +190,15 @@ impl Prefetch {
 
     /// Releases the leases of all pairs that have not started.
     pub(super) async fn release_all(&mut self) -> Result<(), RunError> {
-        for pair in std::mem::take(&mut self.queue) {
-            self.context.catalog.release(pair.lease).await?;
+        let arriving = std::mem::take(&mut self.arriving);
+        let arriving = arriving.into_iter().flat_map(|pairs| {
+            pairs.estimates.abort();
+            pairs.leased.into_iter().map(|(lease, _)| lease)
+        });
+        let queued = std::mem::take(&mut self.queue);
+        let queued = queued.into_iter().map(|pair| pair.lease);
+        for lease in queued.chain(arriving) {
+            self.context.catalog.release(lease).await?;
         }
         Ok(())
     }
@@ -193,8 +212,13 @@ impl Prefetch {
             free: self.free_slots(),
             running: self.running.len(),
             soon_free: at_last_stage.count(),
-            queued: self.queue.len(),
+            queued: self.queue.len() + self.arriving_pairs(),
         }
+    }
+
+    /// Returns the number of leased pairs whose inputs have not arrived.
+    pub(super) fn arriving_pairs(&self) -> usize {
+        self.arriving.iter().map(|pairs| pairs.leased.len()).sum()
     }
 
     /// Leases up to `count` pairs and appends them to the queue.
@@ -228,39 +252,57 @@ impl Prefetch {
         let catalog = &context.catalog;
         let works = catalog.retry_while_unavailable(async || catalog.work(&leases).await);
         let works = works.await?;
-        let leased = self.estimate(leases.into_iter().zip(works)).await;
-        self.queue.extend(leased);
+        let leased: Vec<_> = leases.into_iter().zip(works).collect();
+        let estimates = tokio::spawn(self.estimates(&leased));
+        self.arriving.push_back(ArrivingPairs { leased, estimates });
+        if !self.context.project.has_remote_inputs() {
+            self.arrive().await;
+        }
         Ok(())
     }
 
-    /// Adds a memory estimate to each pair. Reads the headers of the print images. If this takes too long for a pair,
-    /// its files count as empty.
-    async fn estimate(&self, leased: impl Iterator<Item = (Lease, PairWork)>) -> Vec<LeasedPair> {
-        let leased: Vec<_> = leased.collect();
-        let estimates = if self.memory.is_limited() {
-            let estimated = leased.iter().map(|(lease, work)| EstimatedPair {
-                project: self.context.project.clone(),
-                attributes: work.attributes.clone(),
-                from: lease.cursor(),
-                limits: self.image_limits,
-            });
-            let limits = ReadLimits {
-                timeout: self.context.timing.read_timeout(),
-                stop: self.context.stop.clone(),
-                until: StopLevel::Drain,
-            };
-            read_each(estimated.collect(), &limits).await
-        } else {
-            vec![Some(0); leased.len()]
+    /// Waits until the inputs of the pairs that were claimed first have arrived, and appends these pairs to the queue.
+    /// Does not return if no pair is arriving. Nothing is lost if the wait is cancelled.
+    pub(super) async fn arrive(&mut self) {
+        let Some(first) = self.arriving.front_mut() else {
+            return std::future::pending().await;
         };
+        // After a panic, the pairs count as pairs whose files cannot be read.
+        let estimates = (&mut first.estimates).await.unwrap_or_default();
+        let Some(ArrivingPairs { leased, .. }) = self.arriving.pop_front() else {
+            return;
+        };
+        let estimates = estimates.into_iter().chain(std::iter::repeat(None));
         let leased = leased.into_iter().zip(estimates);
-        leased
-            .map(|((lease, work), bytes)| LeasedPair {
+        self.queue
+            .extend(leased.map(|((lease, work), bytes)| LeasedPair {
                 lease,
                 work,
                 bytes: bytes.unwrap_or(PAIR_BYTES),
-            })
-            .collect()
+            }));
+    }
+
+    /// Estimates the memory that each pair needs. Reads the headers of the print images, and remote inputs as a whole.
+    /// If this takes too long for a pair, its estimate is `None`.
+    fn estimates(
+        &self,
+        leased: &[(Lease, PairWork)],
+    ) -> impl Future<Output = Vec<Option<u64>>> + use<> {
+        let is_needed = self.memory.is_limited() || self.context.project.has_remote_inputs();
+        let estimated = leased.iter().map(|(lease, work)| EstimatedPair {
+            project: self.context.project.clone(),
+            attributes: work.attributes.clone(),
+            from: lease.cursor(),
+            limits: self.image_limits,
+        });
+        let estimated: Vec<_> = estimated.take_while(|_| is_needed).collect();
+        let others = vec![Some(0); leased.len() - estimated.len()];
+        let limits = ReadLimits {
+            timeout: self.context.timing.read_timeout(),
+            stop: self.context.stop.clone(),
+            until: StopLevel::Drain,
+        };
+        async move { [read_each(estimated, &limits).await, others].concat() }
     }
 
     /// Warns if the memory estimate of a pair exceeds the limit for all running pairs together.
@@ -292,106 +334,5 @@ impl ReadItem for EstimatedPair {
 
     fn path(&self) -> PathBuf {
         self.project.input_path(&self.attributes.mesh_path)
-    }
-}
-
-/// How busy the slots are.
-#[derive(Debug, Clone, Copy)]
-struct Load {
-    free: usize,
-    running: usize,
-    /// Running pairs at their last stage.
-    soon_free: usize,
-    /// Leased pairs that wait for a slot.
-    queued: usize,
-}
-
-impl Load {
-    /// Returns how many pairs to claim, or 0 if enough pairs are queued. `ahead_per_slot` is the number of pairs to
-    /// claim ahead for each slot.
-    const fn pairs_to_claim(self, ahead_per_slot: usize) -> usize {
-        match (self.free + self.soon_free).saturating_sub(self.queued) {
-            0 => 0,
-            needed => needed + (self.free + self.running) * ahead_per_slot,
-        }
-    }
-}
-
-/// Estimate of how long a pair occupies its slot: a moving average in which recent pairs weigh most.
-#[derive(Debug, Default)]
-struct DurationEstimate {
-    mean: Option<Duration>,
-    is_disabled: bool,
-}
-
-impl DurationEstimate {
-    /// Takes in how long a pair occupied its slot.
-    fn add(&mut self, elapsed: Duration) {
-        self.mean = Some(self.mean.map_or(elapsed, |mean| (mean * 3 + elapsed) / 4));
-    }
-
-    /// Ends claiming ahead. Called if memory is short, because the pairs would have to be released again.
-    const fn disable(&mut self) {
-        self.is_disabled = true;
-    }
-
-    /// Returns how many pairs one slot finishes within [`CLAIM_AHEAD`].
-    fn pairs_ahead(&self) -> usize {
-        match self.mean {
-            Some(mean) if !self.is_disabled => {
-                let pairs = CLAIM_AHEAD.as_micros() / mean.as_micros().max(1);
-                pairs.min(MAX_AHEAD_PER_SLOT) as usize
-            }
-            Some(_) | None => 0,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::time::Duration;
-
-    use super::{DurationEstimate, Load, MAX_AHEAD_PER_SLOT};
-
-    /// Returns how many pairs are claimed ahead per slot, given the durations of earlier pairs in milliseconds.
-    fn pairs_ahead(durations: &[u64]) -> usize {
-        let mut estimate = DurationEstimate::default();
-        for ms in durations {
-            estimate.add(Duration::from_millis(*ms));
-        }
-        estimate.pairs_ahead()
-    }
-
-    #[test]
-    fn pairs_are_claimed_for_slots_that_soon_become_free_and_more_where_they_are_short() {
-        let load = |free, soon_free, queued| Load {
-            free,
-            running: 2 - free,
-            soon_free,
-            queued,
-        };
-        assert_eq!(load(2, 0, 0).pairs_to_claim(0), 2);
-        assert_eq!(load(0, 0, 0).pairs_to_claim(0), 0);
-        assert_eq!(load(0, 1, 0).pairs_to_claim(0), 1);
-        assert_eq!(load(0, 1, 1).pairs_to_claim(2), 0);
-        assert_eq!(load(0, 1, 0).pairs_to_claim(2), 1 + 4);
-        assert_eq!(load(1, 1, 0).pairs_to_claim(2), 2 + 4);
-    }
-
-    #[test]
-    fn short_pairs_are_claimed_ahead_and_long_ones_are_not() {
-        assert_eq!(pairs_ahead(&[]), 0);
-        assert_eq!(pairs_ahead(&[100]), 2);
-        assert_eq!(pairs_ahead(&[0, 0]), MAX_AHEAD_PER_SLOT as usize);
-        assert_eq!(pairs_ahead(&[5000]), 0);
-        assert_eq!(pairs_ahead(&[100, 5000]), 0, "they have become long");
-    }
-
-    #[test]
-    fn no_pairs_are_claimed_ahead_where_memory_is_short() {
-        let mut estimate = DurationEstimate::default();
-        estimate.add(Duration::from_millis(1));
-        estimate.disable();
-        assert_eq!(estimate.pairs_ahead(), 0);
     }
 }

@@ -108,6 +108,7 @@ impl Scheduler {
                 }
                 Some(computed) = self.computing.join_next() => self.finish_computing(task_result(computed)),
                 Some(report) = self.storing.join_next() => self.count(task_result(report)),
+                () = self.prefetch.arrive() => {}
                 _ = recoveries.tick() => self.recover().await?,
                 _ = polls.tick(), if self.prefetch.free_slots() > 0 => self.poll().await?,
             }
@@ -157,7 +158,7 @@ impl Scheduler {
     }
 
     fn is_idle(&self) -> bool {
-        self.computing.is_empty() && self.storing.is_empty()
+        self.computing.is_empty() && self.storing.is_empty() && self.prefetch.arriving_pairs() == 0
     }
 
     /// Turns the catalog's commit delay off in two cases: a slot is free while a pair is being stored, or more than

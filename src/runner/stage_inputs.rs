@@ -114,6 +114,9 @@ impl StageInputs {
                     tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
                     ExecutionError::RerunFrom(stage)
                 }
+                ArtifactError::NoStore(_) | ArtifactError::Bucket(_) => {
+                    ExecutionError::Store(error)
+                }
                 ArtifactError::Io { .. } | ArtifactError::Moved(_) => ExecutionError::Failed {
                     failure: Failure::new(FailureClass::Io, error.to_string()),
                     is_transient: true,
@@ -124,10 +127,10 @@ impl StageInputs {
     /// Reads the mesh file, and records its hash in the pair.
     pub(super) fn read_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         let stored = &pair.attributes.mesh_path;
-        let path = self.project.input_path(stored);
+        let input = self.project.input(stored);
         let limit = self.mesh_limits.max_bytes;
-        pair.file_in_use.set(Some(&path));
-        let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unreadable)?;
+        pair.file_in_use.set(Some(input.path()));
+        let mut file = open_input(&input, limit, "limits.mesh.max_bytes").map_err(unreadable)?;
         let size = file.size();
         let mesh = match mesh::read_from(&mut file, size, stored, &self.mesh_limits) {
             Err(mesh::MeshReadError::Io(error)) => return Err(unreadable(file.error(error))),
@@ -146,10 +149,10 @@ impl StageInputs {
     /// Reads the print image, and records its hash in the pair.
     pub(super) fn read_print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         let stored = &pair.attributes.print_path;
-        let path = self.project.input_path(stored);
+        let input = self.project.input(stored);
         let limit = self.image_limits.max_bytes;
-        pair.file_in_use.set(Some(&path));
-        let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unreadable)?;
+        pair.file_in_use.set(Some(input.path()));
+        let file = read_input(&input, limit, "limits.image.max_bytes").map_err(unreadable)?;
         pair.inputs.print = Some(file.digest.into());
         pair.file_in_use.set(None);
         let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
@@ -160,11 +163,10 @@ impl StageInputs {
     }
 }
 
-#[expect(
-    clippy::needless_pass_by_value,
-    reason = "its signature fits `map_err`"
-)]
 fn unreadable(error: InputError) -> ExecutionError {
+    if let InputError::Store(error) = error {
+        return ExecutionError::Store(ArtifactError::Bucket(error));
+    }
     let is_transient = error.is_transient();
     ExecutionError::Failed {
         failure: Failure::new(error.class(), error.to_string()),

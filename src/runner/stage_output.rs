@@ -10,7 +10,7 @@ use crate::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
 use crate::raster::DepthMap;
-use crate::store::NewArtifact;
+use crate::store::{ArtifactError, NewArtifact};
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,10 +23,12 @@ pub(super) struct StageOutput {
 }
 
 /// Why a stage returned nothing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) enum ExecutionError {
     /// The result of an earlier stage is missing, or belongs to other inputs. The pair runs again from that stage on.
     RerunFrom(Stage),
+    /// An object store failed, which is not the fault of the pair.
+    Store(ArtifactError),
     /// The stage failed.
     Failed {
         failure: Failure,
@@ -75,6 +77,10 @@ pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
 
 /// Returns the hash of a stage's numbers and files. Times are not included.
 pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
+    let mut files = files.clone();
+    for artifact in files.values_mut() {
+        artifact.pack = None;
+    }
     let result = json!({ "outcome": outcome, "files": files });
     hash_of_json(&result)
 }

@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
-use super::atomic_write::write_synced;
+use super::atomic_write::{set_modified_now, write_synced};
 use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
 use super::parent_folder::{parent_folder, sync_folder};
+use super::remote::BucketError;
 use crate::domain::{ArtifactRef, ContentHash};
 use crate::platform::rename;
 
@@ -31,6 +32,7 @@ impl NewArtifact {
             hash: ContentHash::of(&bytes),
             ext: ext.to_owned(),
             bytes: bytes.len() as u64,
+            pack: None,
         };
         Self {
             role: role.to_owned(),
@@ -48,6 +50,11 @@ impl NewArtifact {
     pub const fn reference(&self) -> &ArtifactRef {
         &self.reference
     }
+
+    /// Returns its content.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
 }
 
 /// Why an artifact could not be read or written.
@@ -64,6 +71,12 @@ pub enum ArtifactError {
         "{0} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path"
     )]
     Moved(PathBuf),
+    /// A row names a pack in an object store, but the settings name no store.
+    #[error("artifact {0} is in an object store; set storage.artifacts to its address")]
+    NoStore(String),
+    /// A request to the object store failed.
+    #[error("artifact: {0}")]
+    Bucket(BucketError),
     /// A file operation failed.
     #[error("artifact {path}: {source}")]
     Io {
@@ -75,6 +88,11 @@ pub enum ArtifactError {
 }
 
 impl ArtifactError {
+    /// Returns whether an object store did not answer, so that the same request may succeed later.
+    pub const fn is_unavailable(&self) -> bool {
+        matches!(self, Self::Bucket(BucketError::Unavailable { .. }))
+    }
+
     fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io { path, source }
@@ -89,6 +107,7 @@ impl From<InputError> for ArtifactError {
             | InputError::Changed(path)
             | InputError::TooLarge { path, .. } => Self::Changed(path),
             InputError::Denied(path) => Self::io(&path)(ErrorKind::PermissionDenied.into()),
+            InputError::Store(error) => Self::Bucket(error),
             InputError::Io { path, source } => Self::Io { path, source },
         }
     }
@@ -98,8 +117,11 @@ impl From<InputError> for ArtifactError {
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 impl Project {
-    /// Returns the path of an artifact.
+    /// Returns the path of an artifact, or the address of its pack in an object store.
     pub fn artifact_path(&self, artifact: &ArtifactRef) -> PathBuf {
+        if let Some(location) = &artifact.pack {
+            return self.pack_path(&location.name);
+        }
         let hex = artifact.hash.to_hex();
         let name = format!("{hex}.{}", artifact.ext);
         self.artifacts_dir().join(&hex[..2]).join(name)
@@ -110,6 +132,9 @@ impl Project {
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
     pub fn read_artifact(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
+        if let Some(location) = &artifact.pack {
+            return self.read_packed(artifact, location);
+        }
         let path = self.artifact_path(artifact);
         let (mut file, _) = open_regular(&path)?;
         let mut bytes = Vec::new();
@@ -127,6 +152,9 @@ impl Project {
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
     pub fn check_artifact(&self, artifact: &ArtifactRef, quick: bool) -> Result<(), ArtifactError> {
+        if let Some(location) = &artifact.pack {
+            return self.check_packed(artifact, location, quick);
+        }
         let path = self.artifact_path(artifact);
         let is_complete = regular_metadata(&path)?.len() == artifact.bytes
             && (quick || has_hash(&path, &artifact.hash)?);
@@ -160,7 +188,8 @@ impl Project {
             let path = self.artifact_path(&file.reference);
             let folder = parent_folder(&path);
             self.make_folder(&folder)?;
-            if self.read_artifact(&file.reference).is_err() {
+            // A file that is there already may be unreferenced, and another process may be about to remove it.
+            if self.read_artifact(&file.reference).is_err() || !set_modified_now(&path) {
                 self.write_artifact(&path, &file.bytes, on_written)?;
             }
             folders.insert(folder);

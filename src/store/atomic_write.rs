@@ -3,6 +3,7 @@
 use std::fs::{File, Metadata};
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
+use std::time::SystemTime;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
@@ -66,6 +67,14 @@ pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
         let text = format!("the file is complete, but the disk did not confirm its name: {error}");
         std::io::Error::new(error.kind(), text)
     })
+}
+
+/// Sets the time of change of a file to the present, so that it is not removed as an old unreferenced file. Returns
+/// whether this succeeded.
+pub(super) fn set_modified_now(path: &Path) -> bool {
+    let file = File::options().append(true).open(path);
+    file.and_then(|file| file.set_modified(SystemTime::now()))
+        .is_ok()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use super::remote::BucketError;
 use crate::domain::FailureClass;
 use crate::platform::{is_out_of_files, is_system_out_of_files};
 
@@ -38,6 +39,9 @@ pub enum InputError {
     /// The file is being written.
     #[error("{0} changed while it was read")]
     Changed(PathBuf),
+    /// The object store failed; another attempt may succeed.
+    #[error("{0}")]
+    Store(BucketError),
     /// Reading failed; it may succeed another time.
     #[error("{path}: {source}")]
     Io {
@@ -46,6 +50,15 @@ pub enum InputError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl From<BucketError> for InputError {
+    fn from(error: BucketError) -> Self {
+        match error {
+            BucketError::NotThere(address) => Self::NotThere(address.into()),
+            error => Self::Store(error),
+        }
+    }
 }
 
 impl InputError {
@@ -72,6 +85,7 @@ impl InputError {
             | Self::NotAFile { .. }
             | Self::Denied(_)
             | Self::Changed(_)
+            | Self::Store(_)
             | Self::Io { .. } => FailureClass::Io,
             Self::TooLarge { .. } => FailureClass::BadInput,
         }
@@ -81,7 +95,7 @@ impl InputError {
     pub fn is_transient(&self) -> bool {
         match self {
             Self::Io { source, .. } => source.kind() != ErrorKind::InvalidFilename,
-            Self::Changed(_) => true,
+            Self::Changed(_) | Self::Store(_) => true,
             _ => false,
         }
     }

@@ -2,10 +2,11 @@
 
 use std::fs::File;
 use std::io::{self, Read, Take};
-use std::path::{Path, PathBuf};
 
 use super::input_error::InputError;
+use super::input_place::{Input, Place};
 use super::open_file::{open_regular, regular_metadata};
+use super::remote::BucketError;
 use crate::domain::ContentHash;
 use crate::page_vec::PageVec;
 use crate::platform::generation;
@@ -17,6 +18,22 @@ fn file_stat(meta: &std::fs::Metadata) -> String {
     let modified = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
     let modified = modified.map_or(0, |since| since.as_nanos());
     format!("{}:{modified}:{}", meta.len(), generation(meta))
+}
+
+/// Returns size and modification time of a file below a shared root as text.
+fn shared_file_stat(meta: &std::fs::Metadata) -> String {
+    let stat = file_stat(meta);
+    stat.rsplit_once(':')
+        .map_or_else(String::new, |(stat, _)| stat.to_owned())
+}
+
+impl Input {
+    fn stat(&self, meta: &std::fs::Metadata) -> String {
+        match self.place {
+            Place::SharedFile => shared_file_stat(meta),
+            Place::File | Place::Object(_) => file_stat(meta),
+        }
+    }
 }
 
 /// An input file and its content.
@@ -40,7 +57,7 @@ pub struct InputDigest {
 /// An input file that is being read. Each chunk is hashed right after it is read, while it is in the CPU cache.
 #[derive(Debug)]
 pub struct InputReader {
-    path: PathBuf,
+    input: Input,
     file: Take<File>,
     /// Length of the file in bytes when it was opened.
     len: u64,
@@ -48,6 +65,8 @@ pub struct InputReader {
     limit: (u64, &'static str),
     hasher: blake3::Hasher,
     stat: String,
+    /// Hash of an object when it was received from the store.
+    expected: Option<ContentHash>,
 }
 
 /// Maximum number of bytes that are read and hashed in one step. Chunks of this size stay in the CPU cache.
@@ -70,7 +89,7 @@ impl InputReader {
 
     /// Adds the path to an error from reading it.
     pub fn error(&self, source: io::Error) -> InputError {
-        InputError::io(&self.path, source)
+        InputError::io(self.input.path(), source)
     }
 
     /// Reads the file to its end. Returns the hash and stat of the whole file.
@@ -83,31 +102,47 @@ impl InputReader {
         let (limit, setting) = self.limit;
         if self.file.limit() == 0 {
             return Err(InputError::TooLarge {
-                path: self.path,
+                path: self.input.path().to_owned(),
                 bytes: limit.saturating_add(1),
                 limit,
                 setting,
             });
         }
-        // Reject a changed file: the hash may include bytes that the parser did not read.
-        let meta = self.file.get_ref().metadata();
-        let now = file_stat(&meta.map_err(|error| self.error(error))?);
-        if now != self.stat {
-            return Err(InputError::Changed(self.path));
+        let hash = ContentHash::from_bytes(*self.hasher.finalize().as_bytes());
+        if self.has_changed(&hash)? {
+            return Err(InputError::Changed(self.input.path().to_owned()));
         }
         Ok(InputDigest {
-            hash: ContentHash::from_bytes(*self.hasher.finalize().as_bytes()),
+            hash,
             stat: self.stat,
         })
     }
+
+    /// Returns whether the file has changed since it was opened, so that the hash may include bytes that the parser did
+    /// not read. A local copy of an object is compared with the content that was received.
+    fn has_changed(&self, hash: &ContentHash) -> Result<bool, InputError> {
+        if let (Some(expected), Place::Object(object)) = (&self.expected, &self.input.place) {
+            let is_other = expected != hash;
+            if is_other {
+                object.forget();
+            }
+            return Ok(is_other);
+        }
+        let meta = self.file.get_ref().metadata();
+        let meta = meta.map_err(|error| self.error(error))?;
+        Ok(self.input.stat(&meta) != self.stat)
+    }
 }
 
-/// Returns size, modification time and inode of a file as text.
+/// Returns size, modification time and inode of a file as text, or the version of an object.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
-pub fn stat_input(path: &Path) -> Result<String, InputError> {
-    Ok(file_stat(&regular_metadata(path)?))
+pub fn stat_input(input: &Input) -> Result<String, InputError> {
+    match &input.place {
+        Place::Object(object) => Ok(object.version()?),
+        Place::File | Place::SharedFile => Ok(input.stat(&regular_metadata(input.path())?)),
+    }
 }
 
 /// Opens a file of at most `limit` bytes. `setting` is the name of the limit in error messages.
@@ -115,26 +150,40 @@ pub fn stat_input(path: &Path) -> Result<String, InputError> {
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
 pub fn open_input(
-    path: &Path,
+    input: &Input,
     limit: u64,
     setting: &'static str,
 ) -> Result<InputReader, InputError> {
-    let (file, meta) = open_regular(path)?;
-    if meta.len() > limit {
-        return Err(InputError::TooLarge {
-            path: path.to_owned(),
-            bytes: meta.len(),
-            limit,
-            setting,
-        });
+    let too_large = |bytes| InputError::TooLarge {
+        path: input.path().to_owned(),
+        bytes,
+        limit,
+        setting,
+    };
+    let (file, len, stat, expected) = match &input.place {
+        Place::Object(object) => {
+            let copy = object.open(limit).map_err(|error| match error {
+                BucketError::TooLarge { bytes, .. } => too_large(bytes),
+                error => error.into(),
+            })?;
+            (copy.file, copy.bytes, copy.version, Some(copy.hash))
+        }
+        Place::File | Place::SharedFile => {
+            let (file, meta) = open_regular(input.path())?;
+            (file, meta.len(), input.stat(&meta), None)
+        }
+    };
+    if len > limit {
+        return Err(too_large(len));
     }
     Ok(InputReader {
-        path: path.to_owned(),
+        input: input.clone(),
         file: file.take(limit.saturating_add(1)),
-        len: meta.len(),
+        len,
         limit: (limit, setting),
         hasher: blake3::Hasher::new(),
-        stat: file_stat(&meta),
+        stat,
+        expected,
     })
 }
 
@@ -142,8 +191,12 @@ pub fn open_input(
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, is too large, or changes.
-pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
-    let mut file = open_input(path, limit, setting)?;
+pub fn read_input(
+    input: &Input,
+    limit: u64,
+    setting: &'static str,
+) -> Result<InputFile, InputError> {
+    let mut file = open_input(input, limit, setting)?;
     let about = file.size() as usize;
     let bytes = PageVec::read(&mut file, about).map_err(|error| file.error(error))?;
     Ok(InputFile {
@@ -156,15 +209,22 @@ pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<Inpu
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
-pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
-    let (file, meta) = open_regular(path)?;
+pub fn hash_input(input: &Input) -> Result<InputDigest, InputError> {
+    if let Place::Object(object) = &input.place {
+        let copy = object.open(u64::MAX)?;
+        return Ok(InputDigest {
+            hash: copy.hash,
+            stat: copy.version,
+        });
+    }
+    let (file, meta) = open_regular(input.path())?;
     let mut hasher = blake3::Hasher::new();
     hasher
         .update_reader(file)
-        .map_err(|error| InputError::io(path, error))?;
+        .map_err(|error| InputError::io(input.path(), error))?;
     Ok(InputDigest {
         hash: ContentHash::from_bytes(*hasher.finalize().as_bytes()),
-        stat: file_stat(&meta),
+        stat: input.stat(&meta),
     })
 }
 
@@ -174,13 +234,14 @@ mod tests {
 
     use super::{hash_input, open_input, read_input, stat_input};
     use crate::domain::{ContentHash, FailureClass};
-    use crate::store::InputError;
+    use crate::store::{Input, InputError};
 
     #[test]
     fn a_file_over_the_limit_is_bad_input_and_names_the_setting() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("1.stl");
         std::fs::write(&path, [0; 11]).expect("a file");
+        let path = Input::file(path);
         let error = read_input(&path, 10, "limits.mesh.max_bytes").expect_err("too large");
         assert_eq!(error.class(), FailureClass::BadInput);
         let text = error.to_string();
@@ -194,9 +255,10 @@ mod tests {
     #[test]
     fn a_missing_file_and_a_directory_are_permanent_io_errors() {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let missing = read_input(&dir.path().join("none"), 10, "x").expect_err("not there");
+        let missing =
+            read_input(&Input::file(dir.path().join("none")), 10, "x").expect_err("not there");
         assert!(matches!(missing, InputError::NotThere(_)));
-        let directory = read_input(dir.path(), 10, "x").expect_err("a directory");
+        let directory = read_input(&Input::file(dir.path()), 10, "x").expect_err("a directory");
         assert!(
             directory
                 .to_string()
@@ -213,7 +275,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("1.obj");
         std::fs::write(&path, "v 0 0 0\n").expect("a file");
-        let mut reader = open_input(&path, 100, "x").expect("a file");
+        let mut reader = open_input(&Input::file(&path), 100, "x").expect("a file");
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).expect("it is read");
         // The file grows after its end was reached.
@@ -227,7 +289,7 @@ mod tests {
                 .ends_with("1.obj changed while it was read")
         );
         assert!(error.is_transient());
-        let again = open_input(&path, 100, "x").expect("a file");
+        let again = open_input(&Input::file(&path), 100, "x").expect("a file");
         let digest = again.finish().expect("it stays the same");
         assert_eq!(digest.hash, ContentHash::of(b"v 0 0 0\nv 1 0 0\n"));
     }
@@ -237,6 +299,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("1.png");
         std::fs::write(&path, b"print").expect("a file");
+        let path = Input::file(path);
         let read = read_input(&path, 10, "x").expect("a file");
         let hashed = hash_input(&path).expect("a file");
         assert_eq!(read.digest, hashed);

@@ -2,14 +2,18 @@
 
 mod artifacts;
 mod atomic_write;
+mod collect;
 mod input_error;
+mod input_place;
 mod inputs;
 mod lock;
 mod lock_file;
 mod open_file;
+mod packed;
 mod parent_folder;
 mod project;
 mod referenced;
+mod remote;
 mod replacement_folder;
 mod staging;
 mod target_lock;
@@ -17,6 +21,7 @@ mod target_lock;
 pub use artifacts::{ArtifactError, NewArtifact};
 pub use atomic_write::{rename_into_place, write_atomic, write_synced};
 pub use input_error::InputError;
+pub use input_place::Input;
 pub use inputs::{
     InputDigest, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
 };
@@ -24,6 +29,7 @@ pub use lock::{LockError, RunLock};
 pub use open_file::{open_regular, read_file_or_pipe};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
+pub use remote::{BucketError, ProjectStorage, StorageError, StorageOptions};
 pub use replacement_folder::{Leftover, ReplaceError, ReplacementFolder};
 pub use staging::StagingFolder;
 pub use target_lock::{TargetLock, TargetLockError};

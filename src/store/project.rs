@@ -1,8 +1,10 @@
 //! The project directory: the paths of its catalog, settings, artifacts and inputs.
 
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 use super::parent_folder::{parent_folder, sync_folder};
+use super::remote::ProjectStorage;
 use crate::platform::{FileId, stat, with_slashes};
 
 /// Name of the catalog file in a project.
@@ -13,11 +15,13 @@ pub const SETTINGS_FILE: &str = "mocban.toml";
 const ARTIFACTS: &str = "artifacts";
 
 /// A project directory.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Project {
     dir: PathBuf,
     /// Identity of the directory when it was opened. `None` if the project may not exist yet.
     identity: Option<FileId>,
+    /// Named roots of inputs, and an object store for artifacts, if the settings name any.
+    storage: Option<Arc<ProjectStorage>>,
 }
 
 /// Why a project's directory cannot be used.
@@ -73,6 +77,7 @@ impl Project {
         Self {
             dir: dir.to_owned(),
             identity: None,
+            storage: None,
         }
     }
 
@@ -82,6 +87,7 @@ impl Project {
         Ok(Self {
             dir: dir.to_owned(),
             identity: Some(found.id),
+            storage: None,
         })
     }
 
@@ -134,9 +140,22 @@ impl Project {
         self.dir.join(ARTIFACTS)
     }
 
-    /// Returns the path of an input. `stored` is relative to the project or absolute.
-    pub fn input_path(&self, stored: &str) -> PathBuf {
-        self.dir.join(stored)
+    /// Returns the project with named roots of inputs and an object store for artifacts.
+    #[must_use]
+    pub fn with_storage(self, storage: Option<ProjectStorage>) -> Self {
+        Self {
+            storage: storage.map(Arc::new),
+            ..self
+        }
+    }
+
+    /// Returns the named roots and the object store.
+    pub fn storage(&self) -> Option<&ProjectStorage> {
+        self.storage.as_deref()
+    }
+
+    pub(super) const fn storage_arc(&self) -> Option<&Arc<ProjectStorage>> {
+        self.storage.as_ref()
     }
 
     /// Looks for a moved input below `folder`: first at its whole stored path, then without its first folder, and so on
@@ -154,13 +173,23 @@ impl Project {
         found.map(|path| self.stored_path(&path)).transpose()
     }
 
-    /// Returns the form in which a path is stored. A path below the project is stored relative to the project, so that
+    /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is a
+    /// path that already has this form, such as `scans:1/mesh.obj`. A path below the project is stored relative to the project, so that
     /// the project can be moved with its data. Any other path is stored as absolute. The file need not exist.
     ///
     /// # Errors
     /// Returns an error if the working directory is unknown, or the path is not UTF-8.
     pub fn stored_path(&self, path: &Path) -> Result<String, StoreError> {
+        if let Some(text) = path.to_str().filter(|text| self.is_below_root(text)) {
+            return Ok(text.to_owned());
+        }
         let absolute = std::path::absolute(path).map_err(StoreError::io(path))?;
+        if let Some(below) = self
+            .storage()
+            .and_then(|storage| storage.path_below_root(&absolute))
+        {
+            return Ok(with_slashes(below));
+        }
         let dir = std::path::absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
         let stored = match absolute.strip_prefix(&dir) {
             Ok(below) => below.to_owned(),

@@ -1,9 +1,11 @@
 //! Finds the files in the artifacts folder that are unreferenced: no row of the catalog names them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::Project;
-use crate::domain::ContentHash;
+use super::remote::pack_number;
+use crate::domain::{ArtifactRef, ContentHash};
 
 /// The artifacts that rows of the catalog name. Only the first 64 bits of each hash are stored. An unreferenced file is
 /// not reported if a referenced file has the same 64 bits. A referenced file is never reported.
@@ -13,6 +15,8 @@ use crate::domain::ContentHash;
 #[derive(Debug, Default)]
 pub struct ReferencedArtifacts {
     prefixes: Vec<u64>,
+    /// The random numbers in the names of packs.
+    packs: BTreeSet<u64>,
 }
 
 /// An unreferenced file in the artifacts folder.
@@ -38,9 +42,17 @@ pub enum UnreferencedKind {
 }
 
 impl ReferencedArtifacts {
-    /// Adds the hash of an artifact that a row names.
-    pub fn add(&mut self, hash: &ContentHash) {
-        self.prefixes.push(prefix(hash));
+    /// Adds an artifact that a row names.
+    pub fn add(&mut self, artifact: &ArtifactRef) {
+        match &artifact.pack {
+            Some(pack) => self.packs.extend(pack_number(&pack.name)),
+            None => self.prefixes.push(prefix(&artifact.hash)),
+        }
+    }
+
+    /// Returns whether a row names an artifact of this pack.
+    pub(super) fn has_pack(&self, number: u64) -> bool {
+        self.packs.contains(&number)
     }
 
     /// Calls `each` for every unreferenced file in the artifacts folder. Call this only while no process writes
@@ -150,7 +162,7 @@ mod tests {
             let artifact = file.reference().clone();
             project.write_artifacts(&[file], &|| {}).expect("written");
             if text == "kept" {
-                referenced.add(&artifact.hash);
+                referenced.add(&artifact);
             }
         }
         let artifacts = project.artifacts_dir();

@@ -55,6 +55,7 @@ mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
 mod names;
+mod object_store;
 mod odd;
 mod one_pair;
 mod page;
@@ -79,6 +80,8 @@ mod review_kill;
 #[cfg(target_os = "linux")]
 mod review_load;
 mod review_page;
+#[path = "../support/s3_server.rs"]
+mod s3_server;
 mod same_output;
 mod sample_files;
 mod scan_viewer;

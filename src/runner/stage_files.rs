@@ -1,0 +1,135 @@
+//! Writes the files of computed stages durably, before their rows are stored: each file in the project's folder, or all
+//! files of a pair in one pack in an object store.
+
+use std::io;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use tokio::time::{Instant, timeout_at};
+
+use super::compute_thread::{ComputedStage, run_blocking};
+use super::error::RunError;
+use super::run_context::RunContext;
+use super::stop::StopLevel;
+use crate::catalog::StageCheckpoint;
+use crate::domain::{PairName, Stage};
+use crate::failpoint::{self, Point};
+use crate::store::{ArtifactError, NewArtifact};
+
+/// A pack waits this long for the next stages of its pair, so that a pair is usually one object.
+const PACK_WAIT: Duration = Duration::from_secs(2);
+
+/// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
+/// and `false` if an immediate stop left a stage unwritten.
+pub(super) async fn write_batch(
+    context: &RunContext,
+    pair: &PairName,
+    first: ComputedStage,
+    stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
+) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
+    if context.project.has_packs() {
+        return write_pack(context, pair, first, stages).await;
+    }
+    let (mut batch, mut next) = (Vec::new(), Some(first));
+    while let Some((stage, files)) = next {
+        if !write_files(context, pair, stage.stage, files).await? {
+            return Ok((batch, false));
+        }
+        batch.push(with_times(context, stage));
+        next = stages.try_recv().ok();
+    }
+    Ok((batch, true))
+}
+
+/// Sets the times of a row. Must be called after the slow write, because the lease must still be valid at this point.
+fn with_times(context: &RunContext, stage: StageCheckpoint) -> StageCheckpoint {
+    StageCheckpoint {
+        at: context.clock.now(),
+        next_deadline: context.deadline(),
+        alive_since: context.alive_since(),
+        ..stage
+    }
+}
+
+/// Writes a stage's files, each under its own name.
+///
+/// # Errors
+/// Returns an error if the disk fails, or does not finish within the time limit.
+async fn write_files(
+    context: &RunContext,
+    pair: &PairName,
+    stage: Stage,
+    files: Vec<NewArtifact>,
+) -> Result<bool, ArtifactError> {
+    let (project, name) = (context.project.clone(), pair.clone());
+    let writing = move || {
+        let on_written = || failpoint::hit(stage, Point::Written, Some(&name));
+        project.write_artifacts(&files, &on_written)?;
+        failpoint::hit(stage, Point::Synced, Some(&name));
+        Ok(())
+    };
+    Ok(finished(context, writing).await?.is_some())
+}
+
+/// Writes the files of `first`, and of the stages that arrive within [`PACK_WAIT`] or until the pair's last stage, as one
+/// object.
+async fn write_pack(
+    context: &RunContext,
+    pair: &PairName,
+    first: ComputedStage,
+    stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
+) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
+    let deadline = Instant::now() + PACK_WAIT;
+    let (mut batch, mut files) = (vec![first.0], first.1);
+    let mut counts = vec![files.len()];
+    while let Ok(Some((stage, more))) = timeout_at(deadline, stages.recv()).await {
+        batch.push(stage);
+        counts.push(more.len());
+        files.extend(more);
+    }
+    let (project, name) = (context.project.clone(), pair.clone());
+    let last = batch[batch.len() - 1].stage;
+    let writing = move || {
+        failpoint::hit(last, Point::Written, Some(&name));
+        let locations = project.write_pack(&files)?;
+        failpoint::hit(last, Point::Synced, Some(&name));
+        Ok((files, locations))
+    };
+    let Some((files, locations)) = finished(context, writing).await? else {
+        return Ok((Vec::new(), false));
+    };
+    let mut located = files.iter().zip(locations);
+    for (stage, count) in batch.iter_mut().zip(counts) {
+        for (file, location) in located.by_ref().take(count) {
+            if let Some(artifact) = stage.files.get_mut(file.role()) {
+                artifact.pack = Some(location);
+            }
+        }
+    }
+    let batch = batch.into_iter().map(|stage| with_times(context, stage));
+    Ok((batch.collect(), true))
+}
+
+/// Runs `writing` on a thread for blocking calls. Returns `None`, without waiting for the disk, if an immediate stop is
+/// requested.
+///
+/// # Errors
+/// Returns the error of `writing`, or an error if it takes longer than a stage may.
+async fn finished<T: Send + 'static>(
+    context: &RunContext,
+    writing: impl FnOnce() -> Result<T, ArtifactError> + Send + 'static,
+) -> Result<Option<T>, ArtifactError> {
+    let timeout = context.stage_timeout;
+    tokio::select! {
+        biased;
+        written = run_blocking(writing) => written.map(Some),
+        () = context.stop.reached(StopLevel::Now) => Ok(None),
+        () = tokio::time::sleep(timeout) => {
+            let text = format!("writing took longer than {} s", timeout.as_secs_f64());
+            Err(ArtifactError::Io {
+                path: context.project.artifacts_place(),
+                source: io::Error::new(io::ErrorKind::TimedOut, text),
+            })
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Removes unreferenced artifacts while runs may be active: files and packs that no row names and that are older than a
+//! given age.
+//!
+//! A worker names new files in a row within the time limit of a stage, so an older file without a row will never have
+//! one. A pack has a name that is never used again. A file in the project's folder is named by its content, and a worker
+//! may find that an unreferenced file holds just the bytes that it wants to write. It then sets the file's time of
+//! change, and the collector looks at this time again after it has moved the file aside.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use super::Project;
+use super::artifacts::ArtifactError;
+use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
+use super::remote::{Bucket, PACKS, pack_number};
+
+/// Key of an object whose time of change is the present time of the store.
+const MARKER: &str = "collect-marker";
+
+impl ReferencedArtifacts {
+    /// Removes unreferenced files and packs that are older than `age` by the clock of their file system or store. Calls
+    /// `each` for every unreferenced one, with whether it was removed.
+    ///
+    /// # Errors
+    /// Returns an error if a folder cannot be listed or a request fails.
+    pub fn collect(
+        mut self,
+        project: &Project,
+        age: Duration,
+        mut each: impl FnMut(&UnreferencedFile, bool),
+    ) -> Result<(), ArtifactError> {
+        if let Some(bucket) = project.storage().and_then(|storage| storage.artifacts()) {
+            self.collect_packs(bucket, age, &mut each)
+                .map_err(ArtifactError::Bucket)?;
+        }
+        if !project.artifacts_dir().exists() {
+            return Ok(());
+        }
+        let aside = project.temporary_dir();
+        let failed = |source| ArtifactError::Io {
+            path: aside.clone(),
+            source,
+        };
+        std::fs::create_dir_all(&aside).map_err(failed)?;
+        let marker = tempfile::NamedTempFile::new_in(&aside).map_err(failed)?;
+        let meta = marker.as_file().metadata().map_err(failed)?;
+        let now = meta.modified().map_err(failed)?;
+        let before = now.checked_sub(age).unwrap_or(SystemTime::UNIX_EPOCH);
+        let listed = self.for_each_unreferenced(project, |file| {
+            let is_ours = file.kind != UnreferencedKind::UnknownFile;
+            let removed =
+                is_ours && file.path != marker.path() && remove(&file.path, &aside, before);
+            if file.path != marker.path() {
+                each(&file, removed);
+            }
+        });
+        listed.map_err(failed)
+    }
+
+    /// Removes unreferenced packs.
+    fn collect_packs(
+        &mut self,
+        bucket: &Bucket,
+        age: Duration,
+        each: &mut impl FnMut(&UnreferencedFile, bool),
+    ) -> Result<(), super::BucketError> {
+        bucket.write(MARKER, Vec::new())?;
+        let before = bucket.stat(MARKER)?.modified - age.as_millis() as i64;
+        let mut found = Vec::new();
+        bucket.list(PACKS, |key, stat| {
+            let number = pack_number(&key);
+            if number.is_none_or(|number| !self.has_pack(number)) {
+                found.push((key, stat, number.is_some()));
+            }
+        })?;
+        for (key, stat, is_ours) in found {
+            let is_old = is_ours && stat.modified < before;
+            if is_old {
+                bucket.remove(&key)?;
+            }
+            let file = UnreferencedFile {
+                path: PathBuf::from(bucket.address_of(&key)),
+                bytes: stat.bytes,
+                kind: if is_ours {
+                    UnreferencedKind::Orphan
+                } else {
+                    UnreferencedKind::UnknownFile
+                },
+            };
+            each(&file, is_old);
+        }
+        bucket.remove(MARKER)
+    }
+}
+
+/// Removes a file that was not changed since `before`. Returns whether it was removed.
+fn remove(path: &Path, aside: &Path, before: SystemTime) -> bool {
+    let is_old = |path: &Path| {
+        let modified = std::fs::metadata(path).and_then(|meta| meta.modified());
+        modified.is_ok_and(|modified| modified < before)
+    };
+    if !is_old(path) {
+        return false;
+    }
+    let Some(name) = path.file_name() else {
+        return false;
+    };
+    let mut moved = name.to_owned();
+    moved.push(".collected");
+    let moved = aside.join(moved);
+    if std::fs::rename(path, &moved).is_err() {
+        return false;
+    }
+    if is_old(&moved) {
+        return std::fs::remove_file(&moved).is_ok();
+    }
+    // A worker wants to use it, and may have written it again meanwhile, with the same bytes.
+    let _ = std::fs::rename(&moved, path);
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::time::{Duration, SystemTime};
+
+    use crate::store::remote::ProjectStorage;
+    use crate::store::{NewArtifact, Project, ReferencedArtifacts, UnreferencedKind};
+
+    const DAY: Duration = Duration::from_hours(24);
+
+    fn make_old(path: &std::path::Path) {
+        let old = SystemTime::now() - 2 * DAY;
+        let file = File::options().append(true).open(path);
+        file.and_then(|file| file.set_modified(old))
+            .expect("changed");
+    }
+
+    #[test]
+    fn only_old_files_without_a_row_are_removed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        let [kept, old, new, used] = ["kept", "old", "new", "used"].map(|text| {
+            let file = NewArtifact::new("depth.png", "png", text.into());
+            let artifact = file.reference().clone();
+            project.write_artifacts(&[file], &|| {}).expect("written");
+            artifact
+        });
+        for artifact in [&kept, &old, &used] {
+            make_old(&project.artifact_path(artifact));
+        }
+        // A worker computes the same bytes again.
+        let again = NewArtifact::new("depth.png", "png", b"used".to_vec());
+        project.write_artifacts(&[again], &|| {}).expect("written");
+        let mut referenced = ReferencedArtifacts::default();
+        referenced.add(&kept);
+        let mut seen = Vec::new();
+        let collected = referenced.collect(&project, DAY, |file, removed| {
+            assert_eq!(file.kind, UnreferencedKind::Orphan);
+            seen.push(removed);
+        });
+        collected.expect("collected");
+        seen.sort_unstable();
+        assert_eq!(seen, [false, false, true]);
+        assert!(project.read_artifact(&old).is_err());
+        for artifact in [&kept, &new, &used] {
+            project
+                .check_artifact(artifact, false)
+                .expect("still there");
+        }
+    }
+
+    #[test]
+    fn packs_without_a_row_are_removed_when_they_are_old() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (storage, bucket) = ProjectStorage::in_memory(dir.path().join("cache"));
+        let project = Project::create(dir.path()).expect("a project");
+        let project = project.with_storage(Some(storage));
+        let file = || NewArtifact::new("depth.png", "png", b"same".to_vec());
+        let artifacts = [0; 2].map(|_| {
+            let location = project.write_pack(&[file()]).expect("stored").remove(0);
+            let mut artifact = file().reference().clone();
+            artifact.pack = Some(location);
+            artifact
+        });
+        bucket.put("packs/notes.txt", b"mine");
+        let collect = |age| {
+            let mut referenced = ReferencedArtifacts::default();
+            referenced.add(&artifacts[0]);
+            let mut seen = Vec::new();
+            let collected = referenced.collect(&project, age, |file, removed| {
+                seen.push((file.kind, removed));
+            });
+            collected.expect("collected");
+            seen.sort_by_key(|(kind, _)| *kind as u8);
+            seen
+        };
+        let unknown = (UnreferencedKind::UnknownFile, false);
+        assert_eq!(collect(DAY), [(UnreferencedKind::Orphan, false), unknown]);
+        let removed = (UnreferencedKind::Orphan, true);
+        while collect(Duration::ZERO) != [removed, unknown] {
+            // Both objects have the same time until the clock of the store advances.
+            std::thread::yield_now();
+        }
+        assert_eq!(project.read_artifact(&artifacts[0]).expect("kept"), b"same");
+        assert!(bucket.stat("packs/notes.txt").is_ok());
+    }
+}

@@ -1,0 +1,212 @@
+//! Where an input file is: at a path, below a named root, or in an object store.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Project;
+use super::input_error::InputError;
+use super::open_file::regular_metadata;
+use super::remote::{Bucket, BucketError, CachedObject, ProjectStorage, Root};
+
+/// An input file of a project.
+#[derive(Debug, Clone)]
+pub struct Input {
+    path: PathBuf,
+    pub(super) place: Place,
+}
+
+/// Where an input file is.
+#[derive(Debug, Clone)]
+pub(super) enum Place {
+    /// At its path.
+    File,
+    /// At its path, below a root that several machines share. The inode is not compared, because it differs between
+    /// copies of the data.
+    SharedFile,
+    /// In an object store.
+    Object(RemoteInput),
+}
+
+/// An input in an object store.
+#[derive(Debug, Clone)]
+pub(super) struct RemoteInput {
+    storage: Arc<ProjectStorage>,
+    bucket: Bucket,
+    key: String,
+}
+
+impl Input {
+    /// Returns the input at a path.
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Self {
+            path: path.into(),
+            place: Place::File,
+        }
+    }
+
+    /// Returns the path, or the address of an object, for messages and for the extension of the file name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Returns its length in bytes, or 0 if it cannot be read.
+    pub fn size(&self) -> u64 {
+        match &self.place {
+            Place::File | Place::SharedFile => {
+                std::fs::metadata(&self.path).map_or(0, |meta| meta.len())
+            }
+            Place::Object(object) => object.open(u64::MAX).map_or(0, |copy| copy.bytes),
+        }
+    }
+
+    /// Opens the input, or its local copy.
+    ///
+    /// # Errors
+    /// Returns an error if it does not exist, is not a regular file, or cannot be read.
+    pub fn open(&self) -> Result<std::fs::File, InputError> {
+        match &self.place {
+            Place::File | Place::SharedFile => {
+                super::open_file::open_regular(&self.path).map(|(file, _)| file)
+            }
+            Place::Object(object) => Ok(object.open(u64::MAX)?.file),
+        }
+    }
+
+    /// Returns whether it exists. Returns `true` if this cannot be found out.
+    pub fn exists(&self) -> bool {
+        match &self.place {
+            Place::File | Place::SharedFile => {
+                !matches!(regular_metadata(&self.path), Err(InputError::NotThere(_)))
+            }
+            Place::Object(object) => !matches!(object.version(), Err(BucketError::NotThere(_))),
+        }
+    }
+}
+
+impl RemoteInput {
+    /// Opens a local copy.
+    pub(super) fn open(&self, limit: u64) -> Result<CachedObject, BucketError> {
+        self.storage.open_input(&self.bucket, &self.key, limit)
+    }
+
+    /// Returns the version of the object.
+    pub(super) fn version(&self) -> Result<String, BucketError> {
+        self.storage.input_version(&self.bucket, &self.key)
+    }
+
+    /// Forgets the local copy.
+    pub(super) fn forget(&self) {
+        self.storage
+            .forget_input(&self.bucket.address_of(&self.key));
+    }
+}
+
+impl Project {
+    /// Returns an input by its stored path: relative to the project, absolute, or relative to a named root, such as
+    /// `scans:1/mesh.obj`.
+    pub fn input(&self, stored: &str) -> Input {
+        let root = self.storage_arc().and_then(|storage| {
+            let (root, rest) = storage.root(stored)?;
+            Some((storage, root, rest))
+        });
+        match root {
+            Some((_, Root::Folder(folder), rest)) => Input {
+                path: folder.join(rest),
+                place: Place::SharedFile,
+            },
+            Some((storage, Root::Bucket(bucket), key)) => Input {
+                path: PathBuf::from(bucket.address_of(key)),
+                place: Place::Object(RemoteInput {
+                    storage: Arc::clone(storage),
+                    bucket: bucket.clone(),
+                    key: key.to_owned(),
+                }),
+            },
+            None => Input::file(self.dir().join(stored)),
+        }
+    }
+
+    /// Returns the path of an input, or its address in an object store, for messages.
+    pub fn input_path(&self, stored: &str) -> PathBuf {
+        self.input(stored).path
+    }
+
+    /// Returns whether a stored path is relative to a named root.
+    pub fn is_below_root(&self, stored: &str) -> bool {
+        self.storage()
+            .is_some_and(|storage| storage.root(stored).is_some())
+    }
+
+    /// Returns whether inputs are read from an object store.
+    pub fn has_remote_inputs(&self) -> bool {
+        self.storage()
+            .is_some_and(ProjectStorage::has_remote_inputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::domain::ContentHash;
+    use crate::store::remote::ProjectStorage;
+    use crate::store::{InputError, Project, hash_input, read_input, stat_input};
+
+    #[test]
+    fn an_object_is_an_input_and_its_changes_are_noticed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (storage, bucket) = ProjectStorage::in_memory(dir.path().join("cache"));
+        let project = Project::create(dir.path()).expect("a project");
+        let project = project.with_storage(Some(storage));
+        bucket.put("a/1.obj", b"v 0 0 0");
+        let input = project.input("scans:a/1.obj");
+        assert!(input.exists() && !project.input("scans:a/2.obj").exists());
+        assert_eq!(input.size(), 7);
+        let read = read_input(&input, 100, "x").expect("read");
+        assert_eq!(&read.bytes[..], b"v 0 0 0");
+        assert_eq!(read.digest.hash, ContentHash::of(b"v 0 0 0"));
+        assert_eq!(hash_input(&input).expect("hashed"), read.digest);
+        assert_eq!(stat_input(&input).expect("there"), read.digest.stat);
+        bucket.put("a/1.obj", b"v 1 1 1 1");
+        assert_ne!(stat_input(&input).expect("there"), read.digest.stat);
+        let missing = read_input(&project.input("scans:a/2.obj"), 100, "x");
+        assert!(matches!(missing, Err(InputError::NotThere(_))));
+        let large = read_input(&input, 3, "limits.mesh.max_bytes").expect_err("too large");
+        assert!(
+            large.to_string().contains("limits.mesh.max_bytes"),
+            "{large}"
+        );
+    }
+
+    /// A disk may return other bytes than were written to it.
+    #[test]
+    fn a_local_copy_with_other_bytes_is_not_believed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let cache = dir.path().join("cache");
+        let (storage, bucket) = ProjectStorage::in_memory(cache.clone());
+        let project = Project::create(dir.path()).expect("a project");
+        let project = project.with_storage(Some(storage));
+        bucket.put("1.obj", b"v 0 0 0");
+        let input = project.input("scans:1.obj");
+        assert!(read_input(&input, 100, "x").is_ok());
+        for entry in walk(&cache) {
+            if entry.extension().is_some_and(|ext| ext == "data") {
+                std::fs::write(entry, b"v 9 9 9").expect("written");
+            }
+        }
+        let changed = read_input(&input, 100, "x");
+        assert!(matches!(changed, Err(InputError::Changed(_))));
+        let again = read_input(&input, 100, "x").expect("read from the store");
+        assert_eq!(&again.bytes[..], b"v 0 0 0");
+    }
+
+    fn walk(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
+        let entries = std::fs::read_dir(folder).expect("a folder").flatten();
+        let inside = entries.flat_map(|entry| {
+            if entry.path().is_dir() {
+                walk(&entry.path())
+            } else {
+                vec![entry.path()]
+            }
+        });
+        inside.collect()
+    }
+}

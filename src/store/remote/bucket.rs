@@ -1,0 +1,407 @@
+//! A folder in a bucket of an S3-compatible store, with blocking calls.
+//!
+//! Requests run on threads of their own, so the calls may be made on any thread that may wait. The client repeats a
+//! request after a reply such as 503 and after a lost connection, with growing pauses.
+
+use std::future::Future;
+use std::io::Write;
+use std::sync::{Arc, mpsc};
+
+use futures_util::TryStreamExt as _;
+use object_store::path::Path;
+use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
+
+use super::bucket_error::BucketError;
+use super::client::{connect, runtime};
+
+/// A folder in a bucket.
+#[derive(Debug, Clone)]
+pub(in crate::store) struct Bucket {
+    store: Arc<dyn ObjectStore>,
+    /// The folder within the bucket.
+    prefix: Path,
+    /// The address without a slash at its end, such as `s3://scans/2024`.
+    address: String,
+}
+
+/// Length, version and time of an object.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::store) struct ObjectStat {
+    /// Length in bytes.
+    pub(in crate::store) bytes: u64,
+    /// Changes if the content changes: the length and the entity tag, or the time of the last change.
+    pub(in crate::store) version: String,
+    /// The entity tag, if the store has one.
+    pub(super) tag: Option<String>,
+    /// Time of the last change by the clock of the store, in milliseconds since 1970.
+    pub(in crate::store) modified: i64,
+}
+
+impl From<&ObjectMeta> for ObjectStat {
+    fn from(meta: &ObjectMeta) -> Self {
+        let modified = meta.last_modified.timestamp_millis();
+        let id = match &meta.e_tag {
+            Some(tag) => tag.trim_matches('"').to_owned(),
+            None => modified.to_string(),
+        };
+        Self {
+            bytes: meta.size,
+            version: format!("{}:{id}", meta.size),
+            tag: meta.e_tag.clone(),
+            modified,
+        }
+    }
+}
+
+impl Bucket {
+    /// Opens the folder at an address such as `s3://bucket/folder`. Sends no request. Credentials, region and endpoint
+    /// are those of the environment (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL` and so on).
+    ///
+    /// # Errors
+    /// Returns an error if the address has another form, or a variable has a wrong value.
+    pub(super) fn open(address: &str) -> Result<Self, BucketError> {
+        let wrong = |reason: String| BucketError::Address {
+            address: without_password(address),
+            reason,
+        };
+        let rest = address
+            .strip_prefix("s3://")
+            .ok_or_else(|| wrong("an address begins with s3://".to_owned()))?;
+        let (name, folder) = rest.split_once('/').unwrap_or((rest, ""));
+        if name.is_empty() || name.contains(['@', ':', '?', '#']) {
+            let form = "the form is s3://BUCKET/FOLDER; keys belong in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY";
+            return Err(wrong(form.to_owned()));
+        }
+        let store = connect(name).map_err(wrong)?;
+        let prefix = Path::parse(folder.trim_matches('/'))
+            .map_err(|error| wrong(format!("the folder cannot be used: {error}")))?;
+        Ok(Self::new(store, prefix, address))
+    }
+
+    fn new(store: Arc<dyn ObjectStore>, prefix: Path, address: &str) -> Self {
+        let address = address.trim_end_matches('/').to_owned();
+        Self {
+            store,
+            prefix,
+            address,
+        }
+    }
+
+    /// Returns an empty bucket in memory, for tests.
+    #[cfg(test)]
+    pub(super) fn in_memory() -> Self {
+        let store = object_store::memory::InMemory::new();
+        Self::new(Arc::new(store), Path::default(), "memory://test")
+    }
+
+    /// Stores an object, for tests.
+    #[cfg(test)]
+    pub(in crate::store) fn put(&self, key: &str, bytes: &[u8]) {
+        self.write(key, bytes.to_owned()).expect("stored in memory");
+    }
+
+    /// Returns the address of the folder.
+    pub(in crate::store) fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Returns the address of an object, for messages and as a name.
+    pub(in crate::store) fn address_of(&self, key: &str) -> String {
+        format!("{}/{key}", self.address)
+    }
+
+    /// Reads an object of at most `limit` bytes into memory.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails or the object is larger.
+    pub(super) fn read(&self, key: &str, limit: u64) -> Result<(Vec<u8>, ObjectStat), BucketError> {
+        let (bytes, stat) = self
+            .copy_to(key, limit, None, Vec::new())?
+            .ok_or_else(|| BucketError::NotThere(self.address_of(key)))?;
+        Ok((bytes, stat))
+    }
+
+    /// Writes the content of an object of at most `limit` bytes to `target`. Returns `None` if the object has the entity
+    /// tag `unless`.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails, the object is larger, or `target` cannot be written.
+    pub(super) fn copy_to<W: Write + Send + 'static>(
+        &self,
+        key: &str,
+        limit: u64,
+        unless: Option<String>,
+        mut target: W,
+    ) -> Result<Option<(W, ObjectStat)>, BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let address = self.address_of(key);
+        self.wait(key, async move {
+            let options = GetOptions {
+                if_none_match: unless,
+                ..GetOptions::default()
+            };
+            let failed = |error| BucketError::of(&address, &error);
+            let found = match store.get_opts(&path, options).await {
+                Err(object_store::Error::NotModified { .. }) => return Ok(None),
+                found => found.map_err(failed)?,
+            };
+            let stat = ObjectStat::from(&found.meta);
+            if stat.bytes > limit {
+                let bytes = stat.bytes;
+                return Err(BucketError::TooLarge {
+                    address,
+                    bytes,
+                    limit,
+                });
+            }
+            let mut stream = found.into_stream();
+            while let Some(chunk) = stream.try_next().await.map_err(failed)? {
+                target
+                    .write_all(&chunk)
+                    .map_err(|source| BucketError::Local {
+                        path: std::path::PathBuf::from(&address),
+                        source,
+                    })?;
+            }
+            Ok(Some((target, stat)))
+        })
+    }
+
+    /// Returns length and version of an object.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails or there is no such object.
+    pub(in crate::store) fn stat(&self, key: &str) -> Result<ObjectStat, BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let address = self.address_of(key);
+        self.wait(key, async move {
+            let found = store.head(&path).await;
+            let found = found.map_err(|error| BucketError::of(&address, &error))?;
+            Ok(ObjectStat::from(&found))
+        })
+    }
+
+    /// Stores an object, in place of an earlier one of this name.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let address = self.address_of(key);
+        self.wait(key, async move {
+            let stored = store.put(&path, PutPayload::from(bytes)).await;
+            stored
+                .map(drop)
+                .map_err(|error| BucketError::of(&address, &error))
+        })
+    }
+
+    /// Removes an object. Does nothing if there is none.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn remove(&self, key: &str) -> Result<(), BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let address = self.address_of(key);
+        self.wait(key, async move {
+            match store.delete(&path).await {
+                Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
+                Err(error) => Err(BucketError::of(&address, &error)),
+            }
+        })
+    }
+
+    /// Calls `each` with the key and stat of every object below `folder`, in any order.
+    ///
+    /// # Errors
+    /// Returns an error if a request fails.
+    pub(in crate::store) fn list(
+        &self,
+        folder: &str,
+        mut each: impl FnMut(String, ObjectStat),
+    ) -> Result<(), BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(folder)?);
+        let address = self.address_of(folder);
+        let prefix = self.prefix.clone();
+        let (sender, found) = mpsc::sync_channel::<(String, ObjectStat)>(4096);
+        let listing = self.start(async move {
+            let mut objects = store.list(Some(&path));
+            while let Some(meta) = objects
+                .try_next()
+                .await
+                .map_err(|error| BucketError::of(&address, &error))?
+            {
+                let Some(key) = key_below(&prefix, &meta.location) else {
+                    continue;
+                };
+                // The receiver waits for nothing but this channel.
+                let stat = ObjectStat::from(&meta);
+                tokio::task::block_in_place(|| sender.send((key, stat))).ok();
+            }
+            Ok(())
+        })?;
+        for (key, stat) in found {
+            each(key, stat);
+        }
+        self.reply(folder, &listing)
+    }
+
+    /// Calls `each` with the key and stat of every object in `folder`, without those of its subfolders.
+    ///
+    /// # Errors
+    /// Returns an error if a request fails.
+    pub(super) fn list_folder(
+        &self,
+        folder: &str,
+        mut each: impl FnMut(String, ObjectStat),
+    ) -> Result<(), BucketError> {
+        let (store, path) = (Arc::clone(&self.store), self.path(folder)?);
+        let address = self.address_of(folder);
+        let found = self.wait(folder, async move {
+            let listed = store.list_with_delimiter(Some(&path)).await;
+            listed.map_err(|error| BucketError::of(&address, &error))
+        })?;
+        for meta in &found.objects {
+            if let Some(key) = key_below(&self.prefix, &meta.location) {
+                each(key, ObjectStat::from(meta));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends a request that shows whether the bucket exists and may be read.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(super) fn check(&self) -> Result<(), BucketError> {
+        let (store, prefix) = (Arc::clone(&self.store), self.prefix.clone());
+        let address = self.address.clone();
+        self.wait("", async move {
+            let first = store.list(Some(&prefix)).try_next().await;
+            first
+                .map(drop)
+                .map_err(|error| BucketError::of(&address, &error))
+        })
+    }
+
+    fn path(&self, key: &str) -> Result<Path, BucketError> {
+        let joined = format!("{}/{key}", self.prefix);
+        Path::parse(joined.trim_matches('/')).map_err(|error| BucketError::Address {
+            address: self.address_of(key),
+            reason: error.to_string(),
+        })
+    }
+
+    /// Runs a request on the threads of the client and waits for its outcome.
+    fn wait<T: Send + 'static>(
+        &self,
+        key: &str,
+        request: impl Future<Output = Result<T, BucketError>> + Send + 'static,
+    ) -> Result<T, BucketError> {
+        let receiver = self.start(request)?;
+        self.reply(key, &receiver)
+    }
+
+    fn start<T: Send + 'static>(
+        &self,
+        request: impl Future<Output = Result<T, BucketError>> + Send + 'static,
+    ) -> Result<mpsc::Receiver<Result<T, BucketError>>, BucketError> {
+        let runtime = runtime().map_err(|error| self.unavailable("", &error.to_string()))?;
+        let (sender, receiver) = mpsc::sync_channel(1);
+        runtime.spawn(async move {
+            // The caller may have been given up.
+            let _ = sender.send(request.await);
+        });
+        Ok(receiver)
+    }
+
+    fn reply<T>(
+        &self,
+        key: &str,
+        receiver: &mpsc::Receiver<Result<T, BucketError>>,
+    ) -> Result<T, BucketError> {
+        let ended = receiver.recv();
+        ended.unwrap_or_else(|_| Err(self.unavailable(key, "the request ended without a result")))
+    }
+
+    fn unavailable(&self, key: &str, reason: &str) -> BucketError {
+        BucketError::Unavailable {
+            address: self.address_of(key),
+            reason: reason.to_owned(),
+        }
+    }
+}
+
+/// Returns the key of an object relative to a folder, or `None` if it is not below the folder.
+fn key_below(folder: &Path, object: &Path) -> Option<String> {
+    let parts = object.prefix_match(folder)?;
+    let parts: Vec<_> = parts.map(|part| part.as_ref().to_owned()).collect();
+    Some(parts.join("/"))
+}
+
+/// Returns the address without a user and password.
+fn without_password(address: &str) -> String {
+    match (address.split_once("://"), address.rsplit_once('@')) {
+        (Some((scheme, _)), Some((_, rest))) => format!("{scheme}://{rest}"),
+        _ => address.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Bucket, BucketError};
+
+    #[test]
+    fn objects_are_written_read_listed_and_removed() {
+        let bucket = Bucket::in_memory();
+        for key in ["packs/ab/1.zip", "packs/cd/chữ 2.zip", "other/3"] {
+            bucket.write(key, key.as_bytes().to_vec()).expect("written");
+        }
+        let (bytes, stat) = bucket.read("packs/cd/chữ 2.zip", 100).expect("read");
+        assert_eq!(bytes, "packs/cd/chữ 2.zip".as_bytes());
+        assert_eq!(bucket.stat("packs/cd/chữ 2.zip").expect("there"), stat);
+        let same = bucket.copy_to(
+            "other/3",
+            100,
+            bucket.stat("other/3").expect("there").tag,
+            vec![],
+        );
+        assert!(same.expect("the same object").is_none());
+        let large = bucket.read("other/3", 3);
+        assert!(matches!(
+            large,
+            Err(BucketError::TooLarge {
+                bytes: 7,
+                limit: 3,
+                ..
+            })
+        ));
+        let mut found = Vec::new();
+        bucket
+            .list("packs", |key, stat| found.push((key, stat.bytes)))
+            .expect("listed");
+        found.sort();
+        assert_eq!(
+            found,
+            [
+                ("packs/ab/1.zip".to_owned(), 14),
+                ("packs/cd/chữ 2.zip".to_owned(), 20)
+            ]
+        );
+        bucket.remove("packs/ab/1.zip").expect("removed");
+        bucket.remove("packs/ab/1.zip").expect("nothing to remove");
+        let gone = bucket.read("packs/ab/1.zip", 100);
+        assert!(matches!(gone, Err(BucketError::NotThere(_))));
+    }
+
+    #[test]
+    fn an_address_with_keys_or_another_scheme_is_refused_without_quoting_the_keys() {
+        for address in ["s3://AKIA:secret@bucket/x", "s3:///x", "https://bucket"] {
+            let error = Bucket::open(address).expect_err("refused").to_string();
+            assert!(
+                !error.contains("secret") && !error.contains("AKIA"),
+                "{error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Why a request to an object store failed. Messages never contain a reply of the store, which may name access keys.
+
+use std::error::Error;
+use std::io;
+
+/// Why a request to an object store failed.
+#[derive(Debug, thiserror::Error)]
+pub enum BucketError {
+    /// There is no such object.
+    #[error("{0} is not there")]
+    NotThere(String),
+    /// There is no such bucket.
+    #[error("{0}: there is no such bucket; create it, or correct the setting that names it")]
+    NoBucket(String),
+    /// The store refuses the credentials, or they do not permit the request.
+    #[error(
+        "{address}: the object store refuses the request ({code}); check AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN, and that they permit it"
+    )]
+    Refused {
+        /// Which object or folder.
+        address: String,
+        /// The store's error code, such as `ExpiredToken`.
+        code: String,
+    },
+    /// The store could not be reached, or had no success within the time limit.
+    #[error("{address}: the object store does not answer properly ({reason})")]
+    Unavailable {
+        /// Which object or folder.
+        address: String,
+        /// What was tried, without the reply of the store.
+        reason: String,
+    },
+    /// The address is not that of a folder in a bucket, or the environment lacks something.
+    #[error("{address}: {reason}")]
+    Address {
+        /// The address.
+        address: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The object is larger than the limit.
+    #[error("{address} has {bytes} bytes, over the limit of {limit}")]
+    TooLarge {
+        /// Which object.
+        address: String,
+        /// Its length.
+        bytes: u64,
+        /// The limit in bytes.
+        limit: u64,
+    },
+    /// The local copy of the object could not be written.
+    #[error("{path}: {source}")]
+    Local {
+        /// Which file.
+        path: std::path::PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+impl BucketError {
+    /// Converts an error of the client.
+    pub(super) fn of(address: &str, error: &object_store::Error) -> Self {
+        let address = address.to_owned();
+        let code = code_of(error);
+        match (error, code.as_deref()) {
+            (_, Some("NoSuchBucket")) => Self::NoBucket(address),
+            (object_store::Error::NotFound { .. }, _) => Self::NotThere(address),
+            (_, Some(code)) if is_refusal(code) => Self::Refused {
+                address,
+                code: code.to_owned(),
+            },
+            (
+                object_store::Error::PermissionDenied { .. }
+                | object_store::Error::Unauthenticated { .. },
+                code,
+            ) => Self::Refused {
+                address,
+                code: code.unwrap_or("permission denied").to_owned(),
+            },
+            (_, Some(code)) => Self::Unavailable {
+                address,
+                reason: code.to_owned(),
+            },
+            (error, None) => Self::Unavailable {
+                address,
+                reason: innermost(error),
+            },
+        }
+    }
+}
+
+/// Returns whether the code of an error is about credentials or permissions, whatever its HTTP status is.
+fn is_refusal(code: &str) -> bool {
+    matches!(
+        code,
+        "AccessDenied"
+            | "ExpiredToken"
+            | "InvalidAccessKeyId"
+            | "InvalidToken"
+            | "RequestTimeTooSkewed"
+            | "SignatureDoesNotMatch"
+            | "TokenRefreshRequired"
+    )
+}
+
+/// Returns the `<Code>` of the reply that an error quotes.
+fn code_of(error: &object_store::Error) -> Option<String> {
+    let text = error.to_string();
+    let (_, rest) = text.split_once("<Code>")?;
+    let (code, _) = rest.split_once("</Code>")?;
+    let is_word = !code.is_empty() && code.bytes().all(|byte| byte.is_ascii_alphanumeric());
+    (is_word && code.len() <= 64).then(|| code.to_owned())
+}
+
+/// Returns the last cause of an error in one line. Causes that quote a reply of the store are left out.
+fn innermost(error: &object_store::Error) -> String {
+    let mut cause: &dyn Error = error;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let text = cause.to_string();
+    if text.contains('<') || text.len() > 200 {
+        return "unexpected reply".to_owned();
+    }
+    text.lines().next().unwrap_or_default().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::BucketError;
+
+    fn generic(text: &str) -> object_store::Error {
+        object_store::Error::Generic {
+            store: "S3",
+            source: text.to_owned().into(),
+        }
+    }
+
+    #[test]
+    fn the_code_of_a_reply_decides_and_the_reply_is_not_quoted() {
+        let reply = "status 400: <Error><Code>ExpiredToken</Code><AWSAccessKeyId>AKIASECRET</AWSAccessKeyId></Error>";
+        let error = BucketError::of("s3://b/x", &generic(reply));
+        let text = error.to_string();
+        assert!(text.contains("(ExpiredToken)"), "{text}");
+        assert!(!text.contains("AKIA"), "{text}");
+        let error = BucketError::of("s3://b", &generic("404: <Code>NoSuchBucket</Code>"));
+        assert!(matches!(error, BucketError::NoBucket(_)), "{error}");
+        let error = BucketError::of("s3://b", &generic("<html>AKIASECRET</html>"));
+        assert!(error.to_string().contains("unexpected reply"), "{error}");
+    }
+}

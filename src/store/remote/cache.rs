@@ -1,0 +1,379 @@
+//! Local copies of input files in an object store. The oldest copies are removed when they take too much space.
+//!
+//! A copy has a name made of the object's address and version, so it is never changed. A small file beside it names the
+//! newest version, with which the store is asked whether the object has changed since. Processes may share the folder.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant, SystemTime};
+
+use serde::{Deserialize, Serialize};
+
+use super::bucket::Bucket;
+use super::bucket_error::BucketError;
+use crate::domain::ContentHash;
+use crate::platform::rename;
+
+/// The store is not asked again whether an object has changed within this time.
+const FRESH: Duration = Duration::from_mins(1);
+/// Copies are removed until this share of the space is free again.
+const FREE_SHARE: f64 = 0.1;
+
+/// A folder of copies.
+#[derive(Debug)]
+pub(in crate::store) struct ObjectCache {
+    folder: PathBuf,
+    max_bytes: u64,
+    state: Mutex<CacheState>,
+}
+
+#[derive(Debug, Default)]
+struct CacheState {
+    /// When the store last confirmed a copy, by address.
+    confirmed: BTreeMap<String, Instant>,
+    /// Length of all copies when they were last counted, and what this process has added since. `None` before the first
+    /// count.
+    bytes: Option<u64>,
+}
+
+/// A copy that is open for reading.
+#[derive(Debug)]
+pub(in crate::store) struct CachedObject {
+    /// The open file.
+    pub(in crate::store) file: File,
+    /// Length in bytes.
+    pub(in crate::store) bytes: u64,
+    /// Version of the object.
+    pub(in crate::store) version: String,
+    /// Hash of the content when it was received.
+    pub(in crate::store) hash: ContentHash,
+}
+
+/// The newest known version of an object.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Known {
+    version: String,
+    tag: Option<String>,
+    bytes: u64,
+    hash: ContentHash,
+}
+
+/// Writes to a file and hashes what is written.
+struct HashingFile {
+    file: File,
+    hasher: blake3::Hasher,
+}
+
+impl Write for HashingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(bytes)?;
+        self.hasher.update(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl ObjectCache {
+    /// Returns the cache in `folder`, which is created when the first copy is written.
+    pub(super) fn new(folder: PathBuf, max_bytes: u64) -> Self {
+        Self {
+            folder,
+            max_bytes,
+            state: Mutex::default(),
+        }
+    }
+
+    /// Opens a copy of the object, and reads the object from the store if there is no copy or if it has changed.
+    ///
+    /// # Errors
+    /// Returns an error if a request fails, the object is larger than `limit`, or the copy cannot be written.
+    pub(super) fn open(
+        &self,
+        bucket: &Bucket,
+        key: &str,
+        limit: u64,
+    ) -> Result<CachedObject, BucketError> {
+        let address = bucket.address_of(key);
+        let known = self.known(&address);
+        let copy = known.as_ref().and_then(|known| self.copy(&address, known));
+        if let Some(copy) = copy {
+            if copy.bytes > limit {
+                return Err(BucketError::TooLarge {
+                    address,
+                    bytes: copy.bytes,
+                    limit,
+                });
+            }
+            let tag = known.and_then(|known| known.tag);
+            if self.is_confirmed(&address) {
+                return Ok(copy);
+            }
+            if tag.is_some() {
+                let fetched = self.fetch(bucket, key, limit, tag)?;
+                return Ok(fetched.unwrap_or(copy));
+            }
+        }
+        let fetched = self.fetch(bucket, key, limit, None)?;
+        fetched.ok_or(BucketError::NotThere(address))
+    }
+
+    /// Forgets the copy of an object, because its content is not what was received.
+    pub(super) fn forget(&self, address: &str) {
+        let _ = std::fs::remove_file(self.tag_path(address));
+    }
+
+    /// Reads the object unless it has the entity tag `unless`.
+    fn fetch(
+        &self,
+        bucket: &Bucket,
+        key: &str,
+        limit: u64,
+        unless: Option<String>,
+    ) -> Result<Option<CachedObject>, BucketError> {
+        let address = bucket.address_of(key);
+        let local = |source| BucketError::Local {
+            path: self.folder.clone(),
+            source,
+        };
+        std::fs::create_dir_all(&self.folder).map_err(local)?;
+        let temporary = tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder);
+        let temporary = temporary.map_err(local)?;
+        let target = HashingFile {
+            file: temporary.reopen().map_err(local)?,
+            hasher: blake3::Hasher::new(),
+        };
+        let Some((target, stat)) = bucket.copy_to(key, limit, unless, target)? else {
+            self.confirm(address);
+            return Ok(None);
+        };
+        let known = Known {
+            version: stat.version,
+            tag: stat.tag,
+            bytes: stat.bytes,
+            hash: ContentHash::from_bytes(*target.hasher.finalize().as_bytes()),
+        };
+        let copy = self.copy_path(&address, &known.version);
+        self.make_folder(&copy).map_err(local)?;
+        let opened = File::open(temporary.path()).map_err(local)?;
+        let temporary = temporary.into_temp_path();
+        rename(&temporary, &copy).map_err(local)?;
+        // The file has its new name, so there is nothing to remove.
+        let _ = temporary.keep();
+        self.write_known(&address, &known).map_err(local)?;
+        self.confirm(address);
+        self.added(known.bytes);
+        Ok(Some(known.opened(opened)))
+    }
+
+    fn known(&self, address: &str) -> Option<Known> {
+        let text = std::fs::read(self.tag_path(address)).ok()?;
+        serde_json::from_slice(&text).ok()
+    }
+
+    fn write_known(&self, address: &str, known: &Known) -> io::Result<()> {
+        let mut file = tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder)?;
+        serde_json::to_writer(&mut file, known)?;
+        let temporary = file.into_temp_path();
+        let path = self.tag_path(address);
+        self.make_folder(&path)?;
+        rename(&temporary, &path)?;
+        let _ = temporary.keep();
+        Ok(())
+    }
+
+    /// Opens a copy, and marks it as used.
+    fn copy(&self, address: &str, known: &Known) -> Option<CachedObject> {
+        let file = File::open(self.copy_path(address, &known.version)).ok()?;
+        if file.metadata().ok()?.len() != known.bytes {
+            return None;
+        }
+        let _ = file.set_modified(SystemTime::now());
+        Some(known.opened(file))
+    }
+
+    fn tag_path(&self, address: &str) -> PathBuf {
+        self.path(&ContentHash::of(address.as_bytes()), "json")
+    }
+
+    fn copy_path(&self, address: &str, version: &str) -> PathBuf {
+        let name = format!("{address}\n{version}");
+        self.path(&ContentHash::of(name.as_bytes()), "data")
+    }
+
+    fn path(&self, hash: &ContentHash, extension: &str) -> PathBuf {
+        let hex = hash.to_hex();
+        self.folder
+            .join(&hex[..2])
+            .join(format!("{hex}.{extension}"))
+    }
+
+    /// Creates the folder of a file.
+    fn make_folder(&self, file: &Path) -> io::Result<()> {
+        std::fs::create_dir_all(file.parent().unwrap_or(&self.folder))
+    }
+
+    fn is_confirmed(&self, address: &str) -> bool {
+        let state = self.lock();
+        let confirmed = state.confirmed.get(address);
+        confirmed.is_some_and(|at| at.elapsed() < FRESH)
+    }
+
+    fn confirm(&self, address: String) {
+        let mut state = self.lock();
+        if state.confirmed.len() > 10_000 {
+            state.confirmed.retain(|_, at| at.elapsed() < FRESH);
+        }
+        state.confirmed.insert(address, Instant::now());
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, CacheState> {
+        self.state
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// Counts a new copy, and removes the oldest copies if there is no space left for more.
+    fn added(&self, bytes: u64) {
+        let mut state = self.lock();
+        let total = match state.bytes {
+            Some(before) => before + bytes,
+            None => self.list().iter().map(|file| file.bytes).sum(),
+        };
+        // Copies of other processes are counted only here.
+        state.bytes = Some(if total > self.max_bytes {
+            self.remove_oldest()
+        } else {
+            total
+        });
+    }
+
+    /// Removes the copies that were not used for the longest time. Returns the length of the others.
+    fn remove_oldest(&self) -> u64 {
+        let mut files = self.list();
+        files.sort_by_key(|file| file.used);
+        let mut total: u64 = files.iter().map(|file| file.bytes).sum();
+        let wanted = (self.max_bytes as f64 * (1.0 - FREE_SHARE)) as u64;
+        for file in files {
+            if total <= wanted {
+                break;
+            }
+            // Another process may have removed it. A file that another process reads stays readable.
+            if std::fs::remove_file(&file.path).is_ok() {
+                total = total.saturating_sub(file.bytes);
+            }
+        }
+        total
+    }
+
+    /// Returns all files of the cache.
+    fn list(&self) -> Vec<CacheFile> {
+        let folders = std::fs::read_dir(&self.folder)
+            .into_iter()
+            .flatten()
+            .flatten();
+        let inside = folders.flat_map(|entry| match std::fs::read_dir(entry.path()) {
+            Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+            Err(error) if error.kind() == ErrorKind::NotADirectory => vec![entry.path()],
+            Err(_) => Vec::new(),
+        });
+        inside.filter_map(|path| CacheFile::of(&path)).collect()
+    }
+}
+
+impl Known {
+    fn opened(&self, file: File) -> CachedObject {
+        CachedObject {
+            file,
+            bytes: self.bytes,
+            version: self.version.clone(),
+            hash: self.hash,
+        }
+    }
+}
+
+/// A file of the cache.
+struct CacheFile {
+    path: PathBuf,
+    bytes: u64,
+    used: SystemTime,
+}
+
+impl CacheFile {
+    fn of(path: &Path) -> Option<Self> {
+        let meta = std::fs::metadata(path).ok()?;
+        Some(Self {
+            path: path.to_owned(),
+            bytes: meta.len(),
+            used: meta.modified().ok()?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+
+    use super::super::bucket::Bucket;
+    use super::{BucketError, ObjectCache};
+
+    fn text(cache: &ObjectCache, bucket: &Bucket, key: &str) -> String {
+        let mut object = cache.open(bucket, key, 1000).expect("an object");
+        let mut text = String::new();
+        object.file.read_to_string(&mut text).expect("UTF-8");
+        text
+    }
+
+    #[test]
+    fn an_object_is_read_once_and_again_after_it_has_changed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let bucket = Bucket::in_memory();
+        bucket.write("1.obj", b"old".to_vec()).expect("written");
+        let open = || ObjectCache::new(dir.path().join("cache"), 1000);
+        let cache = open();
+        assert_eq!(text(&cache, &bucket, "1.obj"), "old");
+        bucket.write("1.obj", b"new!".to_vec()).expect("written");
+        assert_eq!(text(&cache, &bucket, "1.obj"), "old", "confirmed just now");
+        assert_eq!(text(&open(), &bucket, "1.obj"), "new!");
+        let small = open().open(&bucket, "1.obj", 3);
+        assert!(matches!(small, Err(BucketError::TooLarge { .. })));
+        bucket.remove("1.obj").expect("removed");
+        let gone = open().open(&bucket, "1.obj", 1000);
+        assert!(matches!(gone, Err(BucketError::NotThere(_))));
+    }
+
+    #[test]
+    fn the_oldest_copies_are_removed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let bucket = Bucket::in_memory();
+        let cache = ObjectCache::new(dir.path().to_owned(), 3000);
+        for number in 0..20 {
+            let key = format!("{number}.png");
+            bucket.write(&key, vec![number; 500]).expect("written");
+            drop(cache.open(&bucket, &key, 1000).expect("an object"));
+        }
+        let left: u64 = cache.list().iter().map(|file| file.bytes).sum();
+        assert!((500..=3500).contains(&left), "{left}");
+        assert_eq!(text(&cache, &bucket, "19.png").as_bytes(), [19; 500]);
+    }
+
+    #[test]
+    fn a_copy_that_was_cut_is_read_again() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let bucket = Bucket::in_memory();
+        bucket.write("1.obj", b"whole".to_vec()).expect("written");
+        let cache = ObjectCache::new(dir.path().to_owned(), 1000);
+        assert_eq!(text(&cache, &bucket, "1.obj"), "whole");
+        for file in cache.list() {
+            if file.bytes == 5 {
+                std::fs::write(&file.path, b"wh").expect("cut");
+            }
+        }
+        assert_eq!(text(&cache, &bucket, "1.obj"), "whole");
+    }
+}

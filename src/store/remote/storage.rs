@@ -1,0 +1,336 @@
+//! Where a project's artifacts and inputs are, apart from its own folder.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use super::bucket::Bucket;
+use super::bucket_error::BucketError;
+use super::cache::{CachedObject, ObjectCache};
+use super::listing::FolderLists;
+use super::pack::read_pack;
+
+/// Packs that are kept in memory, because artifacts of a pair are read one after another.
+const PACKS_IN_MEMORY: usize = 16;
+
+/// The settings of a storage.
+#[derive(Debug, Clone, Default)]
+pub struct StorageOptions {
+    /// Address of the artifacts, such as `s3://bucket/folder`. Empty for the folder `artifacts` of the project.
+    pub artifacts: String,
+    /// Folders or addresses of inputs by name.
+    pub roots: BTreeMap<String, String>,
+    /// Folder of local copies of inputs. Empty for the user's cache folder.
+    pub cache: String,
+    /// Space for local copies, in bytes.
+    pub cache_bytes: u64,
+}
+
+/// A named root of input paths.
+#[derive(Debug, Clone)]
+pub(in crate::store) enum Root {
+    /// A folder on this machine.
+    Folder(PathBuf),
+    /// A folder in an object store.
+    Bucket(Bucket),
+}
+
+/// Where artifacts and inputs are.
+#[derive(Debug)]
+pub struct ProjectStorage {
+    artifacts: Option<Bucket>,
+    roots: BTreeMap<String, Root>,
+    cache: ObjectCache,
+    lists: FolderLists,
+    /// Packs read last, newest first.
+    packs: Mutex<VecDeque<(String, Arc<Vec<u8>>)>>,
+}
+
+/// Why a storage cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StorageError {
+    /// The name of a root is not usable in paths.
+    #[error(
+        "storage.roots.{0}: a name of a root has at least two of the signs a-z, 0-9, _ and -, and begins with a letter"
+    )]
+    RootName(String),
+    /// The folder of a root has no absolute path.
+    #[error(
+        "storage.roots.{name} = {folder:?}: give an absolute path or an address such as s3://bucket/folder"
+    )]
+    RootFolder {
+        /// Its name.
+        name: String,
+        /// Its value.
+        folder: String,
+    },
+    /// No cache folder is known.
+    #[error("no folder for local copies is known; set storage.cache")]
+    NoCacheFolder,
+    /// An address cannot be used.
+    #[error("{setting}: {source}")]
+    Bucket {
+        /// Name of the setting.
+        setting: String,
+        /// Why.
+        source: BucketError,
+    },
+}
+
+impl StorageError {
+    /// Returns whether the same settings may work later.
+    pub const fn is_unavailable(&self) -> bool {
+        let Self::Bucket { source, .. } = self else {
+            return false;
+        };
+        matches!(source, BucketError::Unavailable { .. })
+    }
+}
+
+impl ProjectStorage {
+    /// Opens a storage. Sends no request. Returns `None` if everything is in the project or at a local path.
+    ///
+    /// # Errors
+    /// Returns an error if a setting has an invalid value.
+    pub fn open(options: &StorageOptions) -> Result<Option<Self>, StorageError> {
+        if options.artifacts.is_empty() && options.roots.is_empty() {
+            return Ok(None);
+        }
+        let open = |setting: &str, address: &str| {
+            Bucket::open(address).map_err(|source| StorageError::Bucket {
+                setting: setting.to_owned(),
+                source,
+            })
+        };
+        let mut roots = BTreeMap::new();
+        for (name, place) in &options.roots {
+            if !is_root_name(name) {
+                return Err(StorageError::RootName(name.clone()));
+            }
+            let root = if place.contains("://") {
+                Root::Bucket(open(&format!("storage.roots.{name}"), place)?)
+            } else if std::path::Path::new(place).is_absolute() {
+                Root::Folder(PathBuf::from(place))
+            } else {
+                return Err(StorageError::RootFolder {
+                    name: name.clone(),
+                    folder: place.clone(),
+                });
+            };
+            roots.insert(name.clone(), root);
+        }
+        let artifacts = match &*options.artifacts {
+            "" => None,
+            address => Some(open("storage.artifacts", address)?),
+        };
+        let has_remote_inputs = roots.values().any(|root| matches!(root, Root::Bucket(_)));
+        let cache = match &*options.cache {
+            "" => cache_folder().or(if has_remote_inputs {
+                None
+            } else {
+                Some(PathBuf::new())
+            }),
+            folder => Some(PathBuf::from(folder)),
+        };
+        let cache = cache.ok_or(StorageError::NoCacheFolder)?;
+        Ok(Some(Self {
+            artifacts,
+            roots,
+            cache: ObjectCache::new(cache, options.cache_bytes),
+            lists: FolderLists::default(),
+            packs: Mutex::default(),
+        }))
+    }
+
+    /// Returns a storage with artifacts and one root `scans` in a bucket in memory.
+    #[cfg(test)]
+    pub(in crate::store) fn in_memory(cache: PathBuf) -> (Self, Bucket) {
+        let bucket = Bucket::in_memory();
+        let storage = Self {
+            artifacts: Some(bucket.clone()),
+            roots: BTreeMap::from([("scans".to_owned(), Root::Bucket(bucket.clone()))]),
+            cache: ObjectCache::new(cache, 1 << 20),
+            lists: FolderLists::default(),
+            packs: Mutex::default(),
+        };
+        (storage, bucket)
+    }
+
+    /// Asks each bucket whether it exists and may be read. May block.
+    ///
+    /// # Errors
+    /// Returns the error of the first bucket that does not answer.
+    pub fn check(&self) -> Result<(), StorageError> {
+        let failed = |setting: String| move |source| StorageError::Bucket { setting, source };
+        if let Some(bucket) = &self.artifacts {
+            bucket
+                .check()
+                .map_err(failed("storage.artifacts".to_owned()))?;
+        }
+        for (name, root) in &self.roots {
+            if let Root::Bucket(bucket) = root {
+                bucket
+                    .check()
+                    .map_err(failed(format!("storage.roots.{name}")))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the bucket of the artifacts.
+    pub(in crate::store) const fn artifacts(&self) -> Option<&Bucket> {
+        self.artifacts.as_ref()
+    }
+
+    /// Returns the root that a stored path such as `scans:1/mesh.obj` begins with, and the rest of the path.
+    pub(in crate::store) fn root<'a>(&self, stored: &'a str) -> Option<(&Root, &'a str)> {
+        let (name, rest) = stored.split_once(':')?;
+        Some((self.roots.get(name)?, rest))
+    }
+
+    /// Returns whether some inputs are in an object store.
+    pub(in crate::store) fn has_remote_inputs(&self) -> bool {
+        self.roots
+            .values()
+            .any(|root| matches!(root, Root::Bucket(_)))
+    }
+
+    /// Opens a local copy of an input.
+    ///
+    /// # Errors
+    /// Returns an error if a request fails, the object is larger than `limit`, or the copy cannot be written.
+    pub(in crate::store) fn open_input(
+        &self,
+        bucket: &Bucket,
+        key: &str,
+        limit: u64,
+    ) -> Result<CachedObject, BucketError> {
+        self.cache.open(bucket, key, limit)
+    }
+
+    /// Returns the version of an input, which may be several minutes old.
+    ///
+    /// # Errors
+    /// Returns an error if a request fails or there is no such object.
+    pub(in crate::store) fn input_version(
+        &self,
+        bucket: &Bucket,
+        key: &str,
+    ) -> Result<String, BucketError> {
+        self.lists.version(bucket, key)
+    }
+
+    /// Returns the stored form of a path below a root that is a folder, such as `nas:1/mesh.obj`.
+    pub(in crate::store) fn path_below_root(&self, path: &std::path::Path) -> Option<String> {
+        let below = |(name, root): (&String, &Root)| match root {
+            Root::Folder(folder) => {
+                let rest = path.strip_prefix(folder).ok()?.to_str()?;
+                Some((folder.as_os_str().len(), format!("{name}:{rest}")))
+            }
+            Root::Bucket(_) => None,
+        };
+        // Of several roots, the deepest.
+        self.roots
+            .iter()
+            .filter_map(below)
+            .max()
+            .map(|(_, path)| path)
+    }
+
+    /// Forgets a local copy whose content has changed.
+    pub(in crate::store) fn forget_input(&self, address: &str) {
+        self.cache.forget(address);
+    }
+
+    /// Returns a pack, from memory if it was read lately.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn pack(
+        &self,
+        bucket: &Bucket,
+        name: &str,
+    ) -> Result<Arc<Vec<u8>>, BucketError> {
+        let lock = || {
+            self.packs
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+        };
+        if let Some((_, pack)) = lock().iter().find(|(known, _)| known == name) {
+            return Ok(Arc::clone(pack));
+        }
+        let pack = Arc::new(read_pack(bucket, name)?);
+        let mut packs = lock();
+        packs.push_front((name.to_owned(), Arc::clone(&pack)));
+        packs.truncate(PACKS_IN_MEMORY);
+        Ok(pack)
+    }
+}
+
+fn is_root_name(name: &str) -> bool {
+    let is_allowed =
+        |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"_-".contains(&byte);
+    name.len() >= 2 && name.as_bytes()[0].is_ascii_lowercase() && name.bytes().all(is_allowed)
+}
+
+/// Returns the folder for copies in the user's cache folder.
+fn cache_folder() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let base = variable("XDG_CACHE_HOME")
+        .or_else(|| variable("LOCALAPPDATA"))
+        .map(PathBuf::from)
+        .or_else(|| Some(PathBuf::from(variable("HOME")?).join(".cache")))?;
+    Some(base.join("mocban"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::{ProjectStorage, Root, StorageOptions};
+
+    fn options(roots: &[(&str, &str)]) -> StorageOptions {
+        let roots = roots
+            .iter()
+            .map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
+        StorageOptions {
+            roots: roots.collect::<BTreeMap<_, _>>(),
+            cache: "/nonexistent".to_owned(),
+            ..StorageOptions::default()
+        }
+    }
+
+    #[test]
+    fn a_path_begins_with_the_name_of_its_root() {
+        let root = std::env::temp_dir();
+        let root = root.to_str().expect("UTF-8");
+        let storage = ProjectStorage::open(&options(&[("nas", root)]))
+            .expect("valid")
+            .expect("one root");
+        let (found, rest) = storage.root("nas:a/chữ 1.obj").expect("a root");
+        assert!(matches!(found, Root::Folder(folder) if folder.to_str() == Some(root)));
+        assert_eq!(rest, "a/chữ 1.obj");
+        for path in ["a/1.obj", "other:1.obj", "nas/1.obj", "/nas:1.obj"] {
+            assert!(storage.root(path).is_none(), "{path}");
+        }
+        assert!(
+            ProjectStorage::open(&StorageOptions::default())
+                .expect("valid")
+                .is_none()
+        );
+    }
+
+    #[test]
+    fn names_and_folders_that_would_be_ambiguous_are_refused() {
+        for (name, place) in [
+            ("c", "/mnt"),
+            ("Nas", "/mnt"),
+            ("nas", "mnt"),
+            ("a:b", "/mnt"),
+            ("nas", "ftp://x"),
+        ] {
+            let error = ProjectStorage::open(&options(&[(name, place)])).expect_err("refused");
+            assert!(error.to_string().contains("storage.roots."), "{error}");
+        }
+    }
+}

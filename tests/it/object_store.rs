@@ -1,0 +1,265 @@
+//! Inputs and artifacts in an object store: the results are those of local files, also when the store loses requests and
+//! processes are killed.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::atomic::Ordering;
+
+use mocban::store::Project;
+
+use crate::cli::{Call, binary, call, empty, mocban};
+use crate::resume::project;
+use crate::s3_server::{Faults, S3Server, proxy};
+use crate::uninterrupted::files;
+
+const PAIRS: &str = "6";
+const GOOD: Faults = Faults {
+    refused: 0,
+    lost: 0,
+    slow: 0,
+};
+
+/// A project with local files that has been run, and one with the same pairs in an object store, not run yet.
+struct Remote {
+    dir: tempfile::TempDir,
+    server: S3Server,
+}
+
+impl Remote {
+    /// Returns `None` if no server is installed.
+    fn new() -> Option<Self> {
+        let server = S3Server::start()?;
+        let dir = empty();
+        let local = project(dir.path(), "local", PAIRS);
+        server.upload(&local.dir().join("data"), "scans");
+        let list = std::fs::read_to_string(local.dir().join("data/manifest.csv")).expect("a list");
+        let list = list
+            .replace(",meshes/", ",scans:meshes/")
+            .replace(",prints/", ",scans:prints/");
+        std::fs::write(dir.path().join("remote.csv"), list).expect("written");
+        let settings = "[storage]\nartifacts = \"s3://mocban/results\"\n[storage.roots]\nscans = \"s3://mocban/scans\"\n";
+        let remote = dir.path().join("remote");
+        std::fs::create_dir(&remote).expect("a folder");
+        std::fs::write(remote.join("mocban.toml"), settings).expect("written");
+        // The same paths, but below a folder.
+        let file = dir.path().join("file");
+        std::fs::create_dir(&file).expect("a folder");
+        let root = format!("storage.roots.scans = {:?}\n", local.dir().join("data"));
+        std::fs::write(file.join("mocban.toml"), root).expect("written");
+        mocban(dir.path(), &["-C", "file", "import", "remote.csv"]).expect(0);
+        mocban(dir.path(), &["-C", "file", "run"]).expect(0);
+        let made = Self { dir, server };
+        made.remote(made.server.port(), &["import", "remote.csv"])
+            .expect(0);
+        Some(made)
+    }
+
+    fn path(&self) -> &Path {
+        self.dir.path()
+    }
+
+    /// Returns a command on the remote project through a port, with the cache of one machine.
+    fn command(&self, port: u16, cache: &str, args: &[&str]) -> Command {
+        let mut command = binary();
+        command.current_dir(self.path());
+        command.env("XDG_CACHE_HOME", self.path().join(cache));
+        S3Server::configure(&mut command, port);
+        command.args(["-C", "remote"]).args(args);
+        command
+    }
+
+    fn remote(&self, port: u16, args: &[&str]) -> Call {
+        call(&mut self.command(port, "cache", args))
+    }
+
+    /// Checks that both projects have the same export, and that nothing is damaged.
+    #[track_caller]
+    fn assert_same_results(&self) {
+        for folder in ["of-local", "of-remote"] {
+            let _ = std::fs::remove_dir_all(self.path().join(folder));
+        }
+        let export = ["export", "--to", "jsonl", "-o"];
+        mocban(
+            self.path(),
+            &["-C", "file", "export", "--to", "jsonl", "-o", "of-local"],
+        )
+        .expect(0);
+        let port = self.server.port();
+        self.remote(port, &[&export[..], &["of-remote"]].concat())
+            .expect(0);
+        let of = |name: &str| files(&self.path().join(name));
+        let (local, other) = (of("of-local"), of("of-remote"));
+        let differing = local
+            .iter()
+            .filter(|(path, bytes)| other.get(*path) != Some(bytes));
+        let differing: Vec<_> = differing.map(|(path, _)| path).collect();
+        assert!(
+            local.len() == other.len() && differing.is_empty(),
+            "{differing:?} differ"
+        );
+        self.remote(port, &["check"]).expect(0);
+    }
+}
+
+#[test]
+fn a_pair_is_one_object_and_two_reads_and_the_results_are_those_of_local_files() {
+    let Some(remote) = Remote::new() else { return };
+    let (port, requests) = proxy(remote.server.port(), GOOD);
+    remote.remote(port, &["run"]).expect(0);
+    let pairs: u64 = PAIRS.parse().expect("a number");
+    assert_eq!(requests.put.load(Ordering::Relaxed), pairs);
+    // One list at the start shows that each bucket can be read.
+    assert!(
+        requests.get.load(Ordering::Relaxed) <= 2 * pairs + 2,
+        "{requests:?}"
+    );
+    assert_eq!(remote.server.list("results").len() as u64, pairs);
+    remote.assert_same_results();
+    // Another computer has no copies of the inputs, and nothing to do.
+    let run = call(&mut remote.command(port, "other", &["run"])).expect(0);
+    assert!(
+        run.err.contains("nothing") || run.err.contains("0 left"),
+        "{}",
+        run.err
+    );
+    assert_eq!(remote.server.list("results").len() as u64, pairs);
+    remote.remote(port, &["run", "--rerun", "all"]).expect(0);
+    assert_eq!(remote.server.list("results").len() as u64, 2 * pairs);
+    let collected = remote.remote(port, &["check", "--collect=1"]).expect(0);
+    assert!(
+        collected.out.contains("removed 0 of 6 files"),
+        "{}",
+        collected.out
+    );
+    remote.assert_same_results();
+}
+
+#[test]
+fn a_store_that_loses_requests_and_killed_processes_change_no_result() {
+    let Some(remote) = Remote::new() else { return };
+    let faults = Faults {
+        refused: 20,
+        lost: 15,
+        slow: 5,
+    };
+    let (port, requests) = proxy(remote.server.port(), faults);
+    for point in ["register:written", "register:synced"] {
+        let mut killed = remote.command(port, "cache", &["run", "-j", "1"]);
+        killed.env("MOCBAN_BREAK_AT", point).stderr(Stdio::null());
+        let ended = killed.status().expect("it ends");
+        assert!(!ended.success(), "the failpoint was not reached");
+    }
+    remote.remote(port, &["run"]).expect(0);
+    assert!(
+        requests.disturbed.load(Ordering::Relaxed) > 5,
+        "{requests:?}"
+    );
+    remote.assert_same_results();
+}
+
+#[test]
+fn a_lost_pack_is_computed_again() {
+    let Some(remote) = Remote::new() else { return };
+    let port = remote.server.port();
+    remote.remote(port, &["run"]).expect(0);
+    let packs = remote.server.list("results");
+    remote.server.remove(&packs[0]);
+    let checked = remote.remote(port, &["check"]).expect(12);
+    assert!(
+        checked.out.contains(&packs[0]["results/".len()..]),
+        "{}",
+        checked.out
+    );
+    remote.remote(port, &["check", "--repair"]).expect(0);
+    remote.remote(port, &["run"]).expect(0);
+    remote.assert_same_results();
+}
+
+#[test]
+fn settings_of_the_store_that_are_wrong_are_explained() {
+    let Some(remote) = Remote::new() else { return };
+    let port = remote.server.port();
+    let refused = |command: &mut Command, code: i32, wanted: &str| {
+        let refused = call(command).expect(code);
+        assert!(refused.err.contains(wanted), "{}", refused.err);
+        assert!(
+            !refused.err.contains("secret-of-the-test"),
+            "{}",
+            refused.err
+        );
+        assert_eq!(refused.err.lines().count(), 1, "{}", refused.err);
+    };
+    let set = |setting: &str| remote.command(port, "cache", &["--set", setting, "run"]);
+    let missing = &mut set("storage.artifacts=s3://no-such-bucket/x");
+    refused(missing, 2, "s3://no-such-bucket/x: there is no such bucket");
+    refused(
+        &mut set("storage.artifacts=https://x"),
+        2,
+        "begins with s3://",
+    );
+    refused(
+        &mut set("storage.roots.scans=data"),
+        2,
+        "give an absolute path",
+    );
+    refused(
+        &mut set("storage.roots.Scans=/data"),
+        2,
+        "storage.roots.Scans: ",
+    );
+    let without_keys = &mut remote.command(port, "cache", &["run"]);
+    refused(
+        without_keys.env_remove("AWS_ACCESS_KEY_ID"),
+        2,
+        "no keys: set AWS_ACCESS_KEY_ID",
+    );
+    let list = "id,mesh,print\nnew,scans:meshes/none.obj,scans:prints/none.png\n";
+    std::fs::write(remote.path().join("more.csv"), list).expect("written");
+    let import = remote.remote(port, &["import", "more.csv"]).expect(2);
+    assert!(import.err.contains("2 files are missing"), "{}", import.err);
+    remote.remote(port, &["run"]).expect(0);
+    // Without the setting, nobody knows where the packs are.
+    std::fs::write(remote.path().join("remote/mocban.toml"), "").expect("written");
+    let without_store = ["--set", "storage.roots.scans=s3://mocban/scans"];
+    let export = ["export", "--to", "jsonl", "-o", "lost"];
+    let export = remote.remote(port, &[&without_store[..], &export].concat());
+    assert_ne!(export.code, 0);
+    assert!(
+        export.err.contains("set storage.artifacts"),
+        "{}",
+        export.err
+    );
+}
+
+#[test]
+fn inputs_below_a_folder_with_a_name_move_with_it() {
+    let dir = empty();
+    let local = project(dir.path(), "local", "2");
+    let data = local.dir().join("data");
+    let root = |folder: &Path| format!("storage.roots.nas={}", folder.display());
+    let list = data.join("manifest.csv");
+    let import = [
+        "-C",
+        "named",
+        "--set",
+        &root(&data),
+        "import",
+        list.to_str().expect("UTF-8"),
+    ];
+    mocban(dir.path(), &import).expect(0);
+    mocban(dir.path(), &["-C", "named", "--set", &root(&data), "run"]).expect(0);
+    let moved = dir.path().join("moved");
+    std::fs::rename(&data, &moved).expect("moved");
+    let plan = [
+        "-C",
+        "named",
+        "--set",
+        &root(&moved),
+        "run",
+        "--dry-run",
+        "--json",
+    ];
+    let plan = mocban(dir.path(), &plan).expect(0).json();
+    assert_eq!(plan["pairs"], 0, "{plan}");
+    assert!(Project::open(&dir.path().join("named")).is_ok());
+}
