@@ -48,6 +48,7 @@
 //! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns
 //! the write connection), `db/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
 //! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
+//! `runner/run_metrics.rs` (counts and times, which heartbeats store for `status --hosts`),
 //! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
 //! rows that no run can compute again), `cli/report.rs`, `report/headline.rs` (the answer in three
 //! sentences), `report/provenance.rs` (settings and hashes), `report/render/table.rs` and `report/number_format.rs` (the

@@ -30,6 +30,6 @@ pub(super) async fn times(world: &World, catalog: &Catalog) -> anyhow::Result<[S
         }
         *cell = spread.cell();
     }
-    catalog.end_worker(fake.worker, 2).await?;
+    catalog.end_worker(fake.worker, 2, None).await?;
     Ok(cells)
 }

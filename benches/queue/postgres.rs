@@ -92,7 +92,7 @@ async fn load(
             done += 1;
         }
     }
-    catalog.end_worker(fake.worker, 2).await?;
+    catalog.end_worker(fake.worker, 2, None).await?;
     catalog.close().await;
     Ok((done, claims))
 }

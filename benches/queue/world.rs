@@ -108,6 +108,6 @@ pub(super) async fn work(
         }
     }
     let time = start.elapsed();
-    catalog.end_worker(fake.worker, 2).await?;
+    catalog.end_worker(fake.worker, 2, None).await?;
     Ok(time)
 }

@@ -1,10 +1,11 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 8;
+PRAGMA user_version = 9;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
--- JSON array by stage; `died` is set when others found it dead.
+-- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
+-- stores with its heartbeats: `domain::WorkerMetrics` as JSON.
 CREATE TABLE worker (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     host TEXT NOT NULL,
@@ -14,7 +15,8 @@ CREATE TABLE worker (
     heartbeat INTEGER NOT NULL,
     ended INTEGER,
     fingerprints TEXT CHECK (json_valid(fingerprints)),
-    died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1))
+    died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1)),
+    metrics TEXT CHECK (json_valid(metrics))
 ) STRICT;
 
 -- What a stage's result depends on besides the inputs: its settings and revision, and the fingerprint of the stage

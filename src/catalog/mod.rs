@@ -52,6 +52,7 @@ pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
+pub use queue::worker_list::{WorkerRecord, WorkerState};
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};

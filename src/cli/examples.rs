@@ -24,7 +24,10 @@ const EXAMPLES: [(&str, &str); 26] = [
         "worker",
         "mocban -C blocks --catalog postgres://me@db.example/lab worker --jobs 8",
     ),
-    ("status", "mocban -C blocks status --watch"),
+    (
+        "status",
+        "mocban -C blocks status --watch\nmocban -C blocks status --hosts",
+    ),
     ("show", "mocban -C blocks show b01-0117"),
     ("retry", "mocban -C blocks retry --class io"),
     ("check", "mocban -C blocks check --repair"),

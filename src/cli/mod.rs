@@ -41,6 +41,7 @@ mod show;
 mod show_text;
 mod signals;
 mod status;
+mod status_hosts;
 mod table;
 mod time_text;
 mod truth_file;

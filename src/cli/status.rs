@@ -11,11 +11,13 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::output;
 use super::screen::{Palette, Tone, clear_code};
+use super::status_hosts;
 use super::table::{columns, count};
 use super::verdict::reviewer_name;
-use crate::catalog::{StageCounts, StatusCounts};
+use crate::catalog::{Catalog, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
+use crate::store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
@@ -26,6 +28,9 @@ pub(super) struct StatusArgs {
     /// List every failed pair with its error, not only the first ones of each class
     #[arg(long)]
     pub(super) failed: bool,
+    /// Show the workers of each machine instead: what they have done, how long each stage takes, and what they wait for
+    #[arg(long, conflicts_with = "failed")]
+    pub(super) hosts: bool,
 }
 
 const WATCH_INTERVAL: Duration = Duration::from_secs(2);
@@ -33,14 +38,21 @@ const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     loop {
-        let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
-        let status = ProjectStatus {
-            // Read before the counts: a run that ends in between leaves no leases.
-            running: runner::is_running(&project, &catalog, now()).await?,
-            failures: Failures::read(&catalog, args.failed).await?,
-            counts: catalog.status(&fingerprints).await?,
-        };
-        print_status(&status, &args, context)?;
+        if args.hosts {
+            let workers = status_hosts::read(&catalog, now()).await?;
+            print_refreshed(
+                &args,
+                context,
+                &workers.json(),
+                workers.text(context.stdout),
+            )?;
+        } else {
+            print_status(
+                &read(&project, &catalog, &args, context).await?,
+                &args,
+                context,
+            )?;
+        }
         if !args.watch {
             break;
         }
@@ -51,6 +63,21 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
     }
     catalog.close().await;
     Ok(ExitCode::Done)
+}
+
+async fn read(
+    project: &Project,
+    catalog: &Catalog,
+    args: &StatusArgs,
+    context: &Context,
+) -> anyhow::Result<ProjectStatus> {
+    let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
+    Ok(ProjectStatus {
+        // Read before the counts: a run that ends in between leaves no leases.
+        running: runner::is_running(project, catalog, now()).await?,
+        failures: Failures::read(catalog, args.failed).await?,
+        counts: catalog.status(&fingerprints).await?,
+    })
 }
 
 /// The state that the screen shows.
@@ -99,25 +126,36 @@ fn print_status(
     args: &StatusArgs,
     context: &Context,
 ) -> anyhow::Result<()> {
-    if context.global.json {
-        let json = status.json(args.failed)?;
-        if args.watch {
-            output::print_json_text(&json.to_string())?;
-        } else {
-            output::print_json(&json)?;
-        }
-    } else {
-        let dir = context.dir().display().to_string();
-        let mut text = screen(status, &dir, context.stdout);
-        if args.watch && std::io::stdout().is_terminal() {
-            text.insert_str(0, &clear_code());
-        }
-        output::print(&text)?;
+    let dir = context.dir().display().to_string();
+    let text = screen(status, &dir, context.stdout);
+    print_refreshed(args, context, &status.json(args.failed)?, text)?;
+    if !context.global.json {
         for command in next_steps(status) {
             context.next(&command);
         }
     }
     Ok(())
+}
+
+/// Prints JSON or text. With `--watch`, a JSON document is one line, and a text replaces the last one on the terminal.
+fn print_refreshed(
+    args: &StatusArgs,
+    context: &Context,
+    json: &Value,
+    mut text: String,
+) -> anyhow::Result<()> {
+    if context.global.json {
+        if args.watch {
+            output::print_json_text(&json.to_string())?;
+        } else {
+            output::print_json(json)?;
+        }
+        return Ok(());
+    }
+    if args.watch && std::io::stdout().is_terminal() {
+        text.insert_str(0, &clear_code());
+    }
+    Ok(output::print(&text)?)
 }
 
 fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {

@@ -24,6 +24,7 @@ mod transform;
 mod unique_keys;
 mod unit;
 mod verdict;
+mod worker_metrics;
 
 pub use artifact::{ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
@@ -51,6 +52,7 @@ pub(crate) use unique_keys::KEY_TWICE;
 pub use unique_keys::UniqueKeys;
 pub use unit::LengthUnit;
 pub use verdict::{Reason, Verdict};
+pub use worker_metrics::{ComputeTimes, WaitReason, WorkerMetrics};
 
 /// Milliseconds since the Unix epoch. The current time is always passed as an argument.
 pub type UnixMillis = i64;

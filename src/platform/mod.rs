@@ -33,6 +33,15 @@ pub(crate) struct FileStat {
     pub(crate) len: u64,
 }
 
+/// Memory of this process in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ProcessMemory {
+    /// Memory now.
+    pub(crate) resident: u64,
+    /// Largest memory so far.
+    pub(crate) peak: u64,
+}
+
 /// Device and inode of a file as Linux's tables in `/proc` show them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeviceNumber {

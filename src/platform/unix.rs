@@ -15,7 +15,7 @@ use rustix::process::{Resource, getrlimit};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::task::JoinHandle;
 
-use super::{DeviceNumber, FileId, FileStat};
+use super::{DeviceNumber, FileId, FileStat, ProcessMemory};
 
 fn stat_of(meta: &Metadata) -> FileStat {
     FileStat {
@@ -245,6 +245,23 @@ pub(crate) fn host_name() -> String {
     system.nodename().to_string_lossy().into_owned()
 }
 
+/// Returns the memory of this process (`proc_pid_status(5)`), or `None` on other systems than Linux.
+pub(crate) fn process_memory() -> Option<ProcessMemory> {
+    parse_memory(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
+fn parse_memory(status: &str) -> Option<ProcessMemory> {
+    let field = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+        kib.checked_mul(1024)
+    };
+    Some(ProcessMemory {
+        resident: field("VmRSS:")?,
+        peak: field("VmHWM:")?,
+    })
+}
+
 /// Calls a function at each Ctrl-C, SIGTERM and SIGHUP until the handle is aborted. SIGHUP stays ignored if it was
 /// ignored when this process started, as under `nohup`.
 ///
@@ -307,7 +324,7 @@ impl IgnoredSignals {
 mod tests {
     use tokio::signal::unix::SignalKind;
 
-    use super::{Errno, IgnoredSignals, is_without_locks};
+    use super::{Errno, IgnoredSignals, ProcessMemory, is_without_locks, parse_memory};
 
     #[test]
     fn ignored_signals_are_read_from_the_mask() {
@@ -317,6 +334,18 @@ mod tests {
         assert!(!ignored.contains(SignalKind::interrupt()));
         assert!(!ignored.contains(SignalKind::terminate()));
         assert_eq!(IgnoredSignals::parse("Name:\tmocban\n"), IgnoredSignals(0));
+    }
+
+    #[test]
+    fn memory_is_read_in_bytes() {
+        let status =
+            "Name:\tmocban\nVmPeak:\t  9000 kB\nVmHWM:\t    2048 kB\nVmRSS:\t    1024 kB\n";
+        let memory = ProcessMemory {
+            resident: 1 << 20,
+            peak: 2 << 20,
+        };
+        assert_eq!(parse_memory(status), Some(memory));
+        assert_eq!(parse_memory("VmRSS: 1 kB\n"), None);
     }
 
     #[test]

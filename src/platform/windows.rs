@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::signal::windows::{ctrl_break, ctrl_c, ctrl_close, ctrl_shutdown};
 use tokio::task::JoinHandle;
 
-use super::{DeviceNumber, FileId, FileStat};
+use super::{DeviceNumber, FileId, FileStat, ProcessMemory};
 
 /// Opens a folder like a file (`FILE_FLAG_BACKUP_SEMANTICS` of `CreateFileW`).
 const FOLDERS_TOO: u32 = 0x0200_0000;
@@ -252,6 +252,11 @@ pub(crate) fn host_name() -> String {
         |_| String::new(),
         |name| name.to_string_lossy().into_owned(),
     )
+}
+
+/// Returns `None`: the memory is not asked for.
+pub(crate) const fn process_memory() -> Option<ProcessMemory> {
+    None
 }
 
 /// Calls a function at each Ctrl-C and Ctrl-Break, when the console is closed, and at a shutdown of the system, until

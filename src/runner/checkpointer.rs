@@ -126,7 +126,10 @@ async fn store_stages(
         let batch;
         (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
         let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
-        outcome = context.catalog.checkpoint(lease, batch).await?;
+        context.metrics.begin_commit();
+        let stored = context.catalog.checkpoint(lease, batch).await;
+        context.metrics.end_commit();
+        outcome = stored?;
         if !matches!(outcome, CheckpointOutcome::LeaseLost) {
             count += times.len() as u64;
             for (stage, ms) in times {

@@ -137,7 +137,7 @@ fn run_stage(
     let begun = Instant::now();
     let output = context.executor.run(stage, pair);
     let elapsed = begun.elapsed();
-    context.add_compute_time(elapsed);
+    context.add_compute_time(stage, elapsed);
     let StageOutput {
         outcome,
         files,

@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
+use super::run_metrics::RunMetrics;
 use crate::catalog::RerunPolicy;
 use crate::domain::{PairName, Stage};
 use crate::{mesh, raster};
 
 /// Options of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
@@ -32,6 +33,8 @@ pub struct RunOptions {
     pub mesh_limits: mesh::MeshLimits,
     /// Limits on print images.
     pub image_limits: raster::ImageLimits,
+    /// Where the run counts pairs and times.
+    pub metrics: RunMetrics,
 }
 
 /// Which part of a run to do.
@@ -59,6 +62,7 @@ impl Default for RunOptions {
             stage_timeout: Duration::from_mins(10),
             mesh_limits: mesh::MeshLimits::SUGGESTED,
             image_limits: raster::ImageLimits::SUGGESTED,
+            metrics: RunMetrics::default(),
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
 use super::compute_thread::{ComputeEvent, ComputeThread, run_blocking};
@@ -16,7 +16,7 @@ use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::StopLevel;
 use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
-use crate::domain::{Failure, FailureClass, Stage};
+use crate::domain::{Failure, FailureClass, Stage, WaitReason};
 use crate::failpoint::{self, Point};
 use crate::store::ArtifactError;
 
@@ -145,6 +145,7 @@ async fn fail(
     pair: PairSummary,
     failed: FailedStage,
 ) -> PairReport {
+    let begun = Instant::now();
     let settled = match checkpointer.settle().await {
         Ok(settled) => settled,
         Err(error) => return PairReport::failed(error),
@@ -154,10 +155,10 @@ async fn fail(
         Ok(lease) => lease,
         Err(settled) => return settled.finish(context, PairEnd::LeaseLost).await,
     };
-    PairReport {
-        end: store_failure(context, lease, stage, pair, failed).await,
-        stages,
-    }
+    let end = store_failure(context, lease, stage, pair, failed).await;
+    let waited = begun.elapsed();
+    context.metrics.add_wait(WaitReason::Database, waited);
+    PairReport { end, stages }
 }
 
 async fn store_failure(

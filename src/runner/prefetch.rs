@@ -17,7 +17,7 @@ use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWork};
-use crate::domain::{PairName, Stage, WorkerId};
+use crate::domain::{PairName, Stage, WaitReason, WorkerId};
 use crate::raster;
 use crate::store::Project;
 
@@ -100,6 +100,11 @@ impl Prefetch {
     /// Returns the number of slots without a pair.
     pub(super) fn free_slots(&self) -> usize {
         self.slots.saturating_sub(self.running.len())
+    }
+
+    /// Returns the number of leased pairs that run or have not started.
+    pub(super) fn leased(&self) -> usize {
+        self.queue.len() + self.running.len()
     }
 
     /// Notes that pairs may have become ready since the last claim.
@@ -245,6 +250,7 @@ impl Prefetch {
             deadline: context.deadline() + wait,
             alive_since: context.alive_since(),
         };
+        let (begun, waiting) = (Instant::now(), self.free_slots() as u32);
         let leases = context.catalog.claim(request).await?;
         if leases.is_empty() {
             return Ok(());
@@ -252,6 +258,8 @@ impl Prefetch {
         let catalog = &context.catalog;
         let works = catalog.retry_while_unavailable(async || catalog.work(&leases).await);
         let works = works.await?;
+        let waited = begun.elapsed() * waiting;
+        context.metrics.add_wait(WaitReason::Database, waited);
         let leased: Vec<_> = leases.into_iter().zip(works).collect();
         let estimates = tokio::spawn(self.estimates(&leased));
         self.arriving.push_back(ArrivingPairs { leased, estimates });

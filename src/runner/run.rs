@@ -113,11 +113,11 @@ pub(super) async fn run_with(
     };
     if let Err(error) = start.prepare(&mut guard, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
-        let _ = catalog.end_worker(worker, clock.now()).await;
+        let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
     if options.part == RunPart::Plan {
-        catalog.end_worker(worker, clock.now()).await?;
+        catalog.end_worker(worker, clock.now(), None).await?;
         let status = catalog.status(fingerprints).await?;
         let left = catalog.work_left(options.until, selection.as_ref()).await?;
         let counts = RunCounts::default();
@@ -137,14 +137,19 @@ pub(super) async fn run_with(
         stage_timeout: options.stage_timeout,
         events,
         compute_us: AtomicU64::new(0),
+        metrics: options.metrics.clone(),
     });
     let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
     let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counts = scheduler.run(&mut received, &mut on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let worker = scheduler.worker();
-    let ended =
-        catalog.retry_while_unavailable(async || catalog.end_worker(worker, clock.now()).await);
+    let metrics = context.worker_metrics();
+    let ended = catalog.retry_while_unavailable(async || {
+        catalog
+            .end_worker(worker, clock.now(), Some(&metrics))
+            .await
+    });
     let ended = ended.await;
     stop_waiting.abort();
     // A lost log explains other errors.

@@ -9,10 +9,11 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{Clock, Timing};
+use super::run_metrics::RunMetrics;
 use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{Catalog, FingerprintIds};
-use crate::domain::{Stage, UnixMillis};
+use crate::domain::{Stage, UnixMillis, WorkerMetrics};
 use crate::store::Project;
 
 /// What all pairs of a run have in common.
@@ -34,6 +35,7 @@ pub(super) struct RunContext {
     pub(super) events: mpsc::UnboundedSender<RunEvent>,
     /// Microseconds that stages were computed, all threads together.
     pub(super) compute_us: AtomicU64,
+    pub(super) metrics: RunMetrics,
 }
 
 /// How a pair's task ended.
@@ -83,9 +85,16 @@ impl RunContext {
     }
 
     /// Adds to the time that stages were computed.
-    pub(super) fn add_compute_time(&self, elapsed: Duration) {
+    pub(super) fn add_compute_time(&self, stage: Stage, elapsed: Duration) {
         let us = elapsed.as_micros() as u64;
         self.compute_us.fetch_add(us, Ordering::Relaxed);
+        self.metrics.add_stage(stage, elapsed);
+    }
+
+    /// Returns the counts and times of this run for the worker's row in the catalog.
+    pub(super) fn worker_metrics(&self) -> WorkerMetrics {
+        let elapsed_ms = self.clock.elapsed_ms();
+        self.metrics.snapshot(elapsed_ms, self.is_draining())
     }
 
     /// Sends an event to the caller of the run.

@@ -1,7 +1,7 @@
 //! The main loop of a run: fills the slots, handles pairs that end, and stores this worker's heartbeats.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
@@ -18,7 +18,7 @@ use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
 use crate::catalog::{Outstanding, PairSelection, Waiting};
-use crate::domain::WorkerId;
+use crate::domain::{WaitReason, WorkerId};
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
@@ -64,6 +64,7 @@ impl Scheduler {
         options: &RunOptions,
     ) -> Self {
         let now = context.clock.now();
+        context.metrics.set_jobs(options.workers.max(1));
         Self {
             session: WorkerSession::new(worker, now, context.timing.lease_ms()),
             prefetch: Prefetch::new(Arc::clone(&context), selection.clone(), options),
@@ -98,9 +99,19 @@ impl Scheduler {
         let mut heartbeats = every(context.timing.heartbeat_every);
         while !self.fill_slots().await? {
             self.flush_where_needed().await?;
+            let leased = self.prefetch.leased() + self.storing.len();
+            context.metrics.set_leased(leased);
+            let begun = Instant::now();
+            let waiting = self.slots_waiting_for_storage();
             tokio::select! {
                 biased;
-                () = context.stop.reached(self.reported_stop.next()), if self.reported_stop < StopLevel::Now => self.report_stop(),
+                () = context.stop.reached(self.reported_stop.next()), if self.reported_stop < StopLevel::Now => {
+                    self.report_stop();
+                    if self.reported_stop == StopLevel::Drain {
+                        // Others see at once that this worker stops.
+                        heartbeats.reset_immediately();
+                    }
+                }
                 _ = heartbeats.tick() => self.heartbeat().await?,
                 Some(event) = events.recv() => {
                     self.prefetch.observe(&event);
@@ -112,7 +123,9 @@ impl Scheduler {
                 _ = recoveries.tick() => self.recover().await?,
                 _ = polls.tick(), if self.prefetch.free_slots() > 0 => self.poll().await?,
             }
+            self.add_storage_wait(waiting, begun.elapsed());
         }
+        context.metrics.set_leased(0);
         while let Ok(event) = events.try_recv() {
             on_event(event);
         }
@@ -155,6 +168,29 @@ impl Scheduler {
             self.computing.spawn(async move { (slot, task.await) });
         }
         Ok(())
+    }
+
+    /// Returns how many slots are free because too many computed pairs are being stored.
+    fn slots_waiting_for_storage(&self) -> usize {
+        if self.storing.len() < self.max_storing {
+            return 0;
+        }
+        self.prefetch.free_slots()
+    }
+
+    /// Adds the time that slots waited for pairs to be stored. The commits count as the reason if most of these pairs are
+    /// being committed, and otherwise the files.
+    fn add_storage_wait(&self, slots: usize, elapsed: Duration) {
+        if slots == 0 {
+            return;
+        }
+        let metrics = &self.context.metrics;
+        let reason = if metrics.commits() * 2 >= self.max_storing as u64 {
+            WaitReason::Database
+        } else {
+            WaitReason::Artifacts
+        };
+        metrics.add_wait(reason, elapsed * slots as u32);
     }
 
     fn is_idle(&self) -> bool {
@@ -200,8 +236,14 @@ impl Scheduler {
         self.prefetch.expect_more();
         self.counts.stages += report.stages;
         match report.end {
-            Ok(PairEnd::Done) => self.counts.done += 1,
-            Ok(PairEnd::Failed) => self.counts.failed += 1,
+            Ok(PairEnd::Done) => {
+                self.counts.done += 1;
+                self.context.metrics.count_done();
+            }
+            Ok(PairEnd::Failed) => {
+                self.counts.failed += 1;
+                self.context.metrics.count_failed();
+            }
             Ok(PairEnd::Retry | PairEnd::Released | PairEnd::LeaseLost) => {}
             Err(error) => {
                 self.drain("the run cannot go on");

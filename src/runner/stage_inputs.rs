@@ -2,9 +2,12 @@
 
 use super::options::RunOptions;
 use super::pair_context::PairContext;
+use super::run_metrics::{RunMetrics, TimedRead};
 use super::stage_output::ExecutionError;
 use crate::domain::artifact_role::{DEPTH, print_mask};
-use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
+use crate::domain::{
+    DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage, WaitReason,
+};
 use crate::mesh;
 use crate::raster::{self, DepthMap};
 use crate::stages::normalize::{Normalized, PrintMasks};
@@ -17,6 +20,7 @@ pub(super) struct StageInputs {
     project: Project,
     mesh_limits: mesh::MeshLimits,
     image_limits: raster::ImageLimits,
+    metrics: RunMetrics,
 }
 
 impl StageInputs {
@@ -25,6 +29,7 @@ impl StageInputs {
             project: project.clone(),
             mesh_limits: options.mesh_limits,
             image_limits: options.image_limits,
+            metrics: options.metrics.clone(),
         }
     }
 
@@ -107,8 +112,10 @@ impl StageInputs {
             .get(&stage)
             .and_then(|stored| stored.files.get(role))
             .ok_or(ExecutionError::RerunFrom(stage))?;
-        self.project
-            .read_artifact(artifact)
+        self.metrics
+            .waiting(WaitReason::Artifacts, || {
+                self.project.read_artifact(artifact)
+            })
             .map_err(|error| match error {
                 ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
                     tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
@@ -130,9 +137,14 @@ impl StageInputs {
         let input = self.project.input(stored);
         let limit = self.mesh_limits.max_bytes;
         pair.file_in_use.set(Some(input.path()));
-        let mut file = open_input(&input, limit, "limits.mesh.max_bytes").map_err(unreadable)?;
+        let open = || open_input(&input, limit, "limits.mesh.max_bytes");
+        let opened = self.metrics.waiting(WaitReason::Inputs, open);
+        let mut file = opened.map_err(unreadable)?;
         let size = file.size();
-        let mesh = match mesh::read_from(&mut file, size, stored, &self.mesh_limits) {
+        let mut timed = TimedRead::new(&mut file);
+        let mesh = mesh::read_from(&mut timed, size, stored, &self.mesh_limits);
+        self.metrics.add_wait(WaitReason::Inputs, timed.elapsed);
+        let mesh = match mesh {
             Err(mesh::MeshReadError::Io(error)) => return Err(unreadable(file.error(error))),
             Err(mesh::MeshReadError::Mesh(error)) => Err(error),
             Ok(mesh) => Ok(mesh),
@@ -152,7 +164,9 @@ impl StageInputs {
         let input = self.project.input(stored);
         let limit = self.image_limits.max_bytes;
         pair.file_in_use.set(Some(input.path()));
-        let file = read_input(&input, limit, "limits.image.max_bytes").map_err(unreadable)?;
+        let read = || read_input(&input, limit, "limits.image.max_bytes");
+        let read = self.metrics.waiting(WaitReason::Inputs, read);
+        let file = read.map_err(unreadable)?;
         pair.inputs.print = Some(file.digest.into());
         pair.file_in_use.set(None);
         let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {

@@ -49,12 +49,14 @@ impl WorkerSession {
         self.worker
     }
 
-    /// Stores a heartbeat.
+    /// Stores a heartbeat, with the counts and times of the run.
     pub(super) async fn heartbeat(&mut self, context: &RunContext) -> HeartbeatOutcome {
         let now = context.clock.now();
         let alive_since = context.alive_since();
         let catalog = &context.catalog;
-        match catalog.heartbeat(self.worker, now, alive_since).await {
+        let metrics = context.worker_metrics();
+        let stored = catalog.heartbeat(self.worker, now, alive_since, Some(&metrics));
+        match stored.await {
             Ok(true) => {
                 self.last_heartbeat = now;
                 HeartbeatOutcome::Alive
@@ -77,7 +79,8 @@ impl WorkerSession {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let expired = self.worker;
         catalog
-            .retry_while_unavailable(async || catalog.end_worker(expired, now).await)
+            // The counts go on in the row of the new worker.
+            .retry_while_unavailable(async || catalog.end_worker(expired, now, None).await)
             .await?;
         let fingerprints = context.fingerprints;
         self.worker = catalog

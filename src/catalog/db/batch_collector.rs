@@ -94,6 +94,7 @@ mod tests {
             worker: WorkerId(1),
             now: 1,
             alive_since: 1,
+            metrics: None,
         };
         Request::Heartbeat(heartbeat, oneshot::channel().0)
     }

@@ -163,7 +163,7 @@ impl Batch {
     /// Adds the statements that change workers and jobs.
     fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.items();
-        let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, *heartbeat));
+        let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, heartbeat));
         Ok(JobStatements {
             heartbeats: heartbeats.collect(),
             advanced: checkpoint::add_advance(

@@ -7,7 +7,7 @@ use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{UnixMillis, WorkerId};
+use crate::domain::{UnixMillis, WorkerId, WorkerMetrics};
 
 impl Catalog {
     /// Leases up to `slots` ready pairs, or none if the worker has ended or its heartbeat is before `alive_since`.
@@ -26,8 +26,9 @@ impl Catalog {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
-    /// Stores a worker's heartbeat. Returns `false`, and stores nothing, if the worker has ended or its previous
-    /// heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must register again.
+    /// Stores a worker's heartbeat, and its metrics if given. Returns `false`, and stores nothing, if the worker has ended
+    /// or its previous heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must
+    /// register again.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -36,11 +37,13 @@ impl Catalog {
         worker: WorkerId,
         now: UnixMillis,
         alive_since: UnixMillis,
+        metrics: Option<&WorkerMetrics>,
     ) -> Result<bool> {
         let heartbeat = Heartbeat {
             worker,
             now,
             alive_since,
+            metrics: metrics.map(serde_json::to_string).transpose()?,
         };
         self.grouped(|reply| Request::Heartbeat(heartbeat, reply))
             .await

@@ -47,11 +47,13 @@ impl ClaimRequest {
 }
 
 /// A worker's sign of life.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Heartbeat {
     pub(crate) worker: WorkerId,
     pub(crate) now: UnixMillis,
     pub(crate) alive_since: UnixMillis,
+    /// Its counts and times as JSON. `None` leaves those of the last heartbeat.
+    pub(crate) metrics: Option<String>,
 }
 
 /// Builds the text of a claim for PostgreSQL from the tables of the jobs to choose among. It skips jobs that another process is about
@@ -128,12 +130,14 @@ RETURNING job.pair, job.token",
 
 /// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead.
 pub(crate) const HEARTBEAT: &str = "
-UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
+UPDATE worker SET heartbeat = ?, metrics = coalesce(?, metrics)
+WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
 /// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.
-pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: Heartbeat) -> Statement<(i64,)> {
+pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> Statement<(i64,)> {
     let statement = script.add(HEARTBEAT);
     script.bind(heartbeat.now);
+    script.bind(heartbeat.metrics.clone());
     script.bind(heartbeat.worker.0);
     script.bind(heartbeat.alive_since);
     statement

@@ -16,4 +16,5 @@ mod run_plan;
 pub(crate) mod selection;
 pub(crate) mod shared_runs;
 pub(crate) mod staleness;
+pub(crate) mod worker_list;
 pub(crate) mod workers;

@@ -13,7 +13,7 @@ use crate::domain::{Stage, UnixMillis};
 
 /// Time without a heartbeat after which `status` no longer counts a worker, in milliseconds. Only for display, because
 /// the clocks of two machines may differ.
-const SHOWN_ACTIVE_MS: i64 = 60_000;
+pub(crate) const SHOWN_ACTIVE_MS: i64 = 60_000;
 
 /// Selects the fingerprints of a worker that holds leases and has other settings.
 const OTHERS: &str = "

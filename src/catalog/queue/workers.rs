@@ -7,7 +7,7 @@ use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
+use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
 
 /// The process a worker runs in.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,16 +85,23 @@ impl Catalog {
             .await
     }
 
-    /// Records that a worker ended properly.
+    /// Records that a worker ended properly, and with which metrics. Without metrics, the worker is not listed any more.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
-    pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
+    pub async fn end_worker(
+        &self,
+        worker: WorkerId,
+        now: UnixMillis,
+        metrics: Option<&WorkerMetrics>,
+    ) -> Result<()> {
+        let metrics = metrics.map(serde_json::to_string).transpose()?;
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                query("UPDATE worker SET ended = ?2 WHERE id = ?1")
+                query("UPDATE worker SET ended = ?2, metrics = ?3 WHERE id = ?1")
                     .bind(worker.0)
                     .bind(now)
+                    .bind(metrics)
                     .execute(conn)
                     .await?;
                 Ok(())

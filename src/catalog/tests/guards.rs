@@ -52,7 +52,7 @@ async fn worker_ids_are_not_reused() {
 /// then the pair was leased again. Of the values that a write must match, only the token differs.
 async fn leased_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
-    let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
+    let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0, None).await;
     assert!(heartbeat.expect("an answer"));
     let other = register(&world.catalog).await;
     let overdue = world.catalog.recover_overdue(other, 60, 70).await;
@@ -147,12 +147,12 @@ async fn a_late_release_of_an_older_lease_of_the_same_worker_changes_nothing() {
 async fn a_worker_that_ended_completes_and_claims_nothing() {
     let world = World::new(2).await;
     let lease = world.claim(1).await.remove(0);
-    let ended = world.catalog.end_worker(world.worker, 50).await;
+    let ended = world.catalog.end_worker(world.worker, 50, None).await;
     ended.expect("ended");
     let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
     assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
     assert!(world.claim(1).await.is_empty());
-    let heartbeat = world.catalog.heartbeat(world.worker, 51, 0).await;
+    let heartbeat = world.catalog.heartbeat(world.worker, 51, 0, None).await;
     assert!(!heartbeat.expect("an answer"));
 }
 
@@ -171,7 +171,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
         ..failed(world.fingerprints, FailureAction::Quarantine)
     };
     assert!(!world.catalog.fail(second, late).await.expect("an answer"));
-    let heartbeat = world.catalog.heartbeat(world.worker, 90, 2).await;
+    let heartbeat = world.catalog.heartbeat(world.worker, 90, 2, None).await;
     assert!(!heartbeat.expect("an answer"));
     let request = ClaimRequest {
         alive_since: 2,
@@ -187,7 +187,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     );
     assert_eq!(status(&world).await, JobStatus::Leased);
     // Within the lease, all of them are accepted.
-    let heartbeat = world.catalog.heartbeat(world.worker, 90, 1).await;
+    let heartbeat = world.catalog.heartbeat(world.worker, 90, 1, None).await;
     assert!(heartbeat.expect("an answer"));
     assert_eq!(world.claim(1).await.len(), 1);
     world.assert_counters().await;
@@ -286,7 +286,7 @@ async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
         leases.extend(world.catalog.claim(request).await.expect("a claim"));
         let heartbeat = world
             .catalog
-            .heartbeat(worker, clock + 20, clock - 30)
+            .heartbeat(worker, clock + 20, clock - 30, None)
             .await;
         assert!(heartbeat.expect("an answer"));
     }

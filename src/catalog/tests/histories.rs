@@ -66,7 +66,7 @@ impl Game {
         // The worker of `World` is not used.
         game.world
             .catalog
-            .end_worker(game.world.worker, 1)
+            .end_worker(game.world.worker, 1, None)
             .await
             .expect("ended");
         (0..PAIRS).for_each(|_| game.model.import());
@@ -154,7 +154,7 @@ impl Game {
         let heartbeat = self
             .world
             .catalog
-            .heartbeat(process.worker, now, since)
+            .heartbeat(process.worker, now, since, None)
             .await;
         assert_eq!(heartbeat.expect("an answer"), process.is_alive());
         if process.is_alive() {

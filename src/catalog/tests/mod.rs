@@ -12,6 +12,7 @@ mod staleness;
 mod state_machine;
 mod together;
 mod verdicts;
+mod workers;
 
 use serde_json::{Map, json};
 

@@ -190,7 +190,7 @@ async fn pairs_leased_together_at_a_death_run_exclusively_but_are_not_blamed() {
 async fn leases_of_a_worker_that_ended_properly_do_not_count_as_crashes() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
-    let ended = world.catalog.end_worker(world.worker, 50).await;
+    let ended = world.catalog.end_worker(world.worker, 50, None).await;
     ended.expect("ended");
     world.recovered_by_another(1).await;
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -225,7 +225,7 @@ async fn an_overdue_lease_of_a_living_worker_is_recovered() {
         assert!(
             world
                 .catalog
-                .heartbeat(world.worker, heartbeat, 0)
+                .heartbeat(world.worker, heartbeat, 0, None)
                 .await
                 .expect("stored")
         );

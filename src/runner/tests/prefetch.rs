@@ -198,7 +198,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
         let (me, other) = (WorkerId(1), WorkerId(99));
         let heartbeat = fixture
             .catalog
-            .heartbeat(me, clock.now() + limit * 3 / 2, 0)
+            .heartbeat(me, clock.now() + limit * 3 / 2, 0, None)
             .await;
         assert!(heartbeat.expect("stored"));
         let overdue = fixture.catalog.recover_overdue(other, 0, 0).await;

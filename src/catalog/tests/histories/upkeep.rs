@@ -14,7 +14,10 @@ impl Game {
         let Some(index) = self.somebody() else { return };
         let process = &mut self.model.processes[index];
         (process.ended, process.running) = (true, false);
-        let ended = self.world.catalog.end_worker(process.worker, process.clock);
+        let ended = self
+            .world
+            .catalog
+            .end_worker(process.worker, process.clock, None);
         ended.await.expect("ended");
     }
 

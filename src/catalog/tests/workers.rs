@@ -1,0 +1,89 @@
+//! The list of workers with their metrics.
+
+use super::{World, register};
+use crate::catalog::{WorkerRecord, WorkerState};
+use crate::domain::{ComputeTimes, Stage, WorkerId, WorkerMetrics};
+
+fn metrics(done: u64) -> WorkerMetrics {
+    WorkerMetrics {
+        version: "0.1.0".to_owned(),
+        done,
+        stages: [(Stage::Fit, ComputeTimes { count: done, ms: 7 })].into(),
+        ..WorkerMetrics::default()
+    }
+}
+
+/// Returns a worker as listed, or `None` if it is not listed.
+async fn listed(world: &World, worker: WorkerId) -> Option<WorkerRecord> {
+    let workers = world.catalog.workers(0).await.expect("a read");
+    workers.into_iter().find(|record| record.id == worker)
+}
+
+#[tokio::test]
+async fn a_heartbeat_stores_metrics_and_one_without_keeps_them() {
+    let world = World::new(2).await;
+    let me = world.worker;
+    let before = listed(&world, me).await.expect("the worker");
+    assert_eq!((before.metrics, before.leased), (None, 0));
+    world.claim(2).await;
+    let beat = world.catalog.heartbeat(me, 50, 0, Some(&metrics(3))).await;
+    assert!(beat.expect("an answer"));
+    let beat = world.catalog.heartbeat(me, 60, 0, None).await;
+    assert!(beat.expect("an answer"));
+    let stored = listed(&world, me).await.expect("the worker");
+    assert_eq!(stored.metrics, Some(metrics(3)));
+    assert_eq!((stored.heartbeat, stored.leased), (60, 2));
+    assert_eq!((stored.host.as_str(), stored.pid), ("here", 1));
+}
+
+#[tokio::test]
+async fn a_refused_heartbeat_stores_no_metrics() {
+    let world = World::new(1).await;
+    let me = world.worker;
+    let late = metrics(3);
+    let beat = world.catalog.heartbeat(me, 50, 1_000_000, Some(&late));
+    assert!(!beat.await.expect("an answer"));
+    let stored = listed(&world, me).await.expect("the worker");
+    assert_eq!(stored.metrics, None);
+}
+
+#[tokio::test]
+async fn the_state_of_a_worker_follows_from_its_row() {
+    let world = World::new(1).await;
+    let me = world.worker;
+    let stopping = WorkerMetrics {
+        stopping: true,
+        ..metrics(1)
+    };
+    let catalog = &world.catalog;
+    let beat = |metrics| async move { catalog.heartbeat(me, 50, 0, Some(&metrics)).await };
+    beat(metrics(1)).await.expect("an answer");
+    let state = async |now| listed(&world, me).await.map(|worker| worker.state(now));
+    assert_eq!(state(60_050).await, Some(WorkerState::Alive));
+    assert_eq!(state(60_051).await, Some(WorkerState::Gone));
+    beat(stopping).await.expect("an answer");
+    assert_eq!(state(60).await, Some(WorkerState::Stopping));
+    let ended = catalog.end_worker(me, 70, Some(&metrics(2))).await;
+    ended.expect("ended");
+    assert_eq!(state(90_000).await, Some(WorkerState::Ended));
+    let stored = listed(&world, me).await.expect("the worker");
+    assert_eq!(stored.metrics, Some(metrics(2)));
+}
+
+#[tokio::test]
+async fn workers_before_a_time_and_workers_that_ended_without_metrics_are_not_listed() {
+    let world = World::new(1).await;
+    let other = register(&world.catalog).await;
+    let beat = world.catalog.heartbeat(world.worker, 50, 0, None).await;
+    assert!(beat.expect("an answer"));
+    let since = async |time| {
+        let workers = world.catalog.workers(time).await.expect("a read");
+        let ids = workers.into_iter().map(|worker| worker.id);
+        ids.collect::<Vec<_>>()
+    };
+    assert_eq!(since(0).await, [world.worker, other]);
+    assert_eq!(since(1).await, [world.worker]);
+    let ended = world.catalog.end_worker(world.worker, 60, None).await;
+    ended.expect("ended");
+    assert_eq!(since(0).await, [other]);
+}
