@@ -25,6 +25,7 @@ mod input_paths;
 mod logging;
 mod man;
 mod manifest_file;
+mod metrics;
 mod missing_files;
 mod output;
 mod panics;

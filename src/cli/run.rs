@@ -1,5 +1,6 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use clap::Args;
@@ -8,6 +9,7 @@ use serde_json::{Value, json};
 use super::context::{Context, now, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
+use super::metrics::{self, MetricsServer};
 use super::progress::ProgressReporter;
 use super::table::{columns, count};
 use super::time_text::duration;
@@ -45,6 +47,10 @@ pub(super) struct RunArgs {
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
+    /// others can reach, such as 10.0.0.7:9464
+    #[arg(long, value_name = "PORT", value_parser = metrics::address, conflicts_with = "dry_run")]
+    pub(super) metrics: Option<SocketAddr>,
 }
 
 /// Parses which pairs to run again.
@@ -67,6 +73,7 @@ pub(super) async fn execute(
     part: RunPart,
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
+    let server = MetricsServer::bind(args.metrics).await?;
     let config = context.settings()?.config;
     let (project, catalog) = context.open_for_run().await?;
     let options = options(&args, &config, &catalog, part).await?;
@@ -76,7 +83,10 @@ pub(super) async fn execute(
         catalog.close().await;
         return print_plan(&plan, running, context);
     }
-    let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
+    let serving = server.map(|server| server.serve(options.metrics.clone(), context));
+    let driven = drive(&project, catalog, &config, &options, context).await;
+    drop(serving);
+    let (summary, failures) = driven?;
     context.print_json(&as_json(&summary))?;
     print_outcome(&summary, &failures, context);
     for command in next_steps(&summary, &failures) {

@@ -1,10 +1,13 @@
 //! `plan` and `worker`: the two parts of a run, for runs on several machines.
 
+use std::net::SocketAddr;
+
 use clap::Args;
 use serde_json::json;
 
 use super::context::Context;
 use super::exit::ExitCode;
+use super::metrics;
 use super::run::{self, RunArgs};
 use super::signals;
 use super::table::count;
@@ -37,6 +40,10 @@ pub(super) struct WorkerArgs {
     /// Run only this stage and earlier ones
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
+    /// others can reach, such as 10.0.0.7:9464
+    #[arg(long, value_name = "PORT", value_parser = metrics::address)]
+    pub(super) metrics: Option<SocketAddr>,
 }
 
 pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -68,6 +75,7 @@ pub(super) async fn worker(args: WorkerArgs, context: &Context) -> anyhow::Resul
         memory: args.memory,
         max_failures: args.max_failures,
         stage: args.stage,
+        metrics: args.metrics,
         ..RunArgs::default()
     };
     run::execute(args, RunPart::Work, context).await

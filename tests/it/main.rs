@@ -97,3 +97,5 @@ mod test_size;
 mod tiff_file;
 mod tiff_kinds;
 mod uninterrupted;
+#[cfg(unix)]
+mod watch_workers;

@@ -1,0 +1,103 @@
+//! `--metrics`: serves the counts and times of a run to Prometheus.
+
+use std::net::{Ipv4Addr, SocketAddr};
+
+use axum::Router;
+use axum::http::header;
+use axum::response::IntoResponse;
+use axum::routing::get;
+use tokio::net::TcpListener;
+use tokio::task::AbortHandle;
+
+use super::context::Context;
+use super::exit::Refusal;
+use crate::local_server::{ConnectionLimits, listen, serve};
+use crate::runner::RunMetrics;
+
+/// Version 0.0.4 of the text format, which every version of Prometheus reads.
+const TEXT_FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+/// Parses `PORT` or `ADDRESS:PORT`. A port alone is on 127.0.0.1.
+pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
+    if let Ok(port) = text.parse() {
+        return Ok((Ipv4Addr::LOCALHOST, port).into());
+    }
+    let example = "metrics are served at a port of this machine, such as 9464, or at an address with a port, such as 10.0.0.7:9464";
+    text.parse().ok().ok_or_else(|| example.to_owned())
+}
+
+/// The server of the metrics, with its port bound.
+#[derive(Debug)]
+pub(super) struct MetricsServer {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+/// A server that ends when this handle is dropped.
+#[derive(Debug)]
+pub(super) struct Serving(AbortHandle);
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
+
+impl MetricsServer {
+    /// Binds the address, if one is given.
+    ///
+    /// # Errors
+    /// Returns an error if the address cannot be bound, for example because another process uses the port.
+    pub(super) async fn bind(address: Option<SocketAddr>) -> Result<Option<Self>, Refusal> {
+        let Some(address) = address else {
+            return Ok(None);
+        };
+        let failed = |error| {
+            Refusal::Usage(format!(
+                "cannot serve metrics on {address}: {error}; choose another port with --metrics"
+            ))
+        };
+        let listener = listen(address, "metrics").await.map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        Ok(Some(Self { listener, address }))
+    }
+
+    /// Serves the metrics until the handle is dropped. Prints the address.
+    pub(super) fn serve(self, metrics: RunMetrics, context: &Context) -> Serving {
+        let address = self.address;
+        context.info(&format!("metrics: http://{address}/metrics"));
+        if !address.ip().is_loopback() {
+            context.warn(&format!(
+                "the metrics are served on {address}, which other machines can reach, and the traffic is not encrypted"
+            ));
+        }
+        let router = Router::new().route("/metrics", get(async move || text(&metrics)));
+        let limits = ConnectionLimits::system();
+        let serving = serve(self.listener, router, limits, std::future::pending());
+        Serving(tokio::spawn(serving).abort_handle())
+    }
+}
+
+fn text(metrics: &RunMetrics) -> impl IntoResponse + use<> {
+    (
+        [(header::CONTENT_TYPE, TEXT_FORMAT)],
+        metrics.prometheus_text(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::address;
+
+    #[test]
+    fn a_port_alone_is_on_this_machine() {
+        let parsed = |text| address(text).map(|address| address.to_string());
+        assert_eq!(parsed("9464").as_deref(), Ok("127.0.0.1:9464"));
+        assert_eq!(parsed("127.0.0.1:9464").as_deref(), Ok("127.0.0.1:9464"));
+        assert_eq!(parsed("[::1]:9464").as_deref(), Ok("[::1]:9464"));
+        assert_eq!(parsed("0.0.0.0:9464").as_deref(), Ok("0.0.0.0:9464"));
+        for wrong in ["", "70000", "node1", "node1:9464", "127.0.0.1"] {
+            assert!(parsed(wrong).is_err(), "{wrong}");
+        }
+    }
+}
