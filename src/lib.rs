@@ -68,6 +68,15 @@
 //! no reply are searched for too (`db/known_leases.rs`). `Catalog::retry_while_unavailable` repeats the reads and other
 //! writes of a run. `runner/run_guard.rs` refuses runs with other settings.
 //!
+//! ## Files in an object store
+//!
+//! `store/input_place.rs` decides where an input is: at a path, below a named root, or in an object store. All readers take
+//! the resulting `Input`. `store/remote/` has the rest: `client.rs` and `bucket.rs` send requests, `cache.rs` keeps local
+//! copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair into one
+//! object. `runner/stage_files.rs` collects the stages of a pair for a pack, `runner/prefetch.rs` reads the inputs of leased
+//! pairs before they start, and `store/collect.rs` removes packs without a row. The row of a stage names pack and offset of
+//! each artifact, but the hash of a result does not include them.
+//!
 //! ## A lost lease
 //!
 //! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the
