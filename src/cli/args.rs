@@ -9,7 +9,7 @@ use super::examples::{with_examples, without_global_options};
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
-    backup, check, completions, config, contact_sheet, copy, demo, export, import, man, report,
+    backup, check, completions, config, contact_sheet, copy, db, demo, export, import, man, report,
     restore, retry, review, run, show, status, verdict, view, worker,
 };
 
@@ -56,6 +56,9 @@ pub(super) enum Command {
     Restore(restore::RestoreArgs),
     /// Copy a catalog between a project folder and PostgreSQL
     Copy(copy::CopyArgs),
+    /// Create a catalog in PostgreSQL, and roles for its users
+    #[command(subcommand)]
+    Db(db::DbCommand),
     /// Record and list people's verdicts on the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),

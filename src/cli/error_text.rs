@@ -51,7 +51,13 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     match cause.downcast_ref()? {
         CatalogError::Missing(_) => Some(ExitCode::NoProject),
-        CatalogError::NetworkFileSystem { .. } => Some(ExitCode::Usage),
+        CatalogError::NetworkFileSystem { .. }
+        | CatalogError::MayNotCreateRoles(_)
+        | CatalogError::MayNotReview(_)
+        | CatalogError::OtherReviewer { .. } => Some(ExitCode::Usage),
+        error if error.is_of_server() && error.kind() == Some(CatalogErrorKind::ReadOnly) => {
+            Some(ExitCode::Usage)
+        }
         CatalogError::Corrupt(_) | CatalogError::Json(_) => Some(ExitCode::Damaged),
         error if error.log_loss().is_some() => Some(ExitCode::Damaged),
         CatalogError::UnknownPair(_)
@@ -188,7 +194,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             CatalogError::Damaged(path.into()).to_string()
         }
         Some(CatalogErrorKind::ReadOnly) if error.is_of_server() => format!(
-            "the user of the database may not do this ({}); connect as a user with more rights",
+            "the user of the database may not do this ({}); connect as a user with more rights, or ask the administrator for another role of the catalog",
             root_cause(error)
         ),
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {

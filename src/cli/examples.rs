@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 26] = [
+const EXAMPLES: [(&str, &str); 28] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100",
@@ -37,6 +37,14 @@ const EXAMPLES: [(&str, &str); 26] = [
         "mocban restore blocks.sqlite again --inputs /data/scans",
     ),
     ("copy", "mocban copy blocks postgres://me@db.example/lab"),
+    (
+        "db",
+        "mocban db init --catalog postgres://me@db.example/lab --roles",
+    ),
+    (
+        "db init",
+        "mocban db init --catalog postgres://me@db.example/lab --roles\nmocban db init --roles --print-sql | psql lab",
+    ),
     ("verdict", "mocban -C blocks verdict log"),
     (
         "verdict set",

@@ -12,6 +12,7 @@ mod config;
 mod contact_sheet;
 mod context;
 mod copy;
+mod db;
 mod demo;
 mod error_text;
 mod examples;
@@ -124,6 +125,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Copy(args) => copy::copy(args, context).await,
+        Command::Db(command) => db::db(command, context).await,
         Command::Restore(args) => restore::restore(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,

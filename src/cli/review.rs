@@ -22,7 +22,7 @@ use crate::runner::{Stop, StopLevel};
 /// Arguments of `review`.
 #[derive(Debug, Args)]
 pub(super) struct ReviewArgs {
-    /// Name of the reviewer; a label for the verdicts, not a login
+    /// Name of the reviewer; a label for the verdicts, not a login, unless the catalog in PostgreSQL has roles
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     reviewer: String,
     /// Order of the results: random gives an unbiased estimate of the accuracy; least-confident finds failures sooner
@@ -94,6 +94,8 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         return Err(Refusal::Usage(text.to_owned()).into());
     }
     let (project, catalog) = context.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_review(Some(&args.reviewer))?;
     let language = args.lang.unwrap_or_else(language_of_system);
     let options = ReviewOptions {
         listen: SocketAddr::new(

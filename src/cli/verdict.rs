@@ -108,6 +108,8 @@ pub(super) async fn verdict(
 
 async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_verdicts(&args.reviewer)?;
     let new = NewVerdict {
         pair: select::pair(&catalog, &args.pair).await?,
         metric: args.metric,
@@ -139,6 +141,10 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     };
     let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
     let rows = parse(&bytes).map_err(refused)?;
+    let rights = catalog.review_rights().await?;
+    for row in &rows {
+        rights.require_verdicts(&row.verdict.reviewer)?;
+    }
     let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     verdict_file::refuse_unknown(&rows, &unknown).map_err(refused)?;
@@ -213,9 +219,10 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
 
 async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open().await?;
-    let undone = catalog
-        .verdict_undo(args.reviewer.as_deref(), now())
-        .await?;
+    let rights = catalog.review_rights().await?;
+    let reviewer = args.reviewer.as_deref().or(rights.only_reviewer());
+    rights.require_review(reviewer)?;
+    let undone = catalog.verdict_undo(reviewer, now()).await?;
     catalog.close().await;
     context.print_json(&json!({"schema": 1, "undone": undone}))?;
     for event in &undone {

@@ -104,6 +104,26 @@ pub enum CatalogError {
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]
     NoSchema(String),
+    /// The user of the database may not create the roles.
+    #[error(
+        "the database user {0} may not create roles; ask the administrator for `ALTER ROLE {0} CREATEROLE`, or to run the SQL that `mocban db init --roles --print-sql` prints"
+    )]
+    MayNotCreateRoles(String),
+    /// The user of the database may not review.
+    #[error(
+        "the database user {0} may only look at the verdicts in this catalog, not review; ask the administrator for `GRANT mocban_reviewer TO {0}`"
+    )]
+    MayNotReview(String),
+    /// The user of the database may not store verdicts under another name.
+    #[error(
+        "the database user {user} stores verdicts only under the name {user}, not {reviewer}; give `--reviewer {user}`"
+    )]
+    OtherReviewer {
+        /// The user of the database.
+        user: String,
+        /// The name under which the verdicts should be stored.
+        reviewer: String,
+    },
     /// The target of a copy holds another catalog.
     #[error("{0} holds another catalog; give an empty target")]
     NotEmpty(PathBuf),

@@ -14,11 +14,11 @@ pub(crate) mod lock_owner;
 pub(crate) mod log_watch;
 pub(crate) mod network_fs;
 pub(crate) mod open;
-
 pub(crate) mod postgres;
 pub(crate) mod query;
 pub(crate) mod request;
 pub(crate) mod retry_wait;
+pub(crate) mod roles;
 pub(crate) mod row;
 pub(crate) mod rows;
 pub(crate) mod script;

@@ -11,7 +11,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::SCHEMA_VERSION;
 
 /// Schema of the tables, unless the URL sets another `search_path`.
-const SCHEMA: &str = "mocban";
+pub(crate) const SCHEMA: &str = "mocban";
 /// Oldest supported major version of the server.
 const OLDEST_SERVER: u32 = 15;
 /// Read connections per process.
@@ -77,6 +77,11 @@ impl PostgresAddress {
         Ok(Self { options, schema })
     }
 
+    /// Returns the schema of the tables.
+    pub(crate) fn schema(&self) -> &str {
+        &self.schema
+    }
+
     /// Returns the address as text, without the password.
     pub(crate) fn text(&self) -> String {
         let options = &self.options;
@@ -123,6 +128,14 @@ impl PostgresAddress {
         Ok(pool.connect_lazy_with(options))
     }
 
+    /// Opens a connection, whether or not the database has a catalog.
+    ///
+    /// # Errors
+    /// Returns an error if the server does not answer or refuses.
+    pub(crate) async fn connect_to_database(&self) -> Result<PgConnection> {
+        self.connect_to_server(&self.options).await
+    }
+
     async fn connect_to_server(&self, options: &PgConnectOptions) -> Result<PgConnection> {
         let connected = tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await;
         let connected = connected.unwrap_or_else(|_| {
@@ -159,7 +172,9 @@ impl PostgresAddress {
         Ok(version.fetch_optional(conn).await?)
     }
 
-    async fn require_current(&self, conn: &mut PgConnection) -> Result<()> {
+    /// # Errors
+    /// Returns an error if there is no catalog, or if it has another version.
+    pub(crate) async fn require_current(&self, conn: &mut PgConnection) -> Result<()> {
         match self.version(conn).await? {
             None => Err(CatalogError::NoSchema(self.text())),
             Some(SCHEMA_VERSION) => Ok(()),
@@ -174,21 +189,31 @@ impl PostgresAddress {
     /// Creates the schema. Other processes see the whole schema or none of it.
     async fn create_schema(&self, conn: &mut PgConnection) -> Result<()> {
         let mut transaction = conn.begin().await?;
-        lock(&mut transaction).await?;
-        // Another process may have created it before the lock was free.
-        if self.version(&mut transaction).await?.is_none() {
-            // Lower-case letters, digits and `_` only.
-            let create = format!("CREATE SCHEMA IF NOT EXISTS {}", self.schema);
-            sqlx::raw_sql(sqlx::AssertSqlSafe(create))
-                .execute(&mut *transaction)
-                .await?;
-            for migration in MIGRATOR.iter() {
-                sqlx::raw_sql(migration.sql.clone())
-                    .execute(&mut *transaction)
-                    .await?;
-            }
-        }
+        self.create_schema_in(&mut transaction).await?;
         Ok(transaction.commit().await?)
+    }
+
+    /// Creates the schema in a transaction, and takes the lock of the catalog. Returns `false` if the schema exists.
+    pub(crate) async fn create_schema_in(
+        &self,
+        transaction: &mut Transaction<'_, Postgres>,
+    ) -> Result<bool> {
+        sqlx::query(LOCK).execute(&mut **transaction).await?;
+        // Another process may have created it before the lock was free.
+        if self.version(transaction).await?.is_some() {
+            return Ok(false);
+        }
+        // Lower-case letters, digits and `_` only.
+        let create = format!("CREATE SCHEMA IF NOT EXISTS {}", self.schema);
+        sqlx::raw_sql(sqlx::AssertSqlSafe(create))
+            .execute(&mut **transaction)
+            .await?;
+        for migration in MIGRATOR.iter() {
+            sqlx::raw_sql(migration.sql.clone())
+                .execute(&mut **transaction)
+                .await?;
+        }
+        Ok(true)
     }
 }
 
@@ -196,11 +221,6 @@ impl PostgresAddress {
 /// run one after another, as in SQLite.
 pub(crate) const LOCK: &str =
     "SELECT pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482))";
-
-async fn lock(transaction: &mut Transaction<'_, Postgres>) -> Result<()> {
-    sqlx::query(LOCK).execute(&mut **transaction).await?;
-    Ok(())
-}
 
 /// Returns whether a URL contains a password.
 pub fn has_password(url: &str) -> bool {

@@ -9,6 +9,7 @@
 use serde_json::json;
 
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
@@ -176,6 +177,11 @@ impl ChecksummedTable {
         }
     }
 
+    /// Returns whether rows are only added, never changed.
+    const fn is_append_only(self) -> bool {
+        !matches!(self, Self::Pair | Self::Truth)
+    }
+
     /// Returns the number by which the table `checksum` refers to this table.
     const fn code(self) -> i64 {
         self as i64
@@ -191,6 +197,13 @@ const LAST: &str =
 const STORE: &str = "
 INSERT INTO checksum (record, row, value) SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint) FROM json_each(?2) WHERE true
 ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
+
+/// Like [`STORE`], for new rows of append-only tables. PostgreSQL needs no right to change checksums for it.
+const APPEND: Sql = Sql::pair(
+    STORE,
+    "
+INSERT INTO checksum (record, row, value) SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint) FROM json_each(?2)",
+);
 
 const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
 
@@ -215,7 +228,8 @@ pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]
         checksums.push(json!([row.get::<i64>(0)?, value]));
         before = statements.is_chained.then_some(value);
     }
-    let store = query(STORE).bind(table.code());
+    let store = query(if table.is_append_only() { APPEND } else { STORE.into() });
+    let store = store.bind(table.code());
     store.bind(json_array(checksums)).execute(conn).await?;
     Ok(())
 }

@@ -11,6 +11,7 @@ pub(crate) mod pair_results;
 pub(crate) mod pair_work;
 pub(crate) mod review_answers;
 pub(crate) mod review_context;
+pub(crate) mod review_rights;
 pub(crate) mod stage_results;
 pub(crate) mod status;
 pub(crate) mod verdicts;

@@ -1,0 +1,56 @@
+//! `db init`: creates a catalog in PostgreSQL, and the roles of its users.
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::output;
+use crate::catalog::{ROLES, initialize_database, roles_sql};
+
+/// Commands on the database of a catalog.
+#[derive(Debug, Subcommand)]
+pub(super) enum DbCommand {
+    /// Create the catalog in PostgreSQL if it is missing, and the roles of its users on request
+    Init(DbInitArgs),
+}
+
+/// Arguments of `db init`.
+#[derive(Debug, Args)]
+pub(super) struct DbInitArgs {
+    /// Also create the roles `mocban_owner`, `mocban_worker`, `mocban_reviewer` and `mocban_viewer`, or give them the rights
+    /// that this version needs; the user needs the right CREATEROLE
+    #[arg(long)]
+    pub(super) roles: bool,
+    /// Print the SQL of --roles for an administrator, without connecting
+    #[arg(long, requires = "roles")]
+    pub(super) print_sql: bool,
+}
+
+pub(super) async fn db(command: DbCommand, context: &Context) -> anyhow::Result<ExitCode> {
+    let DbCommand::Init(args) = command;
+    if args.print_sql {
+        let sql = roles_sql(context.catalog_url()?.as_deref())?;
+        output::print(sql.trim_end())?;
+        return Ok(ExitCode::Done);
+    }
+    let Some(url) = context.catalog_url()? else {
+        let text = "`db init` creates a catalog in PostgreSQL; give its address, such as --catalog postgres://me@db.example/lab";
+        return Err(Refusal::Usage(text.to_owned()).into());
+    };
+    let is_new = initialize_database(&url, args.roles).await?;
+    context.print_json(&json!({"schema": 1, "created": is_new, "roles": args.roles}))?;
+    context.info(if is_new {
+        "the catalog is created"
+    } else {
+        "the catalog was there already, and has the schema of this version"
+    });
+    if args.roles {
+        context.info(&format!("the roles are ready: {}", ROLES.join(", ")));
+        context.info("an administrator adds each user to one: GRANT mocban_reviewer TO lan");
+    }
+    if is_new {
+        context.next("import pairs.csv");
+    }
+    Ok(ExitCode::Done)
+}
