@@ -80,6 +80,8 @@ mod review_kill;
 #[cfg(target_os = "linux")]
 mod review_load;
 mod review_page;
+#[cfg(unix)]
+mod roles;
 #[path = "../support/s3_server.rs"]
 mod s3_server;
 mod same_output;

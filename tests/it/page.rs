@@ -115,7 +115,12 @@ impl Page {
 
     /// Starts the server and opens a session as a browser does.
     pub(crate) fn open(project: &Project, reviewer: &str, args: &[&str]) -> Self {
-        let mut page = Self::start(project, reviewer, args);
+        Self::start(project, reviewer, args).with_session()
+    }
+
+    /// Opens a session as a browser does.
+    pub(crate) fn with_session(self) -> Self {
+        let mut page = self;
         let start = page.url["http://".len() + page.host.len()..].to_owned();
         let reply = page.get(&start);
         let cookie = reply.header("set-cookie").expect("a cookie");

@@ -104,14 +104,14 @@ pub enum CatalogError {
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]
     NoSchema(String),
-    /// The user of the database may not create the roles.
+    /// The user of the database, as written in SQL, may not create the roles.
     #[error(
         "the database user {0} may not create roles; ask the administrator for `ALTER ROLE {0} CREATEROLE`, or to run the SQL that `mocban db init --roles --print-sql` prints"
     )]
     MayNotCreateRoles(String),
-    /// The user of the database may not review.
+    /// The user of the database, as written in SQL, may not review.
     #[error(
-        "the database user {0} may only look at the verdicts in this catalog, not review; ask the administrator for `GRANT mocban_reviewer TO {0}`"
+        "the database user {0} may look at this catalog, but not judge or undo; ask the administrator for `GRANT mocban_reviewer TO {0}`"
     )]
     MayNotReview(String),
     /// The user of the database may not store verdicts under another name.

@@ -18,7 +18,7 @@ pub const ROLES: [&str; 4] = [
 
 /// Returns the user, and whether it must create roles but may not.
 const MAY_NOT_CREATE: &str = "
-SELECT CAST(current_user AS text),
+SELECT quote_ident(current_user),
     NOT (me.rolsuper OR me.rolcreaterole) AND (SELECT count(*) FROM pg_roles WHERE rolname = ANY ($1)) < cardinality($1)
 FROM pg_roles AS me WHERE me.rolname = current_user";
 

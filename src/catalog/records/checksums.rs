@@ -228,7 +228,11 @@ pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]
         checksums.push(json!([row.get::<i64>(0)?, value]));
         before = statements.is_chained.then_some(value);
     }
-    let store = query(if table.is_append_only() { APPEND } else { STORE.into() });
+    let store = query(if table.is_append_only() {
+        APPEND
+    } else {
+        STORE.into()
+    });
     let store = store.bind(table.code());
     store.bind(json_array(checksums)).execute(conn).await?;
     Ok(())

@@ -9,6 +9,8 @@ use crate::catalog::{Catalog, CatalogError, Result};
 pub struct ReviewRights {
     /// Name of the user. Empty if the catalog is a file.
     user: String,
+    /// The name as it is written in SQL.
+    quoted: String,
     /// Whether the user may append verdicts.
     adds_verdicts: bool,
     /// Whether the user may store all that the review page stores.
@@ -17,11 +19,11 @@ pub struct ReviewRights {
     is_limited_to_own: bool,
 }
 
-from_row! { ReviewRights { user: "user_name", adds_verdicts, reviews, is_limited_to_own } }
+from_row! { ReviewRights { user: "user_name", quoted, adds_verdicts, reviews, is_limited_to_own } }
 
 /// The policies that limit reviewers to their own names do not apply to workers: see `migrations/roles/postgres.sql`.
 const RIGHTS: &str = "
-SELECT CAST(session_user AS text) AS user_name,
+SELECT CAST(session_user AS text) AS user_name, quote_ident(session_user) AS quoted,
     has_any_column_privilege('verdict', 'INSERT') AS adds_verdicts,
     (SELECT bool_and(has_any_column_privilege(name, 'INSERT')) FROM unnest(ARRAY['verdict', 'verdict_undo', 'attention_check_answer',
         'attention_check_undo', 'manual_alignment', 'manual_alignment_undo', 'checksum']) AS name) AS reviews,
@@ -45,6 +47,7 @@ impl Catalog {
 impl ReviewRights {
     const ALL: Self = Self {
         user: String::new(),
+        quoted: String::new(),
         adds_verdicts: true,
         reviews: true,
         is_limited_to_own: false,
@@ -74,7 +77,7 @@ impl ReviewRights {
 
     fn require(&self, is_granted: bool, reviewer: Option<&str>) -> Result<()> {
         if !is_granted {
-            return Err(CatalogError::MayNotReview(self.user.clone()));
+            return Err(CatalogError::MayNotReview(self.quoted.clone()));
         }
         let other = reviewer.filter(|name| self.only_reviewer().is_some_and(|own| own != *name));
         match other {
