@@ -63,6 +63,10 @@
 //! SQLite that it uses. The statements of claims and checkpoints have two. All writes except group commits hold one lock,
 //! so they run one after another in both databases. Every test of the catalog runs on both.
 //!
+//! In PostgreSQL, `db init --roles` gives the tables to group roles (`db/roles.rs`, `migrations/roles/postgres.sql`): the
+//! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
+//! rights first, so that `review` and `verdict` can say what is missing.
+//!
 //! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`). If an earlier
 //! attempt was stored but its reply was lost, the fencing token and the position of the job show it; leases whose claim had
 //! no reply are searched for too (`db/known_leases.rs`). `Catalog::retry_while_unavailable` repeats the reads and other

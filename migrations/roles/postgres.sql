@@ -16,7 +16,7 @@ BEGIN
             EXECUTE format('GRANT mocban_viewer TO %I', name);
         END IF;
     END LOOP;
-    IF NOT pg_has_role('mocban_owner', 'MEMBER') THEN
+    IF NOT pg_has_role('mocban_owner', 'USAGE') THEN
         GRANT mocban_owner TO CURRENT_USER;
     END IF;
 END $$;

@@ -167,7 +167,7 @@ impl ChecksummedTable {
             Self::Truth => statements!("truth", "pair", "t.body", "t.pair", false),
             Self::Verdict => statements!("verdict", "id", "t.*", "t.pair", true),
             Self::VerdictUndo => statements!("verdict_undo", "act", "t.*",
-                "(SELECT v.pair FROM verdict AS v WHERE v.act = t.act)", false),
+                "(SELECT min(v.pair) FROM verdict AS v WHERE v.act = t.act)", false),
             Self::Answer => statements!("attention_check_answer", "id", "t.*", "t.pair", true),
             Self::AnswerUndo => statements!("attention_check_undo", "answer", "t.*",
                 "(SELECT a.pair FROM attention_check_answer AS a WHERE a.id = t.answer)", false),
