@@ -46,12 +46,16 @@ mod hostile_pairs;
 mod image_pages;
 mod invariance;
 mod kill;
+#[cfg(unix)]
+mod lab;
 #[cfg(target_os = "linux")]
 mod large_lists;
 mod layers;
 mod limits;
 #[cfg(unix)]
 mod manners;
+#[cfg(unix)]
+mod many_reviewers;
 #[cfg(target_os = "linux")]
 mod memory;
 mod names;
@@ -82,6 +86,8 @@ mod review_load;
 mod review_page;
 #[cfg(unix)]
 mod roles;
+#[cfg(unix)]
+mod roles_in_sql;
 #[path = "../support/s3_server.rs"]
 mod s3_server;
 mod same_output;

@@ -9,7 +9,7 @@ use crate::catalog::{Catalog, CatalogError, Result};
 pub struct ReviewRights {
     /// Name of the user. Empty if the catalog is a file.
     user: String,
-    /// The name as it is written in SQL.
+    /// The name, quoted for SQL if needed.
     quoted: String,
     /// Whether the user may append verdicts.
     adds_verdicts: bool,

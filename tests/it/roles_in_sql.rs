@@ -1,0 +1,161 @@
+//! What the database refuses to users with a role, by statements as in `psql`, and the rights to all tables.
+
+use crate::lab::{APPEND_ONLY, Lab, NOT_PERMITTED};
+
+/// The number that the program gives a new action.
+const NEXT: &str = "(SELECT coalesce(max(id), 0) + 1 FROM verdict)";
+
+/// Statements that a reviewer may not run, besides verdicts under another name.
+const FORBIDDEN: [&str; 27] = [
+    "INSERT INTO verdict (id, act, pair, metric, result_hash, verdict, reviewer, at)
+        SELECT 99, 99, pair, metric, result_hash, verdict, reviewer, at FROM verdict LIMIT 1",
+    "UPDATE verdict SET verdict = 'fail'",
+    "UPDATE verdict SET verdict = 'fail' WHERE false",
+    "DELETE FROM verdict",
+    "TRUNCATE verdict CASCADE",
+    "DELETE FROM verdict_undo",
+    "DELETE FROM attention_check_answer",
+    "UPDATE manual_alignment SET note = ''",
+    "INSERT INTO verdict_undo VALUES (4711, 1)",
+    "INSERT INTO attention_check_undo VALUES (4711, 1)",
+    "INSERT INTO manual_alignment_undo VALUES (4711, 1)",
+    "UPDATE checksum SET value = 0",
+    "DELETE FROM checksum",
+    "INSERT INTO checksum VALUES (0, 1000, 0)",
+    "INSERT INTO checksum VALUES (2, 1000, 0)",
+    "UPDATE metric_result SET ssim = 1",
+    "UPDATE pair SET mesh_path = ''",
+    "UPDATE job SET status = 0",
+    "UPDATE counter_part SET n = 0",
+    "UPDATE review_key SET id = 1",
+    "SELECT setval('verdict_id_seq', 1)",
+    "DROP TRIGGER verdict_append_only ON verdict",
+    "ALTER TABLE verdict DISABLE ROW LEVEL SECURITY",
+    "CREATE TABLE mine ()",
+    "CREATE OR REPLACE FUNCTION refuse_change() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN RETURN NULL; END'",
+    "SET ROLE mocban_owner",
+    "SET session_replication_role = replica",
+];
+
+/// Returns the statement that stores a verdict.
+fn verdict(act: &str, reviewer: &str) -> String {
+    format!(
+        "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
+        VALUES ({act}, 1, 'density', decode(repeat('00', 32), 'hex'), 'pass', '{reviewer}', 1)"
+    )
+}
+
+/// Returns a catalog with verdicts of `lan`, and the number of their action.
+fn with_verdicts() -> Option<(Lab, String)> {
+    let lab = Lab::with_roles("2")?;
+    let set = "verdict set upright-0000 pass --reviewer lan";
+    lab.call("lan", set).expect(0);
+    let acts = lab.sql("guest", "SELECT DISTINCT act::text FROM verdict");
+    let act = acts.expect("acts").concat().concat();
+    Some((lab, act))
+}
+
+#[test]
+fn a_reviewer_adds_only_the_own_verdicts_and_changes_none() {
+    let Some((lab, act)) = with_verdicts() else {
+        return;
+    };
+    for sql in FORBIDDEN {
+        lab.assert_database_refuses("lan", sql, NOT_PERMITTED);
+    }
+    let as_group = format!("SET ROLE mocban_reviewer; {}", verdict(NEXT, "mai"));
+    let answer = "INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
+        SELECT 'e', pair, metric, result_hash, 'turned', '{}', result_hash, 'pass', 'mai', 1 FROM verdict LIMIT 1";
+    let alignment = "INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, seen, print_from_depth,
+            print_from_mesh, iou, dice, reviewer, at)
+        SELECT 'e', pair, result_hash, result_hash, result_hash, result_hash, '{}', '{}', 1, 1, 'mai', 1 FROM verdict LIMIT 1";
+    for sql in [
+        &*verdict(NEXT, "mai"),
+        &verdict(NEXT, "lan "),
+        &as_group,
+        answer,
+        alignment,
+    ] {
+        lab.assert_database_refuses("lan", sql, NOT_PERMITTED);
+        // The same statements with the own name are valid.
+        if !sql.contains("lan ") {
+            let own = format!("BEGIN; {}; ROLLBACK", sql.replace("'mai'", "'lan'"));
+            lab.sql("lan", &own).expect("the own name");
+        }
+    }
+    // Neither takes the number of a later action, nor joins an action of another reviewer, undoes it or stores its checksum.
+    for sql in [
+        verdict("1000000", "mai"),
+        verdict(&act, "mai"),
+        format!("INSERT INTO verdict_undo VALUES ({act}, 1)"),
+        format!("INSERT INTO checksum VALUES (2, {act}, 1)"),
+        format!("INSERT INTO checksum VALUES (3, {act}, 1)"),
+    ] {
+        lab.assert_database_refuses("mai", &sql, NOT_PERMITTED);
+    }
+    lab.assert_whole();
+    // A row that was not stored by the program is found.
+    lab.sql("mai", &verdict(NEXT, "mai")).expect("the own name");
+    let checked = lab.call("guest", "check").expect(12);
+    assert!(checked.out.contains("has no checksum"), "{}", checked.out);
+}
+
+#[test]
+fn nobody_changes_verdicts_and_a_viewer_or_worker_undoes_none() {
+    let Some((lab, act)) = with_verdicts() else {
+        return;
+    };
+    let undo = format!("INSERT INTO verdict_undo VALUES ({act}, 1)");
+    let changes = [
+        "UPDATE verdict SET verdict = 'fail'",
+        "DELETE FROM verdict",
+        "TRUNCATE verdict_undo",
+    ];
+    for user in ["guest", "grid"] {
+        for sql in changes.into_iter().chain([&*undo, "CREATE TABLE mine ()"]) {
+            lab.assert_database_refuses(user, sql, NOT_PERMITTED);
+        }
+    }
+    for sql in [&*verdict(NEXT, "guest"), "UPDATE job SET status = 0"] {
+        lab.assert_database_refuses("guest", sql, NOT_PERMITTED);
+    }
+    // A policy hides the checksums of verdicts from updates.
+    let changed = lab.sql(
+        "grid",
+        "UPDATE checksum SET value = 0 WHERE record > 1 RETURNING 'changed'",
+    );
+    assert_eq!(changed, Ok(Vec::new()));
+    for user in ["chief", "mocban"] {
+        for sql in changes {
+            lab.assert_database_refuses(user, sql, APPEND_ONLY);
+        }
+    }
+    lab.assert_whole();
+}
+
+/// Every table has an owner, can be read by viewers, and can be written only as listed here.
+#[test]
+fn every_table_has_the_listed_rights() {
+    let Some(lab) = Lab::new("2") else { return };
+    lab.call("mocban", "db init --roles").expect(0);
+    let rights = lab.sql(
+        "mocban",
+        "SELECT c.relname::text, string_agg(format('%s %s', r.role, p.action), ', ' ORDER BY r.role, p.action)
+        FROM pg_class AS c
+            CROSS JOIN unnest(ARRAY['reviewer', 'viewer', 'worker']) AS r (role)
+            CROSS JOIN unnest(ARRAY['SELECT', 'INSERT', 'UPDATE', 'DELETE', 'TRUNCATE', 'REFERENCES', 'TRIGGER']) AS p (action)
+        WHERE c.relnamespace = 'mocban'::regnamespace AND c.relkind IN ('r', 'v') AND c.relowner = 'mocban_owner'::regrole
+            AND CASE WHEN p.action IN ('DELETE', 'TRUNCATE', 'TRIGGER')
+                THEN has_table_privilege('mocban_' || r.role, c.oid, p.action)
+                ELSE has_any_column_privilege('mocban_' || r.role, c.oid, p.action) END
+        GROUP BY c.relname ORDER BY c.relname",
+    );
+    let rights = rights.expect("rights").into_iter();
+    let lines: Vec<_> = rights
+        .map(|row| format!("{}: {}", row[0], row[1]))
+        .collect();
+    insta::assert_snapshot!("rights_of_roles", lines.join("\n"));
+    let tables = "SELECT count(*)::text FROM pg_class WHERE relnamespace = 'mocban'::regnamespace AND relkind IN ('r', 'v')";
+    let tables = lab.sql("mocban", tables).expect("a number");
+    assert_eq!(tables[0][0], lines.len().to_string());
+}
