@@ -1,5 +1,5 @@
--- Four group roles of a catalog. May be run again, for example after an upgrade of the schema. `{schema}` stands for the
--- schema of the catalog. Login users are made by the administrator, who adds them to a role: GRANT mocban_reviewer TO lan;
+-- Four group roles of a catalog. May be run again, for example after an upgrade of the schema. The administrator creates
+-- the logins, and adds each to a role: GRANT mocban_reviewer TO lan;
 
 -- Roles belong to the whole server, so another catalog may have created them already.
 DO $$

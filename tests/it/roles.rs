@@ -182,6 +182,9 @@ fn workers_and_owners_import_the_verdicts_of_others() {
         "GRANT mocban_reviewer",
     );
     lab.assert_refused("lan", "verdict import verdicts.csv", "not nga");
+    let own = "pair,verdict,reviewer\nupright-0001,pass,lan\n";
+    std::fs::write(lab.path().join("own.csv"), own).expect("written");
+    lab.call("lan", "verdict import own.csv").expect(0);
     for (user, recorded) in [("grid", 2), ("chief", 2)] {
         let imported = lab.call(user, "--json verdict import verdicts.csv");
         assert_eq!(imported.expect(0).json()["recorded"], recorded);

@@ -92,6 +92,6 @@ mod tests {
             assert!(other.contains(place), "{place}: {other}");
         }
         assert!(!other.contains("SCHEMA mocban "), "{other}");
-        roles_sql(Some("mysql://me@localhost/lab")).expect_err("another database");
+        roles_sql(Some("not a URL")).expect_err("no address");
     }
 }
