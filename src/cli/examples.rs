@@ -43,7 +43,7 @@ const EXAMPLES: [(&str, &str); 28] = [
     ),
     (
         "db init",
-        "mocban db init --catalog postgres://me@db.example/lab --roles\nmocban db init --roles --print-sql | psql lab",
+        "mocban db init --catalog postgres://me@db.example/lab --roles\nmocban db init --roles --print-sql",
     ),
     ("verdict", "mocban -C blocks verdict log"),
     (
