@@ -102,6 +102,7 @@ fn help_of_every_command() {
         &["retry"],
         &["check"],
         &["backup"],
+        &["db", "init"],
         &["restore"],
         &["verdict"],
         &["verdict", "set"],
