@@ -121,6 +121,7 @@ fn every_role_may_look() {
             "verdict log",
             "check",
             "agreement",
+            "status --hosts",
         ] {
             lab.call(user, words).expect(0);
         }
