@@ -44,7 +44,10 @@ impl Remote {
         // The same paths, but below a folder.
         let file = dir.path().join("file");
         std::fs::create_dir(&file).expect("a folder");
-        let root = format!("storage.roots.scans = '{}'\n", local.dir().join("data").display());
+        let root = format!(
+            "storage.roots.scans = '{}'\n",
+            local.dir().join("data").display()
+        );
         std::fs::write(file.join("mocban.toml"), root).expect("written");
         mocban(dir.path(), &["-C", "file", "import", "remote.csv"]).expect(0);
         mocban(dir.path(), &["-C", "file", "run"]).expect(0);
