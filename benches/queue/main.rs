@@ -6,6 +6,7 @@
 //! cargo bench --bench queue -- --pairs 10000,100000,1000000 --queue-pairs 5000
 //! cargo build --release --manifest-path benches/peers-queue/Cargo.toml --target-dir target/peers-queue
 //! cargo bench --bench queue -- --postgres postgres://me@localhost/bench --pairs 1000000
+//! cargo bench --bench queue -- --postgres postgres://me@localhost/bench --pairs 300000 --hold-snapshot
 //! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
 //! ```
 //!
@@ -27,6 +28,7 @@ mod process;
 mod queues;
 mod scale;
 mod share;
+mod snapshot;
 mod spread;
 mod world;
 
@@ -41,7 +43,11 @@ fn main() -> anyhow::Result<()> {
     if let Some(url) = &options.postgres {
         // Several connections are used at the same time.
         let runtime = tokio::runtime::Runtime::new()?;
-        let text = runtime.block_on(postgres::table(&options, url))?;
+        let text = if options.hold_snapshot {
+            runtime.block_on(snapshot::table(&options, url))?
+        } else {
+            runtime.block_on(postgres::table(&options, url))?
+        };
         return Ok(std::io::stdout().write_all(text.as_bytes())?);
     }
     // The same runtime as for `mocban run`.

@@ -29,6 +29,9 @@ pub(super) struct Options {
     /// Address of a PostgreSQL database, such as `postgres://me@localhost/bench`: measures only that
     #[arg(long, value_name = "URL")]
     pub(super) postgres: Option<String>,
+    /// Measure claims with and without a snapshot that another session holds, instead of several loads
+    #[arg(long, requires = "postgres")]
+    pub(super) hold_snapshot: bool,
     /// Pairs of the demo that are run with real stages, for the catalog's share; 0 for none [default: 12, and none
     /// under `cargo test`]
     #[arg(long, value_name = "N")]

@@ -97,7 +97,8 @@ async fn load(
     Ok((done, claims))
 }
 
-async fn import(catalog: &Catalog, pairs: usize) -> anyhow::Result<()> {
+/// Imports pairs.
+pub(super) async fn import(catalog: &Catalog, pairs: usize) -> anyhow::Result<()> {
     let (sender, rows) = mpsc::channel(2);
     let send = async move {
         for first in (0..pairs).step_by(ROWS) {
