@@ -104,7 +104,10 @@ impl Batch {
         let rows = script.run(conn).await?;
         let (mut stored, mut unknown) = (Vec::new(), Vec::new());
         if let Some(leases) = &mut leases {
-            stored = self.stored_before(conn, &statements, &rows).await?;
+            // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
+            if leases.is_searching() {
+                stored = self.stored_before(conn, &statements, &rows).await?;
+            }
             for request in self.claims.items() {
                 unknown.push(leases.unknown(conn, request.worker).await?);
             }

@@ -50,6 +50,12 @@ impl KnownLeases {
         self.search_until = Some(Instant::now() + SEARCH_TIME);
     }
 
+    /// Returns whether an earlier commit may have been stored although its reply was lost.
+    pub(crate) fn is_searching(&self) -> bool {
+        self.search_until
+            .is_some_and(|until| Instant::now() <= until)
+    }
+
     /// Adds leases that a claim returned.
     pub(crate) fn add(&mut self, leases: &[Lease]) {
         let tokens = leases.iter().map(|lease| (lease.pair, lease.token));
@@ -65,13 +71,8 @@ impl KnownLeases {
 
     /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
     /// a reconnection.
-    pub(crate) async fn unknown(
-        &mut self,
-        conn: &mut Conn,
-        worker: WorkerId,
-    ) -> Result<Vec<Lease>> {
-        if self.search_until.is_none_or(|until| Instant::now() > until) {
-            self.search_until = None;
+    pub(crate) async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
+        if !self.is_searching() {
             return Ok(Vec::new());
         }
         let mut leases: Vec<Lease> = query_as(LEASES).bind(worker.0).fetch_all(conn).await?;
