@@ -63,6 +63,10 @@
 //! SQLite that it uses. The statements of claims and checkpoints have two. All writes except group commits hold one lock,
 //! so they run one after another in both databases. Every test of the catalog runs on both.
 //!
+//! In PostgreSQL, claims begin behind the last claimed pair (`queue/claim_start.rs`), because they would otherwise pass over
+//! all pairs claimed before while another session holds a snapshot. So they do not always lease the most advanced pairs
+//! first that other processes released.
+//!
 //! In PostgreSQL, `db init --roles` gives the tables to group roles (`db/roles.rs`, `migrations/roles/postgres.sql`): the
 //! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
 //! rights first, so that `review` and `verdict` can say what is missing.

@@ -1,15 +1,16 @@
 //! Group commit: stores a batch of requests in one transaction, with two round trips to SQLite's thread.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::known_leases::{KnownLeases, stored_before};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
-use crate::catalog::db::write_connection::BEGIN;
+use crate::catalog::db::write_connection::{BEGIN, ServerState};
 use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints, position_after};
-use crate::catalog::queue::claim::{self, ClaimRequest, Heartbeat};
+use crate::catalog::queue::claim::{self, Behind, ClaimRequest, Heartbeat};
 use crate::catalog::queue::counters::{DONE, Deltas};
 use crate::catalog::queue::fail::{self, FailedRow};
 use crate::catalog::queue::lease::{FencedRow, Lease, StageFailure};
@@ -91,40 +92,67 @@ impl Batch {
     }
 
     /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
-    /// the transaction may still be open, so the caller must roll it back. `leases` are given for a server, where an
+    /// the transaction may still be open, so the caller must roll it back. `server` is given for a server, where an
     /// earlier commit of the same batch may have been stored although its answer was lost.
     pub(crate) async fn apply(
         &self,
         conn: &mut Conn,
-        mut leases: Option<&mut KnownLeases>,
+        mut server: Option<&mut ServerState>,
     ) -> Result<BatchReply> {
+        let began = Instant::now();
+        let starts = self.claim_starts(server.as_deref_mut(), began);
         let mut script = Script::default();
         script.execute(BEGIN);
-        let statements = self.add_jobs(&mut script)?;
+        let statements = self.add_jobs(&mut script, &starts)?;
         let rows = script.run(conn).await?;
         let (mut stored, mut unknown) = (Vec::new(), Vec::new());
-        if let Some(leases) = &mut leases {
+        if let Some(server) = &mut server {
             // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
-            if leases.is_searching() {
+            if server.leases.is_searching() {
                 stored = self.stored_before(conn, &statements, &rows).await?;
             }
             for request in self.claims.items() {
-                unknown.push(leases.unknown(conn, request.worker).await?);
+                unknown.push(server.leases.unknown(conn, request.worker).await?);
             }
         }
         let mut script = Script::default();
         let mut reply = self.add_records(&mut script, &statements, &rows, &stored)?;
         script.execute("COMMIT");
         script.run(conn).await?;
+        if let Some(server) = &mut server {
+            let times = [began, Instant::now()];
+            let claims = self.claims.items().zip(starts).zip(&reply.claims);
+            for ((request, start), claimed) in claims {
+                server.claim_start.note(request, start, claimed, times);
+            }
+        }
         for (claimed, unknown) in reply.claims.iter_mut().zip(unknown) {
             let is_new = |lease: &Lease| !claimed.iter().any(|other| other.pair == lease.pair);
             let found: Vec<Lease> = unknown.into_iter().filter(is_new).collect();
             claimed.extend(found);
         }
-        if let Some(leases) = leases {
-            self.note_leases(leases, &reply);
+        if let Some(server) = server {
+            self.note_leases(&mut server.leases, &reply);
         }
         Ok(reply)
+    }
+
+    /// Returns where each claim begins. Claims see what the other requests of the batch change.
+    fn claim_starts(&self, server: Option<&mut ServerState>, now: Instant) -> Vec<Option<Behind>> {
+        let Some(ServerState { claim_start, .. }) = server else {
+            return vec![None; self.claims.0.len()];
+        };
+        if !self.heartbeats.0.is_empty() {
+            claim_start.begin_again();
+        }
+        let failures = self.failures.items().map(|item| &item.0);
+        let checkpoints = self.checkpoints.items().map(|item| &item.0);
+        let exclusive = failures.chain(checkpoints).filter(|lease| lease.exclusive);
+        for lease in exclusive.chain(self.releases.items()) {
+            claim_start.note_release(lease);
+        }
+        let claims = self.claims.items();
+        claims.map(|request| claim_start.of(request, now)).collect()
     }
 
     /// Finds the requests without effect in this transaction that an earlier commit has stored.
@@ -164,7 +192,7 @@ impl Batch {
     }
 
     /// Adds the statements that change workers and jobs.
-    fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
+    fn add_jobs(&self, script: &mut Script, starts: &[Option<Behind>]) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.items();
         let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, heartbeat));
         Ok(JobStatements {
@@ -178,7 +206,8 @@ impl Batch {
             claims: self
                 .claims
                 .items()
-                .map(|request| claim::add_claim(script, request))
+                .zip(starts)
+                .map(|(request, start)| claim::add_claim(script, request, *start))
                 .collect(),
         })
     }

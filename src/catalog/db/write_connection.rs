@@ -16,6 +16,7 @@ use crate::catalog::db::log_watch::LogWatch;
 use crate::catalog::db::postgres::{LOCK, PostgresAddress};
 use crate::catalog::db::query::query;
 use crate::catalog::db::retry_wait::RetryWait;
+use crate::catalog::queue::claim_start::ClaimStart;
 
 /// Begins a transaction.
 pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
@@ -39,7 +40,14 @@ pub(crate) struct WriteConnection {
 struct Server {
     address: PostgresAddress,
     retry_wait: Arc<RetryWait>,
-    leases: KnownLeases,
+    state: ServerState,
+}
+
+/// What this process remembers of its requests to a server.
+#[derive(Debug, Default)]
+pub(crate) struct ServerState {
+    pub(crate) leases: KnownLeases,
+    pub(crate) claim_start: ClaimStart,
 }
 
 impl WriteConnection {
@@ -67,16 +75,16 @@ impl WriteConnection {
             server: Some(Server {
                 address,
                 retry_wait,
-                leases: KnownLeases::default(),
+                state: ServerState::default(),
             }),
             is_broken: false,
         }
     }
 
-    /// Returns the connection, the path, and the known leases if the catalog is on a server.
-    pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut KnownLeases>) {
-        let leases = self.server.as_mut().map(|server| &mut server.leases);
-        (&mut self.conn, &self.path, leases)
+    /// Returns the connection, the path, and the remembered state if the catalog is on a server.
+    pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut ServerState>) {
+        let state = self.server.as_mut().map(|server| &mut server.state);
+        (&mut self.conn, &self.path, state)
     }
 
     /// Connects again if the state of the connection is unknown.
@@ -98,7 +106,7 @@ impl WriteConnection {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;
-                    server.leases.replies_may_be_lost();
+                    server.state.leases.replies_may_be_lost();
                     tracing::info!("connected to the database server again");
                     return true;
                 }
@@ -154,6 +162,9 @@ impl WriteConnection {
         *is_broken = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
         if outcome.is_err() && !*is_broken {
             rollback(conn).await;
+        }
+        if let Some(server) = &mut self.server {
+            server.state.claim_start.begin_again();
         }
         self.check_log().await?;
         outcome

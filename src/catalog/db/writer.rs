@@ -93,9 +93,9 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
     writer.check_log().await?;
     writer.reconnect_if_broken().await;
     let reply = loop {
-        let (conn, path, mut leases) = writer.parts();
+        let (conn, path, mut server) = writer.parts();
         let reply = retry_while_busy!(path, {
-            let outcome = batch.apply(conn, leases.as_deref_mut()).await;
+            let outcome = batch.apply(conn, server.as_deref_mut()).await;
             if outcome.as_ref().is_err_and(|error| !error.is_unavailable()) {
                 rollback(conn).await;
             }

@@ -1,11 +1,13 @@
 //! Statements that take leases, keep them alive and give them back.
 
+use std::cmp::Reverse;
+
 use serde_json::json;
 
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::script::{Script, Statement};
-use crate::catalog::queue::counters::{Deltas, cursor};
+use crate::catalog::queue::counters::{Cursor, Deltas, cursor};
 use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::catalog::queue::selection::PairSelection;
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
@@ -56,21 +58,66 @@ pub(crate) struct Heartbeat {
     pub(crate) metrics: Option<String>,
 }
 
-/// Builds the text of a claim for PostgreSQL from the tables of the jobs to choose among. It skips jobs that another process is about
-/// to lease. An exclusive job excludes only leases on the same host. A worker whose settings are not those of the last
-/// plan gets nothing.
+/// Where a claim on a server begins: behind this pair among those with the same next stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Behind {
+    /// The next stage.
+    pub(crate) turn: Cursor,
+    pub(crate) pair: i64,
+    /// Whether to search all pairs if there are too few behind this one.
+    pub(crate) or_anywhere: bool,
+}
+
+impl Behind {
+    /// Begins behind the pair of a lease.
+    pub(crate) const fn pair_of(lease: &Lease) -> Self {
+        Self {
+            turn: cursor(lease.cursor),
+            pair: lease.pair.0,
+            or_anywhere: true,
+        }
+    }
+
+    /// Returns whether a leased pair is behind this one and has the same next stage.
+    pub(crate) const fn is_before(self, lease: &Lease) -> bool {
+        cursor(lease.cursor) == self.turn && lease.pair.0 > self.pair
+    }
+
+    /// Returns whether a leased pair is behind this one in the order of claims.
+    pub(crate) fn is_before_in_order(self, lease: &Lease) -> bool {
+        order(cursor(lease.cursor), lease.pair.0) > order(self.turn, self.pair)
+    }
+}
+
+/// Builds the text that selects ready jobs for PostgreSQL from the tables, a condition and a limit. It skips jobs that
+/// another process is about to lease.
+macro_rules! ready_in_postgres {
+    ($from:literal, $condition:literal, $limit:literal) => {
+        concat!(
+            "SELECT j.pair FROM ",
+            $from,
+            " WHERE j.status = 0",
+            $condition,
+            " AND j.stage <= ? AND j.exclusive = ?
+        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ",
+            $limit,
+            " FOR UPDATE OF j SKIP LOCKED"
+        )
+    };
+}
+
+/// Builds the text of a claim for PostgreSQL from the text that selects its jobs. An exclusive job excludes only leases
+/// on the same host. A worker whose settings are not those of the last plan gets nothing.
 macro_rules! claim_in_postgres {
-    ($ready:literal) => {
+    ($($ready:tt)*) => {
         concat!(
             "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
 FROM worker AS me
 WHERE job.pair = ANY (ARRAY(
-        SELECT j.pair FROM ",
-            $ready,
-            "
-        WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
-        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ? FOR UPDATE OF j SKIP LOCKED))
+        ",
+            $($ready)*,
+            "))
     AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
     AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
     AND NOT EXISTS (
@@ -93,7 +140,7 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    claim_in_postgres!("job AS j"),
+    claim_in_postgres!(ready_in_postgres!("job AS j", "", "?")),
 );
 
 /// Like [`CLAIM`], but leases only selected pairs.
@@ -107,9 +154,33 @@ WHERE pair IN (
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
 RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    claim_in_postgres!(
-        "json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)"
+    claim_in_postgres!(ready_in_postgres!(
+        "json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)",
+        "",
+        "?"
+    )),
+);
+
+/// Like [`CLAIM`], but leases jobs behind a position first, and others only if there are too few. Only for PostgreSQL.
+/// The two conditions on `turn` are an equality that the planner does not recognize. With a plain one, it may read the
+/// primary key, which is in the same order but contains all jobs.
+pub(crate) const CLAIM_BEHIND: &str = claim_in_postgres!(
+    "WITH behind AS MATERIALIZED (
+        ",
+    ready_in_postgres!(
+        "job AS j",
+        " AND j.prio = 0 AND j.turn <= ? AND j.turn >= ? AND j.pair > ?",
+        "?"
     ),
+    "), anywhere AS MATERIALIZED (
+        ",
+    ready_in_postgres!(
+        "job AS j",
+        " AND NOT (j.prio = 0 AND j.turn = ? AND j.pair > ?)",
+        "greatest(? - (SELECT count(*) FROM behind), 0)"
+    ),
+    ")
+        SELECT pair FROM behind UNION ALL SELECT pair FROM anywhere"
 );
 
 /// Gives leases back. Their attempts do not count.
@@ -143,35 +214,58 @@ pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> State
     statement
 }
 
-/// Adds a claim to a script.
-pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Statement<Lease> {
+/// Adds a claim to a script. `behind` is only for a claim on a server that is neither exclusive nor for named pairs.
+pub(crate) fn add_claim(
+    script: &mut Script,
+    request: &ClaimRequest,
+    behind: Option<Behind>,
+) -> Statement<Lease> {
     let slots = if request.exclusive {
         request.slots.min(1)
     } else {
         request.slots
+    } as i64;
+    let bind_search = |script: &mut Script, slots: i64| {
+        script.bind(cursor(request.until));
+        script.bind(i64::from(request.exclusive));
+        script.bind(slots);
     };
-    let statement = match request.among {
-        Some(_) => script.add(CLAIM_AMONG),
-        None => script.add(CLAIM),
+    let statement = match (&request.among, behind) {
+        (Some(_), _) => script.add(CLAIM_AMONG),
+        (None, Some(_)) => script.add(CLAIM_BEHIND),
+        (None, None) => script.add(CLAIM),
     };
     script.bind(request.worker.0);
     script.bind(request.deadline);
     if let Some(among) = &request.among {
         script.bind(among.json.clone());
     }
-    script.bind(cursor(request.until));
-    script.bind(i64::from(request.exclusive));
-    script.bind(slots as i64);
+    if let Some(behind) = behind {
+        script.bind(behind.turn);
+        script.bind(behind.turn);
+        script.bind(behind.pair);
+        bind_search(script, slots);
+        script.bind(behind.turn);
+        script.bind(behind.pair);
+        bind_search(script, if behind.or_anywhere { slots } else { 0 });
+    } else {
+        bind_search(script, slots);
+    }
     script.bind(request.worker.0);
     script.bind(request.alive_since);
     script.bind(i64::from(request.exclusive));
     statement
 }
 
+/// Returns the key by which claims sort pairs.
+const fn order(turn: Cursor, pair: i64) -> (Reverse<Cursor>, i64) {
+    (Reverse(turn), pair)
+}
+
 /// Counts claimed leases, and returns them in the order of the claim.
 pub(crate) fn count_claimed(mut leases: Vec<Lease>, deltas: &mut Deltas) -> Vec<Lease> {
     // RETURNING promises no order.
-    leases.sort_by_key(|lease| (std::cmp::Reverse(lease.cursor), lease.pair));
+    leases.sort_by_key(|lease| order(cursor(lease.cursor), lease.pair.0));
     for lease in &leases {
         let from = lease.counter_key().with_status(JobStatus::Ready);
         deltas.move_job(from, lease.counter_key());

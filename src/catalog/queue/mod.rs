@@ -3,6 +3,7 @@
 mod api;
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
+pub(crate) mod claim_start;
 pub(crate) mod counters;
 pub(crate) mod fail;
 pub(crate) mod fingerprint;

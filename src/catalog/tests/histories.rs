@@ -8,9 +8,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::model::{LEASE, Process, Queue};
-use super::{World, done, enter, fingerprints, inputs};
+use super::{Place, World, done, enter, fingerprints, inputs};
 use crate::catalog::{
-    CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
+    Catalog, CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
     StageFailure,
 };
 use crate::domain::{Failure, FailureClass, Stage};
@@ -23,6 +23,8 @@ const MOST_PAIRS: usize = 8;
 const LONGEST: i64 = 200;
 struct Game {
     world: World,
+    /// The catalog as another computer sees it. It only claims.
+    elsewhere: Catalog,
     conn: Conn,
     dice: ChaCha8Rng,
     model: Queue,
@@ -45,6 +47,8 @@ struct Seen {
     late: u32,
     poisoned: u32,
     overdue: u64,
+    /// Claims that did not lease the first pairs.
+    out_of_order: u32,
 }
 
 impl Game {
@@ -52,6 +56,7 @@ impl Game {
         let world = World::new(PAIRS).await;
         let conn = world.place.conn().await;
         let mut game = Self {
+            elsewhere: world.place.open().await.expect("the catalog"),
             settings: (fingerprints([1; 4]), world.fingerprints),
             conn,
             world,
@@ -164,27 +169,71 @@ impl Game {
 
     async fn claim(&mut self) {
         let (slots, exclusive) = (self.dice.random_range(1..3), self.is_likely(0.4));
+        let is_elsewhere = self.is_likely(0.4);
         if let Some(index) = self.somebody() {
-            self.claim_by(index, slots, exclusive).await;
+            if is_elsewhere {
+                self.claim_elsewhere(index, slots, exclusive).await;
+            } else {
+                self.claim_by(index, slots, exclusive).await;
+            }
         }
     }
 
     async fn claim_by(&mut self, index: usize, slots: usize, exclusive: bool) {
+        let (process, request) = self.claim_request(index, slots, exclusive);
+        let deadline = request.deadline;
+        let taken = self.world.catalog.claim(request).await.expect("a claim");
+        let expected = self.model.claim(&process, slots, exclusive, deadline);
+        assert_eq!(pairs_and_tokens(&taken), expected);
+        self.leases.extend(taken);
+    }
+
+    /// Claims where releases and other changes are not noticed. Finds as many pairs, but not always the first ones, and
+    /// on a server perhaps not with the first claim.
+    async fn claim_elsewhere(&mut self, index: usize, slots: usize, exclusive: bool) {
+        let (process, request) = self.claim_request(index, slots, exclusive);
+        let claimable = self.model.claimable(&process, exclusive);
+        let wanted = claimable.len().min(request.slots);
+        let mut taken = self.claims_elsewhere(request.clone()).await;
+        if taken.len() < wanted {
+            let any = self
+                .elsewhere
+                .in_transaction(|_| Box::pin(async { Ok(()) }));
+            any.await.expect("an empty transaction");
+            let rest = ClaimRequest {
+                slots: wanted - taken.len(),
+                ..request.clone()
+            };
+            taken.extend(self.claims_elsewhere(rest).await);
+        }
+        let found = pairs_and_tokens(&taken);
+        let pairs: Vec<_> = found.iter().map(|(pair, _)| *pair).collect();
+        assert!(pairs.iter().all(|pair| claimable.contains(pair)));
+        assert_eq!(pairs.len(), wanted);
+        self.seen.out_of_order += u32::from(pairs != claimable[..wanted]);
+        let expected = self.model.take(process.worker, &pairs, request.deadline);
+        assert_eq!(found, expected);
+        self.leases.extend(taken);
+    }
+
+    async fn claims_elsewhere(&self, request: ClaimRequest) -> Vec<Lease> {
+        self.elsewhere.claim(request).await.expect("a claim")
+    }
+
+    fn claim_request(
+        &mut self,
+        index: usize,
+        slots: usize,
+        exclusive: bool,
+    ) -> (Process, ClaimRequest) {
         let process = self.model.processes[index];
         let deadline = process.clock + self.dice.random_range(0..LEASE / 2);
         let request = ClaimRequest {
             exclusive,
             alive_since: process.alive_since(),
-            ..ClaimRequest::new(process.worker, slots, deadline)
+            ..ClaimRequest::new(process.worker, if exclusive { 1 } else { slots }, deadline)
         };
-        let taken = self.world.catalog.claim(request).await.expect("a claim");
-        let expected = self.model.claim(&process, slots, exclusive, deadline);
-        let found: Vec<_> = taken
-            .iter()
-            .map(|lease| (lease.pair().0, lease.token))
-            .collect();
-        assert_eq!(found, expected);
-        self.leases.extend(taken);
+        (process, request)
     }
 
     /// Returns whether a write under a lease must be accepted.
@@ -284,6 +333,11 @@ impl Game {
     }
 }
 
+fn pairs_and_tokens(leases: &[Lease]) -> Vec<(i64, i64)> {
+    let ids = leases.iter().map(|lease| (lease.pair().0, lease.token));
+    ids.collect()
+}
+
 #[tokio::test]
 async fn random_histories_agree_with_the_model() {
     let mut all = Seen::default();
@@ -297,7 +351,11 @@ async fn random_histories_agree_with_the_model() {
         all.late += game.seen.late;
         all.poisoned += game.seen.poisoned;
         all.overdue += game.seen.overdue;
+        all.out_of_order += game.seen.out_of_order;
     }
     assert!(all.fenced > 50 && all.late > 10, "{all:?}");
     assert!(all.poisoned > 0 && all.overdue > 0, "{all:?}");
+    // Only claims on a server begin behind earlier ones.
+    let is_shared = matches!(Place::new(), Place::Url(_));
+    assert_eq!(all.out_of_order > 0, is_shared, "{all:?}");
 }

@@ -117,14 +117,8 @@ impl Queue {
         self.holds(lease) && self.of_worker(lease.worker).is_alive()
     }
 
-    /// Leases jobs; returns the pairs with their tokens, in order.
-    pub(super) fn claim(
-        &mut self,
-        process: &Process,
-        slots: usize,
-        exclusive: bool,
-        deadline: UnixMillis,
-    ) -> Vec<(i64, i64)> {
+    /// Returns the pairs that a claim may lease, in order.
+    pub(super) fn claimable(&self, process: &Process, exclusive: bool) -> Vec<i64> {
         if !process.is_alive() {
             return Vec::new();
         }
@@ -134,7 +128,6 @@ impl Queue {
         if leased.any(blocks) {
             return Vec::new();
         }
-        let slots = if exclusive { 1 } else { slots };
         let ready = self.jobs.iter().filter_map(|(pair, job)| match job.state {
             JobState::Ready { stage } if job.exclusive == exclusive => {
                 Some((std::cmp::Reverse(stage), *pair))
@@ -143,16 +136,37 @@ impl Queue {
         });
         let mut ready: Vec<_> = ready.collect();
         ready.sort_unstable();
-        ready.truncate(slots);
-        let worker = process.worker;
-        let take = |(_, pair)| {
-            let job = self.job(pair);
+        ready.into_iter().map(|(_, pair)| pair).collect()
+    }
+
+    /// Leases jobs; returns the pairs with their tokens, in order.
+    pub(super) fn claim(
+        &mut self,
+        process: &Process,
+        slots: usize,
+        exclusive: bool,
+        deadline: UnixMillis,
+    ) -> Vec<(i64, i64)> {
+        let mut pairs = self.claimable(process, exclusive);
+        pairs.truncate(if exclusive { 1 } else { slots });
+        self.take(process.worker, &pairs, deadline)
+    }
+
+    /// Leases these jobs; returns the pairs with their tokens.
+    pub(super) fn take(
+        &mut self,
+        worker: WorkerId,
+        pairs: &[i64],
+        deadline: UnixMillis,
+    ) -> Vec<(i64, i64)> {
+        let take = |pair: &i64| {
+            let job = self.job(*pair);
             job.happens(Event::Claim { worker, deadline });
             job.token += 1;
             job.attempt += 1;
-            (pair, job.token)
+            (*pair, job.token)
         };
-        ready.into_iter().map(take).collect()
+        pairs.iter().map(take).collect()
     }
 
     pub(super) fn checkpoint(&mut self, lease: &Lease, stage: Stage, deadline: UnixMillis) {
