@@ -17,8 +17,6 @@ use super::world::fingerprints;
 
 /// Connections, each with a worker.
 const CONNECTIONS: usize = 4;
-/// Pairs per claim.
-const BATCH: usize = 64;
 /// How long a line is measured, if the pairs last that long.
 const TIME: Duration = Duration::from_secs(36);
 /// The schema of each line.
@@ -33,12 +31,18 @@ SELECT pg_backend_pid() % 256, stage, status, 0, sign * (SELECT count(*) FROM en
 FROM (VALUES (0, 1, -1), (4, 3, 1)) AS item (stage, status, sign)
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n";
 
-/// What is stored of a finished pair.
+/// What is measured.
 #[derive(Debug, Clone, Copy)]
-enum Stored {
-    JobOnly,
-    Results,
+struct Load {
+    /// Pairs per claim.
+    batch: usize,
+    /// Whether to store the results of four stages, or only the end of the job.
+    has_results: bool,
+    is_snapshot_held: bool,
 }
+
+/// Pairs per claim, and whether results are stored.
+const LOADS: [(usize, bool); 3] = [(64, false), (500, false), (64, true)];
 
 /// The pairs that a load finished, and the times of its claims.
 #[derive(Debug, Default)]
@@ -51,16 +55,18 @@ struct Finished {
 pub(super) async fn table(options: &Options, url: &str) -> anyhow::Result<String> {
     let pairs = options.sizes()[0];
     let mut table = format!(
-        "\n{pairs} pairs, {CONNECTIONS} connections, {BATCH} pairs a claim, at most {} s a line\n\n\
-         | stored | snapshot held | pairs | pairs/s | claim p50 / p95 (ms) |\n|---|---|---|---|---|\n",
+        "\n{pairs} pairs, {CONNECTIONS} connections, at most {} s a line\n\n\
+         | stored | pairs a claim | snapshot held | pairs | pairs/s | claim p50 / p95 (ms) |\n|---|---|---|---|---|---|\n",
         TIME.as_secs()
     );
-    for (stored, name) in [
-        (Stored::JobOnly, "end of the job"),
-        (Stored::Results, "results of four stages"),
-    ] {
-        for is_held in [false, true] {
-            let (mut finished, time) = line(url, pairs, stored, is_held).await?;
+    for (batch, has_results) in LOADS {
+        for is_snapshot_held in [false, true] {
+            let load = Load {
+                batch,
+                has_results,
+                is_snapshot_held,
+            };
+            let (mut finished, time) = line(url, pairs, load).await?;
             finished.claims.sort();
             let ms = |share: f64| {
                 let at = (finished.claims.len().saturating_sub(1) as f64 * share) as usize;
@@ -68,8 +74,13 @@ pub(super) async fn table(options: &Options, url: &str) -> anyhow::Result<String
             };
             writeln!(
                 table,
-                "| {name} | {} | {} | {:.0} | {:.1} / {:.1} |",
-                if is_held { "yes" } else { "no" },
+                "| {} | {batch} | {} | {} | {:.0} | {:.1} / {:.1} |",
+                if has_results {
+                    "results of four stages"
+                } else {
+                    "end of the job"
+                },
+                if is_snapshot_held { "yes" } else { "no" },
                 finished.pairs,
                 finished.pairs as f64 / time.as_secs_f64(),
                 ms(0.5),
@@ -81,12 +92,7 @@ pub(super) async fn table(options: &Options, url: &str) -> anyhow::Result<String
 }
 
 /// Measures one line in a new schema.
-async fn line(
-    url: &str,
-    pairs: usize,
-    stored: Stored,
-    is_held: bool,
-) -> anyhow::Result<(Finished, Duration)> {
+async fn line(url: &str, pairs: usize, load: Load) -> anyhow::Result<(Finished, Duration)> {
     let mut conn = PgConnectOptions::from_str(url)?.connect().await?;
     let drop = || AssertSqlSafe(format!("DROP SCHEMA IF EXISTS {SCHEMA} CASCADE"));
     sqlx::raw_sql(drop()).execute(&mut conn).await?;
@@ -97,7 +103,7 @@ async fn line(
     sqlx::raw_sql("CHECKPOINT").execute(&mut conn).await?;
     let fake = Fake::without_files(&catalog, &fingerprints(None)?).await?;
     let mut holder = PgConnectOptions::from_str(&url)?.connect().await?;
-    if is_held {
+    if load.is_snapshot_held {
         let hold = "BEGIN ISOLATION LEVEL REPEATABLE READ; SELECT FROM job LIMIT 1";
         sqlx::raw_sql(hold).execute(&mut holder).await?;
     }
@@ -107,7 +113,7 @@ async fn line(
         let catalog = Catalog::connect(&url, false).await?;
         let conn = PgConnectOptions::from_str(&url)?.connect().await?;
         let fake = Arc::new(fake.another_worker(&catalog).await?);
-        tasks.spawn(load(catalog, conn, fake, stored));
+        tasks.spawn(work(catalog, conn, fake, load));
     }
     let mut finished = Finished::default();
     while let Some(ended) = tasks.join_next().await {
@@ -124,31 +130,30 @@ async fn line(
 }
 
 /// Claims and finishes pairs until none is left or the time is over.
-async fn load(
+async fn work(
     catalog: Catalog,
     mut conn: PgConnection,
     fake: Arc<Fake>,
-    stored: Stored,
+    load: Load,
 ) -> anyhow::Result<Finished> {
     let _waiting = catalog.waiting().await?;
     let begin = Instant::now();
     let mut finished = Finished::default();
     while begin.elapsed() < TIME {
         let claim = Instant::now();
-        let leases = catalog.claim(fake.request(BATCH)).await?;
+        let leases = catalog.claim(fake.request(load.batch)).await?;
         if leases.is_empty() {
             break;
         }
         finished.claims.push(claim.elapsed());
         finished.pairs += leases.len();
-        match stored {
-            Stored::JobOnly => {
-                let pairs: Vec<i64> = leases.iter().map(|lease| lease.pair().0).collect();
-                let end = sqlx::query(END).bind(pairs).bind(fake.worker.0);
-                end.execute(&mut conn).await?;
-            }
-            Stored::Results => finish(&catalog, &fake, leases).await?,
+        if load.has_results {
+            finish(&catalog, &fake, leases).await?;
+            continue;
         }
+        let pairs: Vec<i64> = leases.iter().map(|lease| lease.pair().0).collect();
+        let end = sqlx::query(END).bind(pairs).bind(fake.worker.0);
+        end.execute(&mut conn).await?;
     }
     catalog.end_worker(fake.worker, 2, None).await?;
     catalog.close().await;
