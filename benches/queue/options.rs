@@ -7,6 +7,7 @@ use clap::Parser;
 /// Times the catalog on many pairs; prints Markdown.
 #[derive(Debug, Parser)]
 #[command(name = "queue")]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option")]
 pub(super) struct Options {
     /// Sizes of catalogs [default: 100000, and 300 under `cargo test`]
     #[arg(long, value_delimiter = ',', value_name = "N")]

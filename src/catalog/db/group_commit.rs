@@ -11,6 +11,7 @@ use crate::catalog::db::script::{Script, ScriptRows, Statement};
 use crate::catalog::db::write_connection::{BEGIN, ServerState};
 use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::{self, Behind, ClaimRequest, Heartbeat};
+use crate::catalog::queue::claim_start::ClaimStart;
 use crate::catalog::queue::counters::{DONE, Deltas};
 use crate::catalog::queue::fail::{self, FailedRow};
 use crate::catalog::queue::lease::{FencedRow, Lease, StageFailure};
@@ -100,7 +101,10 @@ impl Batch {
         mut server: Option<&mut ServerState>,
     ) -> Result<BatchReply> {
         let began = Instant::now();
-        let starts = self.claim_starts(server.as_deref_mut(), began);
+        let starts = match &mut server {
+            Some(server) => self.claim_starts(&mut server.claim_start, began),
+            None => vec![None; self.claims.0.len()],
+        };
         let mut script = Script::default();
         script.execute(BEGIN);
         let statements = self.add_jobs(&mut script, &starts)?;
@@ -137,11 +141,8 @@ impl Batch {
         Ok(reply)
     }
 
-    /// Returns where each claim begins. Claims see what the other requests of the batch change.
-    fn claim_starts(&self, server: Option<&mut ServerState>, now: Instant) -> Vec<Option<Behind>> {
-        let Some(ServerState { claim_start, .. }) = server else {
-            return vec![None; self.claims.0.len()];
-        };
+    /// Returns where each claim on a server begins. Claims see what the other requests of the batch change.
+    fn claim_starts(&self, claim_start: &mut ClaimStart, now: Instant) -> Vec<Option<Behind>> {
         if !self.heartbeats.0.is_empty() {
             claim_start.begin_again();
         }

@@ -128,12 +128,12 @@ mod tests {
         }
     }
 
-    fn behind(pair: i64, or_anywhere: bool) -> Option<Behind> {
-        Some(Behind {
+    const fn behind(pair: i64, or_anywhere: bool) -> Behind {
+        Behind {
             turn: 0,
             pair,
             or_anywhere,
-        })
+        }
     }
 
     /// Returns a start after a claim of one slot that leased pair 7.
@@ -148,7 +148,7 @@ mod tests {
     fn claims_begin_behind_the_last_pair_for_some_time() {
         let now = Instant::now();
         let start = after_one(now);
-        assert_eq!(start.of(&request(2), now), behind(7, true));
+        assert_eq!(start.of(&request(2), now), Some(behind(7, true)));
         assert_eq!(start.of(&request(2), now + SEARCH_ALL_EVERY), None);
         let until = Stage::Fit;
         let other = ClaimRequest {
@@ -164,14 +164,14 @@ mod tests {
         let mut start = after_one(now);
         start.note(
             &request(2),
-            behind(7, true),
+            Some(behind(7, true)),
             &[lease(3, Stage::Fit)],
             [now; 2],
         );
-        assert_eq!(start.of(&request(2), now), behind(7, false));
-        assert_eq!(start.of(&request(2), now + PAUSE), behind(7, true));
+        assert_eq!(start.of(&request(2), now), Some(behind(7, false)));
+        assert_eq!(start.of(&request(2), now + PAUSE), Some(behind(7, true)));
         let other = ClaimRequest::new(WorkerId(2), 2, 0);
-        assert_eq!(start.of(&other, now), behind(7, true));
+        assert_eq!(start.of(&other, now), Some(behind(7, true)));
         start.begin_again();
         assert_eq!(start.of(&request(2), now), None);
     }
@@ -185,8 +185,8 @@ mod tests {
             lease(4, Stage::Fit),
             lease(8, Stage::Fit),
         ];
-        start.note(&request(3), behind(7, true), &leases, [now; 2]);
-        assert_eq!(start.of(&request(3), now), behind(4, true));
+        start.note(&request(3), Some(behind(7, true)), &leases, [now; 2]);
+        assert_eq!(start.of(&request(3), now), Some(behind(4, true)));
     }
 
     #[test]
@@ -196,7 +196,7 @@ mod tests {
         let ended = now + SEARCH_ALL_EVERY / 10;
         start.note(&request(1), None, &[lease(7, Stage::Fit)], [now, ended]);
         let later = ended + SEARCH_ALL_EVERY;
-        assert_eq!(start.of(&request(1), later), behind(7, true));
+        assert_eq!(start.of(&request(1), later), Some(behind(7, true)));
         assert_eq!(start.of(&request(1), later + SEARCH_ALL_EVERY), None);
     }
 
@@ -211,7 +211,7 @@ mod tests {
         let mut start = ClaimStart::default();
         start.note(&one, None, &[lease(7, Stage::Fit)], [now; 2]);
         start.note_release(&lease(7, Stage::Depth));
-        assert_eq!(start.of(&one, now), behind(7, true));
+        assert_eq!(start.of(&one, now), Some(behind(7, true)));
         start.note_release(&lease(6, Stage::Fit));
         assert_eq!(start.of(&one, now), None);
     }
