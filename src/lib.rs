@@ -199,7 +199,7 @@
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;
 //! `benches/speed` times readers and stages by scan size; `benches/queue` times the catalog on many pairs;
 //! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
-//! (see `benches/queue/main.rs`).
+//! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
 pub mod catalog;
 pub mod check;
