@@ -8,7 +8,7 @@ use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::known_leases::{KnownLeases, stored_before};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
-use crate::catalog::db::write_connection::{BEGIN, ServerState};
+use crate::catalog::db::write_connection::{BEGIN, CatalogServerState};
 use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::{self, Behind, ClaimRequest, Heartbeat};
 use crate::catalog::queue::claim_start::ClaimStart;
@@ -98,7 +98,7 @@ impl Batch {
     pub(crate) async fn apply(
         &self,
         conn: &mut Conn,
-        mut server: Option<&mut ServerState>,
+        mut server: Option<&mut CatalogServerState>,
     ) -> Result<BatchReply> {
         let began = Instant::now();
         let starts = match &mut server {

@@ -40,12 +40,12 @@ pub(crate) struct WriteConnection {
 struct Server {
     address: PostgresAddress,
     retry_wait: Arc<RetryWait>,
-    state: ServerState,
+    state: CatalogServerState,
 }
 
 /// What this process remembers of its requests to a server.
 #[derive(Debug, Default)]
-pub(crate) struct ServerState {
+pub(crate) struct CatalogServerState {
     pub(crate) leases: KnownLeases,
     pub(crate) claim_start: ClaimStart,
 }
@@ -75,14 +75,14 @@ impl WriteConnection {
             server: Some(Server {
                 address,
                 retry_wait,
-                state: ServerState::default(),
+                state: CatalogServerState::default(),
             }),
             is_broken: false,
         }
     }
 
     /// Returns the connection, the path, and the remembered state if the catalog is on a server.
-    pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut ServerState>) {
+    pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut CatalogServerState>) {
         let state = self.server.as_mut().map(|server| &mut server.state);
         (&mut self.conn, &self.path, state)
     }
