@@ -135,7 +135,7 @@ async fn locate_inputs(
     let catalog = Catalog::open(new).await?;
     let (project, inputs) = (project.clone(), inputs.to_owned());
     let replaced = catalog.replace_input_paths(move |stored| {
-        if project.is_below_root(stored) || project.input_path(stored).exists() {
+        if project.input_path(stored).exists() {
             return Some(stored.to_owned());
         }
         project.find_input(stored, &inputs).ok()?

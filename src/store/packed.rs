@@ -67,13 +67,12 @@ impl Project {
         if !quick {
             return self.read_packed(artifact, location).map(drop);
         }
-        let (_, bucket) = self.packs(&location.name)?;
-        let key = pack_key(&location.name);
-        let found = bucket.stat(&key).map_err(of_bucket)?;
-        if found.bytes >= location.offset.saturating_add(artifact.bytes) {
+        let (storage, bucket) = self.packs(&location.name)?;
+        let found = storage.pack_bytes(bucket, &location.name);
+        if found.map_err(of_bucket)? >= location.offset.saturating_add(artifact.bytes) {
             Ok(())
         } else {
-            Err(ArtifactError::Changed(bucket.address_of(&key).into()))
+            Err(ArtifactError::Changed(self.pack_path(&location.name)))
         }
     }
 
@@ -130,7 +129,10 @@ mod tests {
         let (depth, mask) = (packed.next().expect("two"), packed.next().expect("two"));
         assert_eq!(project.read_artifact(&depth).expect("read"), b"depth");
         assert_eq!(project.read_artifact(&mask).expect("read"), b"mask");
+        project.check_artifact(&mask, true).expect("long enough");
         bucket.remove(&key).expect("removed");
+        let (storage, _) = project.packs("any").expect("a storage");
+        storage.forget_packs();
         let quick = project.check_artifact(&mask, true);
         assert!(matches!(quick, Err(ArtifactError::Missing(_))));
     }

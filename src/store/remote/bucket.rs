@@ -12,12 +12,12 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
-use super::client::{connect, runtime};
+use super::client::{LazyClient, runtime};
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
 pub(in crate::store) struct Bucket {
-    store: Arc<dyn ObjectStore>,
+    client: Arc<LazyClient>,
     /// The folder within the bucket.
     prefix: Path,
     /// The address without a slash at its end, such as `s3://scans/2024`.
@@ -55,10 +55,10 @@ impl From<&ObjectMeta> for ObjectStat {
 
 impl Bucket {
     /// Opens the folder at an address such as `s3://bucket/folder`. Sends no request. Credentials, region and endpoint
-    /// are those of the environment (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL` and so on).
+    /// are those of the environment (`AWS_ACCESS_KEY_ID`, `AWS_ENDPOINT_URL` and so on), which are read at the first request.
     ///
     /// # Errors
-    /// Returns an error if the address has another form, or a variable has a wrong value.
+    /// Returns an error if the address has another form.
     pub(super) fn open(address: &str) -> Result<Self, BucketError> {
         let wrong = |reason: String| BucketError::Address {
             address: without_password(address),
@@ -72,16 +72,15 @@ impl Bucket {
             let form = "the form is s3://BUCKET/FOLDER; keys belong in AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY";
             return Err(wrong(form.to_owned()));
         }
-        let store = connect(name).map_err(wrong)?;
         let prefix = Path::parse(folder.trim_matches('/'))
             .map_err(|error| wrong(format!("the folder cannot be used: {error}")))?;
-        Ok(Self::new(store, prefix, address))
+        Ok(Self::new(LazyClient::new(name), prefix, address))
     }
 
-    fn new(store: Arc<dyn ObjectStore>, prefix: Path, address: &str) -> Self {
+    fn new(client: LazyClient, prefix: Path, address: &str) -> Self {
         let address = address.trim_end_matches('/').to_owned();
         Self {
-            store,
+            client: Arc::new(client),
             prefix,
             address,
         }
@@ -91,7 +90,11 @@ impl Bucket {
     #[cfg(test)]
     pub(super) fn in_memory() -> Self {
         let store = object_store::memory::InMemory::new();
-        Self::new(Arc::new(store), Path::default(), "memory://test")
+        Self::new(
+            LazyClient::of(Arc::new(store)),
+            Path::default(),
+            "memory://test",
+        )
     }
 
     /// Stores an object, for tests.
@@ -133,7 +136,7 @@ impl Bucket {
         unless: Option<String>,
         mut target: W,
     ) -> Result<Option<(W, ObjectStat)>, BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let (store, path) = (self.store()?, self.path(key)?);
         let address = self.address_of(key);
         self.wait(key, async move {
             let options = GetOptions {
@@ -172,7 +175,7 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails or there is no such object.
     pub(in crate::store) fn stat(&self, key: &str) -> Result<ObjectStat, BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let (store, path) = (self.store()?, self.path(key)?);
         let address = self.address_of(key);
         self.wait(key, async move {
             let found = store.head(&path).await;
@@ -186,7 +189,7 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(in crate::store) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let (store, path) = (self.store()?, self.path(key)?);
         let address = self.address_of(key);
         self.wait(key, async move {
             let stored = store.put(&path, PutPayload::from(bytes)).await;
@@ -201,7 +204,7 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(in crate::store) fn remove(&self, key: &str) -> Result<(), BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(key)?);
+        let (store, path) = (self.store()?, self.path(key)?);
         let address = self.address_of(key);
         self.wait(key, async move {
             match store.delete(&path).await {
@@ -220,7 +223,7 @@ impl Bucket {
         folder: &str,
         mut each: impl FnMut(String, ObjectStat),
     ) -> Result<(), BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(folder)?);
+        let (store, path) = (self.store()?, self.path(folder)?);
         let address = self.address_of(folder);
         let prefix = self.prefix.clone();
         let (sender, found) = mpsc::sync_channel::<(String, ObjectStat)>(4096);
@@ -255,7 +258,7 @@ impl Bucket {
         folder: &str,
         mut each: impl FnMut(String, ObjectStat),
     ) -> Result<(), BucketError> {
-        let (store, path) = (Arc::clone(&self.store), self.path(folder)?);
+        let (store, path) = (self.store()?, self.path(folder)?);
         let address = self.address_of(folder);
         let found = self.wait(folder, async move {
             let listed = store.list_with_delimiter(Some(&path)).await;
@@ -274,13 +277,20 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(super) fn check(&self) -> Result<(), BucketError> {
-        let (store, prefix) = (Arc::clone(&self.store), self.prefix.clone());
+        let (store, prefix) = (self.store()?, self.prefix.clone());
         let address = self.address.clone();
         self.wait("", async move {
             let first = store.list(Some(&prefix)).try_next().await;
             first
                 .map(drop)
                 .map_err(|error| BucketError::of(&address, &error))
+        })
+    }
+
+    fn store(&self) -> Result<Arc<dyn ObjectStore>, BucketError> {
+        self.client.get().map_err(|reason| BucketError::Address {
+            address: self.address.clone(),
+            reason: reason.to_owned(),
         })
     }
 

@@ -1,7 +1,7 @@
 //! The client of S3-compatible stores: its time limits and repetitions, its keys, and the threads of its requests.
 
 use std::io;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 use std::time::Duration;
 
 use object_store::aws::AmazonS3Builder;
@@ -30,11 +30,46 @@ pub(super) fn runtime() -> Result<&'static Runtime, &'static io::Error> {
     RUNTIME.as_ref()
 }
 
+/// A client of a bucket that is made at its first use, because commands such as `status` send no requests and need no keys.
+#[derive(Debug)]
+pub(super) struct LazyClient {
+    bucket: String,
+    made: OnceLock<Result<Arc<dyn ObjectStore>, String>>,
+}
+
+impl LazyClient {
+    /// Returns the client of a bucket.
+    pub(super) fn new(bucket: &str) -> Self {
+        Self {
+            bucket: bucket.to_owned(),
+            made: OnceLock::new(),
+        }
+    }
+
+    /// Returns a client that is made already.
+    #[cfg(test)]
+    pub(super) fn of(store: Arc<dyn ObjectStore>) -> Self {
+        Self {
+            bucket: String::new(),
+            made: OnceLock::from(Ok(store)),
+        }
+    }
+
+    /// Returns the client.
+    ///
+    /// # Errors
+    /// Returns the reason if a variable of the environment is missing or has a wrong value.
+    pub(super) fn get(&self) -> Result<Arc<dyn ObjectStore>, &str> {
+        let made = self.made.get_or_init(|| connect(&self.bucket));
+        made.as_ref().map(Arc::clone).map_err(String::as_str)
+    }
+}
+
 /// Returns a client of a bucket. Sends no request. Credentials, region and endpoint are those of the environment.
 ///
 /// # Errors
 /// Returns the reason if a variable is missing or has a wrong value.
-pub(super) fn connect(bucket: &str) -> Result<Arc<dyn ObjectStore>, String> {
+fn connect(bucket: &str) -> Result<Arc<dyn ObjectStore>, String> {
     require_keys()?;
     // The client would look for a provider of cryptography and find none. Another call may have installed it.
     let _ = rustls::crypto::ring::default_provider().install_default();

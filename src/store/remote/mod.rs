@@ -6,6 +6,7 @@ mod cache;
 mod client;
 mod listing;
 mod pack;
+mod recent;
 mod storage;
 
 pub use bucket_error::BucketError;

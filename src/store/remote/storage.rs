@@ -1,17 +1,15 @@
 //! Where a project's artifacts and inputs are, apart from its own folder.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
 use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
-use super::pack::read_pack;
-
-/// Packs that are kept in memory, because artifacts of a pair are read one after another.
-const PACKS_IN_MEMORY: usize = 16;
+use super::pack::{key, read_pack};
+use super::recent::Recent;
 
 /// The settings of a storage.
 #[derive(Debug, Clone, Default)]
@@ -42,8 +40,10 @@ pub struct ProjectStorage {
     roots: BTreeMap<String, Root>,
     cache: ObjectCache,
     lists: FolderLists,
-    /// Packs read last, newest first.
-    packs: Mutex<VecDeque<(String, Arc<Vec<u8>>)>>,
+    /// Packs read last.
+    packs: Recent<Arc<Vec<u8>>>,
+    /// Lengths in bytes of the packs asked for last.
+    lengths: Recent<u64>,
 }
 
 /// Why a storage cannot be used.
@@ -138,7 +138,8 @@ impl ProjectStorage {
             roots,
             cache: ObjectCache::new(cache, options.cache_bytes),
             lists: FolderLists::default(),
-            packs: Mutex::default(),
+            packs: Recent::default(),
+            lengths: Recent::default(),
         }))
     }
 
@@ -151,7 +152,8 @@ impl ProjectStorage {
             roots: BTreeMap::from([("scans".to_owned(), Root::Bucket(bucket.clone()))]),
             cache: ObjectCache::new(cache, 1 << 20),
             lists: FolderLists::default(),
-            packs: Mutex::default(),
+            packs: Recent::default(),
+            lengths: Recent::default(),
         };
         (storage, bucket)
     }
@@ -251,19 +253,28 @@ impl ProjectStorage {
         bucket: &Bucket,
         name: &str,
     ) -> Result<Arc<Vec<u8>>, BucketError> {
-        let lock = || {
-            self.packs
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-        };
-        if let Some((_, pack)) = lock().iter().find(|(known, _)| known == name) {
-            return Ok(Arc::clone(pack));
-        }
-        let pack = Arc::new(read_pack(bucket, name)?);
-        let mut packs = lock();
-        packs.push_front((name.to_owned(), Arc::clone(&pack)));
-        packs.truncate(PACKS_IN_MEMORY);
-        Ok(pack)
+        self.packs
+            .get_or_insert(name, || read_pack(bucket, name).map(Arc::new))
+    }
+
+    /// Forgets the packs in memory, as another process would know none.
+    #[cfg(test)]
+    pub(in crate::store) fn forget_packs(&self) {
+        self.packs.clear();
+        self.lengths.clear();
+    }
+
+    /// Returns the length of a pack in bytes.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn pack_bytes(
+        &self,
+        bucket: &Bucket,
+        name: &str,
+    ) -> Result<u64, BucketError> {
+        self.lengths
+            .get_or_insert(name, || Ok(bucket.stat(&key(name))?.bytes))
     }
 }
 
