@@ -1,10 +1,14 @@
 //! Inputs and artifacts in an object store: the results are those of local files, also when the store loses requests and
 //! processes are killed.
 
+use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::Ordering;
+use std::time::{Duration, SystemTime};
 
+use mocban::catalog::Catalog;
+use mocban::check::{CheckOptions, check};
 use mocban::store::Project;
 
 use crate::cli::{Call, binary, call, empty, mocban};
@@ -267,4 +271,56 @@ fn inputs_below_a_folder_with_a_name_move_with_it() {
     let plan = mocban(dir.path(), &plan).expect(0).json();
     assert_eq!(plan["pairs"], 0, "{plan}");
     assert!(Project::open(&dir.path().join("named")).is_ok());
+}
+
+/// Settings alternate, so that results become unreferenced and are then computed again with the same bytes. Before each
+/// run, all files are made old.
+#[tokio::test(flavor = "multi_thread")]
+async fn old_files_are_removed_while_the_same_results_are_computed_again() {
+    let dir = empty();
+    let local = project(dir.path(), "local", "4");
+    let options = CheckOptions {
+        quick: true,
+        repair: false,
+        in_use: true,
+        collect: Some(Duration::from_mins(30)),
+    };
+    mocban(local.dir(), &["run"]).expect(0);
+    let mut removed = 0;
+    for smoothing in ["1.3", "1.22", "1.3", "1.22", "1.3"] {
+        make_old(&local.artifacts_dir());
+        let setting = format!("register.smoothing_px={smoothing}");
+        let path = local.dir().to_owned();
+        let run = move || {
+            call(
+                binary()
+                    .arg("-C")
+                    .arg(path)
+                    .args(["--set", &setting, "run"]),
+            )
+        };
+        let running = tokio::task::spawn_blocking(run);
+        while !running.is_finished() {
+            let Ok(catalog) = Catalog::open_read_only(&local.catalog_path()).await else {
+                continue;
+            };
+            let summary = check(&local, &catalog, options).await.expect("checked");
+            assert_eq!(summary.found(), 0, "{summary:?}");
+            removed += summary.unreferenced.map_or(0, |found| found.removed);
+            catalog.close().await;
+        }
+        running.await.expect("it ends").expect(0);
+    }
+    assert!(removed > 0);
+    mocban(local.dir(), &["check"]).expect(0);
+}
+
+/// Sets the times of all files below a folder back by an hour.
+fn make_old(folder: &Path) {
+    let old = SystemTime::now() - Duration::from_hours(1);
+    for (path, _) in files(folder) {
+        let file = File::options().append(true).open(folder.join(path));
+        let changed = file.and_then(|file| file.set_modified(old));
+        changed.expect("changed");
+    }
 }
