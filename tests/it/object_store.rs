@@ -222,6 +222,12 @@ fn settings_of_the_store_that_are_wrong_are_explained() {
         2,
         "no keys: set AWS_ACCESS_KEY_ID",
     );
+    // A port that was just free, so nobody listens there.
+    let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).expect("a port");
+    let away = listener.local_addr().expect("an address").port();
+    drop(listener);
+    let away = &mut remote.command(away, "cache", &["run"]);
+    refused(away, 1, "the object store does not answer properly");
     let list = "id,mesh,print\nnew,scans:meshes/none.obj,scans:prints/none.png\n";
     std::fs::write(remote.path().join("more.csv"), list).expect("written");
     let import = remote.remote(port, &["import", "more.csv"]).expect(2);

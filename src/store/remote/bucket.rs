@@ -277,7 +277,9 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(super) fn check(&self) -> Result<(), BucketError> {
-        let (store, prefix) = (self.store()?, self.prefix.clone());
+        let store = self.client.for_first_request();
+        let store = store.map_err(|reason| self.unusable(&reason))?;
+        let prefix = self.prefix.clone();
         let address = self.address.clone();
         self.wait("", async move {
             let first = store.list(Some(&prefix)).try_next().await;
@@ -288,10 +290,14 @@ impl Bucket {
     }
 
     fn store(&self) -> Result<Arc<dyn ObjectStore>, BucketError> {
-        self.client.get().map_err(|reason| BucketError::Address {
+        self.client.get().map_err(|reason| self.unusable(reason))
+    }
+
+    fn unusable(&self, reason: &str) -> BucketError {
+        BucketError::Address {
             address: self.address.clone(),
             reason: reason.to_owned(),
-        })
+        }
     }
 
     fn path(&self, key: &str) -> Result<Path, BucketError> {

@@ -23,7 +23,9 @@ pub enum BucketError {
         code: String,
     },
     /// The store could not be reached, or had no success within the time limit.
-    #[error("{address}: the object store does not answer properly ({reason})")]
+    #[error(
+        "{address}: the object store does not answer properly ({reason}); check that it runs, and AWS_ENDPOINT_URL"
+    )]
     Unavailable {
         /// Which object or folder.
         address: String,
@@ -123,7 +125,8 @@ fn innermost(error: &object_store::Error) -> String {
     if text.contains('<') || text.len() > 200 {
         return "unexpected reply".to_owned();
     }
-    text.lines().next().unwrap_or_default().to_owned()
+    let line = text.lines().next().unwrap_or_default();
+    line.trim_end_matches([':', ' ']).to_owned()
 }
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ const CONNECT: Duration = Duration::from_secs(10);
 const SILENCE: Duration = Duration::from_secs(30);
 /// A request is given up if it had no success for this long.
 const GIVE_UP: Duration = Duration::from_mins(4);
+/// A first request that only shows whether the store answers is given up after this time.
+const GIVE_UP_FIRST: Duration = Duration::from_secs(5);
 /// Threads that send requests.
 const THREADS: usize = 2;
 
@@ -60,8 +62,16 @@ impl LazyClient {
     /// # Errors
     /// Returns the reason if a variable of the environment is missing or has a wrong value.
     pub(super) fn get(&self) -> Result<Arc<dyn ObjectStore>, &str> {
-        let made = self.made.get_or_init(|| connect(&self.bucket));
+        let made = self.made.get_or_init(|| connect(&self.bucket, GIVE_UP));
         made.as_ref().map(Arc::clone).map_err(String::as_str)
+    }
+
+    /// Returns another client of the same bucket, whose requests are given up soon.
+    ///
+    /// # Errors
+    /// Returns the reason if a variable of the environment is missing or has a wrong value.
+    pub(super) fn for_first_request(&self) -> Result<Arc<dyn ObjectStore>, String> {
+        connect(&self.bucket, GIVE_UP_FIRST)
     }
 }
 
@@ -69,7 +79,7 @@ impl LazyClient {
 ///
 /// # Errors
 /// Returns the reason if a variable is missing or has a wrong value.
-fn connect(bucket: &str) -> Result<Arc<dyn ObjectStore>, String> {
+fn connect(bucket: &str, give_up: Duration) -> Result<Arc<dyn ObjectStore>, String> {
     require_keys()?;
     // The client would look for a provider of cryptography and find none. Another call may have installed it.
     let _ = rustls::crypto::ring::default_provider().install_default();
@@ -87,7 +97,7 @@ fn connect(bucket: &str) -> Result<Arc<dyn ObjectStore>, String> {
             base: 2.0,
         },
         max_retries: usize::MAX,
-        retry_timeout: GIVE_UP,
+        retry_timeout: give_up,
     };
     let builder = AmazonS3Builder::from_env().with_client_options(client);
     let store = builder.with_bucket_name(bucket).with_retry(retry).build();
