@@ -70,9 +70,9 @@ pub struct PairFields {
     pub unit: Option<LengthUnit>,
     /// Whether the carved side faces down in the scan.
     pub scanned_face_down: Option<bool>,
-    /// Path of the mesh in the catalog, relative to the project or absolute.
+    /// Path of the mesh in the catalog: relative to the project or to a named root, or absolute.
     pub mesh: String,
-    /// Path of the print in the catalog, relative to the project or absolute.
+    /// Path of the print in the catalog: relative to the project or to a named root, or absolute.
     pub print: String,
     /// All other columns of the manifest.
     pub meta: Map<String, Value>,
