@@ -147,9 +147,7 @@ impl Context {
 
     /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
     fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
-        let settings = self.settings();
-        let storage = Self::storage(settings.as_ref().ok())?;
-        let url = self.catalog_of(settings)?;
+        let (storage, url) = self.data_locations()?;
         let project = match url {
             Some(_) => Project::open_directory(&self.dir())?,
             None => Project::open(&self.dir())?,
@@ -172,9 +170,21 @@ impl Context {
         Ok((project, catalog))
     }
 
+    /// Returns the named roots with the object store, and the URL of the catalog if that is in PostgreSQL.
+    ///
+    /// # Errors
+    /// Returns an error under the conditions of [`Self::catalog_url`], or if a setting of the storage is invalid.
+    pub(super) fn data_locations(
+        &self,
+    ) -> anyhow::Result<(Option<ProjectStorage>, Option<String>)> {
+        let settings = self.settings();
+        let storage = Self::storage(settings.as_ref().ok())?;
+        Ok((storage, self.catalog_of(settings)?))
+    }
+
     /// Returns the named roots and the object store of the settings. Sends no request. Returns `None` if the settings
     /// name none, or are invalid.
-    pub(super) fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
+    fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
         let Some(settings) = settings.map(|settings| &settings.config.storage) else {
             return Ok(None);
         };

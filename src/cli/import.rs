@@ -89,7 +89,7 @@ pub(super) async fn import_pairs(
         Some(file) => read_truths(file, &listing.ids, context).await?,
         None => Vec::new(),
     };
-    let storage = Context::storage(context.settings().ok().as_ref())?;
+    let (storage, url) = context.data_locations()?;
     let project = Project::at(&dir).with_storage(storage);
     let truths = stored_truths(truths, &project)?;
     let list = Arc::new(ImportList {
@@ -97,7 +97,6 @@ pub(super) async fn import_pairs(
         truths,
         allow_missing: args.allow_missing,
     });
-    let url = context.catalog_url()?;
     let missing_dirs = missing_dirs(&dir);
     let stored = store(&project, url.as_deref(), &list).await;
     if stored.is_err() {

@@ -12,12 +12,12 @@ use super::remote::{Bucket, BucketError, CachedObject, ProjectStorage, Root};
 #[derive(Debug, Clone)]
 pub struct Input {
     path: PathBuf,
-    pub(super) place: Place,
+    pub(super) place: InputLocation,
 }
 
 /// Where an input file is.
 #[derive(Debug, Clone)]
-pub(super) enum Place {
+pub(super) enum InputLocation {
     /// At its path.
     File,
     /// At its path, below a root that several machines share. The inode is not compared, because it differs between
@@ -40,7 +40,7 @@ impl Input {
     pub fn file(path: impl Into<PathBuf>) -> Self {
         Self {
             path: path.into(),
-            place: Place::File,
+            place: InputLocation::File,
         }
     }
 
@@ -52,10 +52,10 @@ impl Input {
     /// Returns its length in bytes, or 0 if it cannot be read.
     pub fn size(&self) -> u64 {
         match &self.place {
-            Place::File | Place::SharedFile => {
+            InputLocation::File | InputLocation::SharedFile => {
                 std::fs::metadata(&self.path).map_or(0, |meta| meta.len())
             }
-            Place::Object(object) => object.open(u64::MAX).map_or(0, |copy| copy.bytes),
+            InputLocation::Object(object) => object.open(u64::MAX).map_or(0, |copy| copy.bytes),
         }
     }
 
@@ -65,20 +65,22 @@ impl Input {
     /// Returns an error if it does not exist, is not a regular file, or cannot be read.
     pub fn open(&self) -> Result<std::fs::File, InputError> {
         match &self.place {
-            Place::File | Place::SharedFile => {
+            InputLocation::File | InputLocation::SharedFile => {
                 super::open_file::open_regular(&self.path).map(|(file, _)| file)
             }
-            Place::Object(object) => Ok(object.open(u64::MAX)?.file),
+            InputLocation::Object(object) => Ok(object.open(u64::MAX)?.file),
         }
     }
 
     /// Returns whether it exists. Returns `true` if this cannot be found out.
     pub fn exists(&self) -> bool {
         match &self.place {
-            Place::File | Place::SharedFile => {
+            InputLocation::File | InputLocation::SharedFile => {
                 !matches!(regular_metadata(&self.path), Err(InputError::NotThere(_)))
             }
-            Place::Object(object) => !matches!(object.version(), Err(BucketError::NotThere(_))),
+            InputLocation::Object(object) => {
+                !matches!(object.version(), Err(BucketError::NotThere(_)))
+            }
         }
     }
 }
@@ -112,11 +114,11 @@ impl Project {
         match root {
             Some((_, Root::Folder(folder), rest)) => Input {
                 path: folder.join(rest),
-                place: Place::SharedFile,
+                place: InputLocation::SharedFile,
             },
             Some((storage, Root::Bucket(bucket), key)) => Input {
                 path: PathBuf::from(bucket.address_of(key)),
-                place: Place::Object(RemoteInput {
+                place: InputLocation::Object(RemoteInput {
                     storage: Arc::clone(storage),
                     bucket: bucket.clone(),
                     key: key.to_owned(),

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read, Take};
 
 use super::input_error::InputError;
-use super::input_place::{Input, Place};
+use super::input_place::{Input, InputLocation};
 use super::open_file::{open_regular, regular_metadata};
 use super::remote::BucketError;
 use crate::domain::ContentHash;
@@ -30,8 +30,8 @@ fn shared_file_stat(meta: &std::fs::Metadata) -> String {
 impl Input {
     fn stat(&self, meta: &std::fs::Metadata) -> String {
         match self.place {
-            Place::SharedFile => shared_file_stat(meta),
-            Place::File | Place::Object(_) => file_stat(meta),
+            InputLocation::SharedFile => shared_file_stat(meta),
+            InputLocation::File | InputLocation::Object(_) => file_stat(meta),
         }
     }
 }
@@ -121,7 +121,8 @@ impl InputReader {
     /// Returns whether the file has changed since it was opened, so that the hash may include bytes that the parser did
     /// not read. A local copy of an object is compared with the content that was received.
     fn has_changed(&self, hash: &ContentHash) -> Result<bool, InputError> {
-        if let (Some(expected), Place::Object(object)) = (&self.expected, &self.input.place) {
+        if let (Some(expected), InputLocation::Object(object)) = (&self.expected, &self.input.place)
+        {
             let is_other = expected != hash;
             if is_other {
                 object.forget();
@@ -140,8 +141,10 @@ impl InputReader {
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn stat_input(input: &Input) -> Result<String, InputError> {
     match &input.place {
-        Place::Object(object) => Ok(object.version()?),
-        Place::File | Place::SharedFile => Ok(input.stat(&regular_metadata(input.path())?)),
+        InputLocation::Object(object) => Ok(object.version()?),
+        InputLocation::File | InputLocation::SharedFile => {
+            Ok(input.stat(&regular_metadata(input.path())?))
+        }
     }
 }
 
@@ -161,14 +164,14 @@ pub fn open_input(
         setting,
     };
     let (file, len, stat, expected) = match &input.place {
-        Place::Object(object) => {
+        InputLocation::Object(object) => {
             let copy = object.open(limit).map_err(|error| match error {
                 BucketError::TooLarge { bytes, .. } => too_large(bytes),
                 error => error.into(),
             })?;
             (copy.file, copy.bytes, copy.version, Some(copy.hash))
         }
-        Place::File | Place::SharedFile => {
+        InputLocation::File | InputLocation::SharedFile => {
             let (file, meta) = open_regular(input.path())?;
             (file, meta.len(), input.stat(&meta), None)
         }
@@ -210,7 +213,7 @@ pub fn read_input(
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn hash_input(input: &Input) -> Result<InputDigest, InputError> {
-    if let Place::Object(object) = &input.place {
+    if let InputLocation::Object(object) = &input.place {
         let copy = object.open(u64::MAX)?;
         return Ok(InputDigest {
             hash: copy.hash,

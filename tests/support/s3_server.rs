@@ -43,7 +43,7 @@ impl S3Server {
     fn try_start(program: &Path) -> Option<Self> {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let [master, volume, filer, port] = free_ports();
-        // Each server also listens on its port + 10000 unless told otherwise.
+        // Without these arguments, each part also listens on its port + 10000, which may be in use.
         let [grpc_master, grpc_volume, grpc_filer, grpc_s3] = free_ports();
         let process = Command::new(program)
             .args([

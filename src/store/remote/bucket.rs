@@ -117,11 +117,10 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails or the object is larger.
-    pub(super) fn read(&self, key: &str, limit: u64) -> Result<(Vec<u8>, ObjectStat), BucketError> {
-        let (bytes, stat) = self
-            .copy_to(key, limit, None, Vec::new())?
-            .ok_or_else(|| BucketError::NotThere(self.address_of(key)))?;
-        Ok((bytes, stat))
+    pub(super) fn read(&self, key: &str, limit: u64) -> Result<Vec<u8>, BucketError> {
+        let copied = self.copy_to(key, limit, None, Vec::new())?;
+        let copied = copied.map(|(bytes, _)| bytes);
+        copied.ok_or_else(|| BucketError::NotThere(self.address_of(key)))
     }
 
     /// Writes the content of an object of at most `limit` bytes to `target`. Returns `None` if the object has the entity
@@ -175,11 +174,8 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails or there is no such object.
     pub(in crate::store) fn stat(&self, key: &str) -> Result<ObjectStat, BucketError> {
-        let (store, path) = (self.store()?, self.path(key)?);
-        let address = self.address_of(key);
-        self.wait(key, async move {
-            let found = store.head(&path).await;
-            let found = found.map_err(|error| BucketError::of(&address, &error))?;
+        self.request(key, |store, path| async move {
+            let found = store.head(&path).await?;
             Ok(ObjectStat::from(&found))
         })
     }
@@ -189,13 +185,8 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(in crate::store) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
-        let (store, path) = (self.store()?, self.path(key)?);
-        let address = self.address_of(key);
-        self.wait(key, async move {
-            let stored = store.put(&path, PutPayload::from(bytes)).await;
-            stored
-                .map(drop)
-                .map_err(|error| BucketError::of(&address, &error))
+        self.request(key, |store, path| async move {
+            store.put(&path, PutPayload::from(bytes)).await.map(drop)
         })
     }
 
@@ -204,12 +195,10 @@ impl Bucket {
     /// # Errors
     /// Returns an error if the request fails.
     pub(in crate::store) fn remove(&self, key: &str) -> Result<(), BucketError> {
-        let (store, path) = (self.store()?, self.path(key)?);
-        let address = self.address_of(key);
-        self.wait(key, async move {
+        self.request(key, |store, path| async move {
             match store.delete(&path).await {
-                Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
-                Err(error) => Err(BucketError::of(&address, &error)),
+                Err(object_store::Error::NotFound { .. }) => Ok(()),
+                removed => removed,
             }
         })
     }
@@ -258,11 +247,8 @@ impl Bucket {
         folder: &str,
         mut each: impl FnMut(String, ObjectStat),
     ) -> Result<(), BucketError> {
-        let (store, path) = (self.store()?, self.path(folder)?);
-        let address = self.address_of(folder);
-        let found = self.wait(folder, async move {
-            let listed = store.list_with_delimiter(Some(&path)).await;
-            listed.map_err(|error| BucketError::of(&address, &error))
+        let found = self.request(folder, |store, path| async move {
+            store.list_with_delimiter(Some(&path)).await
         })?;
         for meta in &found.objects {
             if let Some(key) = key_below(&self.prefix, &meta.location) {
@@ -305,6 +291,22 @@ impl Bucket {
         Path::parse(joined.trim_matches('/')).map_err(|error| BucketError::Address {
             address: self.address_of(key),
             reason: error.to_string(),
+        })
+    }
+
+    /// Sends a request for an object or folder, and adds its address to an error of the client.
+    fn request<T: Send + 'static, F>(
+        &self,
+        key: &str,
+        send: impl FnOnce(Arc<dyn ObjectStore>, Path) -> F,
+    ) -> Result<T, BucketError>
+    where
+        F: Future<Output = object_store::Result<T>> + Send + 'static,
+    {
+        let (address, reply) = (self.address_of(key), send(self.store()?, self.path(key)?));
+        self.wait(key, async move {
+            let outcome = reply.await;
+            outcome.map_err(|error| BucketError::of(&address, &error))
         })
     }
 
@@ -373,8 +375,10 @@ mod tests {
         for key in ["packs/ab/1.zip", "packs/cd/chữ 2.zip", "other/3"] {
             bucket.write(key, key.as_bytes().to_vec()).expect("written");
         }
-        let (bytes, stat) = bucket.read("packs/cd/chữ 2.zip", 100).expect("read");
+        let bytes = bucket.read("packs/cd/chữ 2.zip", 100).expect("read");
         assert_eq!(bytes, "packs/cd/chữ 2.zip".as_bytes());
+        let copied = bucket.copy_to("packs/cd/chữ 2.zip", 100, None, vec![]);
+        let (_, stat) = copied.expect("read").expect("an object");
         assert_eq!(bucket.stat("packs/cd/chữ 2.zip").expect("there"), stat);
         let same = bucket.copy_to(
             "other/3",

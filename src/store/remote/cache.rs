@@ -1,7 +1,7 @@
 //! Local copies of input files in an object store. The oldest copies are removed when they take too much space.
 //!
-//! A copy has a name made of the object's address and version, so it is never changed. A small file beside it names the
-//! newest version, with which the store is asked whether the object has changed since. Processes may share the folder.
+//! A copy has a name made of the object's address and version, so it is never changed. A small file beside it holds the
+//! newest known version. A conditional request then shows whether the object has changed. Processes may share the folder.
 
 use std::collections::BTreeMap;
 use std::fs::File;

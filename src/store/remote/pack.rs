@@ -93,7 +93,7 @@ pub(in crate::store) fn number_of(name: &str) -> Option<u64> {
 /// # Errors
 /// Returns an error if the request fails.
 pub(super) fn read_pack(bucket: &Bucket, name: &str) -> Result<Vec<u8>, BucketError> {
-    bucket.read(&key(name), MAX_BYTES).map(|(bytes, _)| bytes)
+    bucket.read(&key(name), MAX_BYTES)
 }
 
 /// Returns the bytes of an artifact, or `None` if the pack is too short for it or holds other bytes.
