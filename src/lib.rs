@@ -182,6 +182,7 @@
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
+//! | `block` | a whole block and the image of its page: height maps, registration, characters, cut | `domain`, `simd`, `mesh`, `raster` |
 //! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
 //! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster`, `platform` |
@@ -201,6 +202,7 @@
 //! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
 //! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
+pub mod block;
 pub mod catalog;
 pub mod check;
 pub mod cli;
