@@ -12,8 +12,13 @@ use super::relief::Relief;
 use super::windows::{ShrunkRelief, WindowMatch, WindowSizes, match_windows};
 use crate::raster::Grid;
 
-/// Rotations apart from quarter turns that are searched, degrees.
-const ANGLES_DEG: [f64; 9] = [-6.0, -4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5, 6.0];
+/// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,
+/// degrees.
+const MAX_ANGLE_DEG: f64 = 6.0;
+/// Rotations of the search in which the outline of the face says nothing: all.
+const ALL_ANGLES_DEG: f64 = 45.0;
+/// Step of rotations, degrees.
+const ANGLE_STEP_DEG: f64 = 1.5;
 /// Scales that are searched, in relation to the one at which ink and strokes have the same extent.
 const SCALE_RATIOS: [f64; 9] = [0.88, 0.91, 0.94, 0.97, 1.0, 1.03, 1.06, 1.09, 1.12];
 /// Scales of the second search, page pixels per mm, and the ratio of two neighbours.
@@ -82,6 +87,51 @@ pub struct Alignment {
     pub windows: Vec<WindowMatch>,
 }
 
+/// What is searched for coarse positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SearchRange {
+    /// The whole page, nearly parallel to the outline of the face.
+    Narrow,
+    /// A page that shows only a part of the face, or more than the face: any resolution.
+    AllScales,
+    /// A face with an outline that is no rectangle: any rotation.
+    AllAngles,
+}
+
+impl SearchRange {
+    /// Returns the rotations and scales for one side.
+    fn range(self, side: &BlockSide, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
+        let max_angle_deg = match self {
+            Self::Narrow | Self::AllScales => MAX_ANGLE_DEG,
+            Self::AllAngles => ALL_ANGLES_DEG,
+        };
+        let steps = (max_angle_deg / ANGLE_STEP_DEG) as i32;
+        let angle =
+            |step: i32| f64::from(step) * ANGLE_STEP_DEG.to_radians() - side.relief.angle_rad;
+        let scales = if self == Self::AllScales {
+            let count = (WIDE_SCALES[1] / WIDE_SCALES[0]).ln() / WIDE_RATIO.ln();
+            (0..=count as i32)
+                .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
+                .collect()
+        } else {
+            let expected = expected_scale(relief, page);
+            expected
+                .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
+                .unwrap_or_default()
+        };
+        CoarseRange {
+            angles: (-steps..=steps).map(angle).collect(),
+            scales,
+            min_overlap: if self == Self::AllScales { 0.3 } else { 0.6 },
+            count: if self == Self::AllScales {
+                2 * CANDIDATES
+            } else {
+                CANDIDATES
+            },
+        }
+    }
+}
+
 /// A position while it is refined.
 struct Candidate {
     side: usize,
@@ -94,34 +144,25 @@ struct Candidate {
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
 pub fn align(sides: &[BlockSide], page: &PageInk) -> Result<Alignment, BlockError> {
-    let narrow = |relief: &ShrunkRelief| CoarseRange {
-        angles: ANGLES_DEG.map(f64::to_radians).to_vec(),
-        scales: expected_scale(relief, page)
-            .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
-            .unwrap_or_default(),
-        min_overlap: 0.6,
-        count: CANDIDATES,
-    };
-    let first = refined(sides, page, &narrow);
-    if let Some(alignment) = first.as_ref().filter(|found| found.agreement.is_sure()) {
-        return Ok(alignment.clone());
+    let mut best: Option<Alignment> = None;
+    for search in [
+        SearchRange::Narrow,
+        SearchRange::AllScales,
+        SearchRange::AllAngles,
+    ] {
+        let found = refined(sides, page, search);
+        let quality = |found: &Option<Alignment>| {
+            found
+                .as_ref()
+                .map_or(-1.0, |found| found.agreement.quality())
+        };
+        if quality(&found) > quality(&best) {
+            best = found;
+        }
+        if best.as_ref().is_some_and(|best| best.agreement.is_sure()) {
+            break;
+        }
     }
-    let wide = |_: &ShrunkRelief| CoarseRange {
-        angles: [-4.0, -2.0, 0.0, 2.0, 4.0].map(f64::to_radians).to_vec(),
-        scales: {
-            let count = (WIDE_SCALES[1] / WIDE_SCALES[0]).ln() / WIDE_RATIO.ln();
-            (0..=count as i32)
-                .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
-                .collect()
-        },
-        min_overlap: 0.3,
-        count: 2 * CANDIDATES,
-    };
-    let second = refined(sides, page, &wide);
-    let best = [first, second]
-        .into_iter()
-        .flatten()
-        .max_by(|a, b| a.agreement.quality().total_cmp(&b.agreement.quality()));
     match best {
         Some(alignment) if alignment.agreement.is_sure() => Ok(alignment),
         best => Err(BlockError::Refused {
@@ -159,15 +200,11 @@ impl Agreement {
 }
 
 /// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(
-    sides: &[BlockSide],
-    page: &PageInk,
-    range: &dyn Fn(&ShrunkRelief) -> CoarseRange,
-) -> Option<Alignment> {
+fn refined(sides: &[BlockSide], page: &PageInk, search: SearchRange) -> Option<Alignment> {
     let mut best: Option<Candidate> = None;
     for (side, block) in sides.iter().enumerate() {
         let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
-        for position in coarse::search(&relief, page, &range(&relief)) {
+        for position in coarse::search(&relief, page, &search.range(block, &relief, page)) {
             let Some(candidate) = first_round(side, &relief, page, &position) else {
                 continue;
             };

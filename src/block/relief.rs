@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::face_layer::find_face;
+use super::face_layer::{face_angle, find_face};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use crate::raster::{Grid, Mask};
 
@@ -34,6 +34,8 @@ pub struct Relief {
     pub face: Mask,
     /// Height of the surface under the tops, mm, at cells of 27 x 27 pixels.
     pub surface: Grid<f32>,
+    /// Rotation of the face's outline in the frame of the height map, from u to v, radians.
+    pub angle_rad: f64,
 }
 
 /// Side of a cell of [`Relief::face`], in pixels of the height map.
@@ -47,6 +49,7 @@ impl Relief {
         let soft = soften(map, &face, &surface);
         Some(Self {
             soft,
+            angle_rad: face_angle(&face),
             face,
             surface,
         })
