@@ -1,15 +1,14 @@
 //! Finds the side of a block and the map of its face to a page, or refuses.
 
-use serde::{Deserialize, Serialize};
-
+use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
 use super::coarse::{self, CoarsePosition, CoarseRange};
 use super::error::BlockError;
 use super::field::ShiftField;
-use super::height_map::HeightMap;
+use super::height_map::{HeightMap, StoredHeights};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
-use super::windows::{ShrunkRelief, WindowMatch, WindowSizes, match_windows};
+use super::windows::{ShrunkRelief, WindowSizes, match_windows};
 use crate::raster::Grid;
 
 /// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,
@@ -39,12 +38,6 @@ const ROUNDS: [(WindowSizes, f64, Option<f64>); 5] = [
     (sizes(2, 18.0, 7.0, 1.2), 45.0, Some(14.0)),
     (sizes(2, 14.0, 6.0, 0.9), 45.0, Some(12.0)),
 ];
-/// Windows within this distance of the field agree, mm.
-const AGREEMENT_MM: f64 = 0.5;
-/// Agreement of the right block: at least .83, with a median correlation of .78. Of a wrong one: at most .54 and .49.
-const MIN_AGREEMENT: f64 = 0.68;
-const MIN_MEDIAN_NCC: f64 = 0.6;
-
 const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> WindowSizes {
     WindowSizes {
         shrink,
@@ -54,24 +47,22 @@ const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> Wind
     }
 }
 
-/// One side of a block.
+/// The face on one side of a block.
 #[derive(Debug, Clone)]
-pub struct BlockSide {
+pub struct Face {
     /// Heights.
     pub map: HeightMap,
     /// Strokes.
     pub relief: Relief,
 }
 
-/// How well the places of a face agree with a page.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Agreement {
-    /// Number of windows with relief on the face and on the page.
-    pub windows: usize,
-    /// Share of the windows that lie within 0.5 mm of the field.
-    pub share: f64,
-    /// Median of the windows' correlations.
-    pub median_ncc: f64,
+impl Face {
+    /// Computes the relief of stored heights; `None` if no surface fits them.
+    pub fn of(stored: &StoredHeights) -> Option<Self> {
+        let map = HeightMap::from(stored);
+        let relief = Relief::of(&map)?;
+        Some(Self { map, relief })
+    }
 }
 
 /// A page on one side of a block.
@@ -83,8 +74,8 @@ pub struct Alignment {
     pub map: PageMap,
     /// Evidence.
     pub agreement: Agreement,
-    /// Windows of the last round.
-    pub windows: Vec<WindowMatch>,
+    /// Where on the face the page agrees.
+    pub support: Support,
 }
 
 /// What is searched for coarse positions.
@@ -100,7 +91,7 @@ enum SearchRange {
 
 impl SearchRange {
     /// Returns the rotations and scales for one side.
-    fn range(self, side: &BlockSide, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
+    fn range(self, side: &Face, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
         let max_angle_deg = match self {
             Self::Narrow | Self::AllScales => MAX_ANGLE_DEG,
             Self::AllAngles => ALL_ANGLES_DEG,
@@ -143,7 +134,7 @@ struct Candidate {
 ///
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
-pub fn align(sides: &[BlockSide], page: &PageInk) -> Result<Alignment, BlockError> {
+pub fn align(sides: &[Face], page: &PageInk) -> Result<Alignment, BlockError> {
     let mut best: Option<Alignment> = None;
     for search in [
         SearchRange::Narrow,
@@ -172,35 +163,8 @@ pub fn align(sides: &[BlockSide], page: &PageInk) -> Result<Alignment, BlockErro
     }
 }
 
-impl Agreement {
-    fn is_sure(&self) -> bool {
-        self.share >= MIN_AGREEMENT && self.median_ncc >= MIN_MEDIAN_NCC
-    }
-
-    fn quality(&self) -> f64 {
-        self.share * self.median_ncc
-    }
-
-    fn of(windows: &[WindowMatch], field: &ShiftField) -> Self {
-        let positions: Vec<[f64; 2]> = windows.iter().map(|w| w.at).collect();
-        let fitted = field.at_all(&positions);
-        let agrees = |(window, fitted): &(&WindowMatch, &[f64; 2])| {
-            let [dx, dy] = [0, 1].map(|k: usize| window.shift[k] - fitted[k]);
-            dx.hypot(dy) <= AGREEMENT_MM
-        };
-        let count = windows.iter().zip(&fitted).filter(agrees).count();
-        let mut values: Vec<f64> = windows.iter().map(|w| w.ncc).collect();
-        values.sort_by(f64::total_cmp);
-        Self {
-            windows: windows.len(),
-            share: count as f64 / windows.len().max(1) as f64,
-            median_ncc: values.get(values.len() / 2).copied().unwrap_or(0.0),
-        }
-    }
-}
-
 /// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(sides: &[BlockSide], page: &PageInk, search: SearchRange) -> Option<Alignment> {
+fn refined(sides: &[Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
     let mut best: Option<Candidate> = None;
     for (side, block) in sides.iter().enumerate() {
         let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
@@ -228,16 +192,16 @@ fn refined(sides: &[BlockSide], page: &PageInk, search: SearchRange) -> Option<A
         }
         let windows = match_windows(&relief, page, &map, &sizes);
         let field = ShiftField::fit(&windows, sigma, fine)?;
-        let agreement = Agreement::of(&windows, &field);
         map = map.shifted(&field.at_all(&map.node_positions()));
-        last = Some((agreement, windows));
+        last = Some((windows, field));
     }
-    let (agreement, windows) = last?;
+    let (windows, field) = last?;
+    let (agreement, support) = Agreement::of(&windows, &field);
     Some(Alignment {
         side: best.side,
         map,
         agreement,
-        windows,
+        support,
     })
 }
 
@@ -256,28 +220,9 @@ fn first_round(
     let mut map = PageMap::affine(&position.page_from_face, place(low), place(high));
     let windows = match_windows(relief, page, &map, &COMPARED);
     let field = ShiftField::fit(&windows, COMPARED_SIGMA_MM, None)?;
-    let quality = Agreement::near(&windows, &field, COMPARED_MM);
+    let quality = agreement::mean_near(&windows, &field, COMPARED_MM);
     map = map.shifted(&field.at_all(&map.node_positions()));
     Some(Candidate { side, map, quality })
-}
-
-impl Agreement {
-    /// Returns the mean correlation of the windows, counting those far from the field as 0.
-    fn near(windows: &[WindowMatch], field: &ShiftField, reach_mm: f64) -> f64 {
-        let sum: f64 = windows
-            .iter()
-            .map(|window| {
-                let fitted = field.at(window.at);
-                let [dx, dy] = [0, 1].map(|k: usize| window.shift[k] - fitted[k]);
-                if dx.hypot(dy) <= reach_mm {
-                    window.ncc
-                } else {
-                    0.0
-                }
-            })
-            .sum();
-        sum / windows.len().max(1) as f64
-    }
 }
 
 /// Returns the scale at which the ink has the extent of the strokes, page pixels per mm.

@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use rayon::prelude::*;
 
-use super::align::BlockSide;
+use super::align::Face;
 use super::relief::surface_height;
 use crate::domain::Affine2;
 use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
@@ -41,7 +41,7 @@ pub enum CutError {
 /// Which characters a point of the face belongs to.
 #[derive(Debug, Clone)]
 pub struct CutPlan<'a> {
-    side: &'a BlockSide,
+    side: &'a Face,
     boxes: Vec<[f64; 4]>,
     origin_mm: [f64; 2],
     columns: usize,
@@ -52,7 +52,7 @@ pub struct CutPlan<'a> {
 
 impl<'a> CutPlan<'a> {
     /// Plans the cut of boxes on the face, `[u0, v0, u1, v1]` in mm.
-    pub fn new(side: &'a BlockSide, face_boxes: &[[f64; 4]]) -> Self {
+    pub fn new(side: &'a Face, face_boxes: &[[f64; 4]]) -> Self {
         let grown = |[u0, v0, u1, v1]: [f64; 4]| {
             [
                 u0 - MARGIN_MM,

@@ -6,8 +6,8 @@ use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
 
-/// Cells of the mask per side in pixels of the height map: 0.6 mm.
-const CELL: usize = 4;
+/// Pixels of the height map per side of a cell of the mask: 0.6 mm.
+pub(super) const FACE_CELL: usize = 4;
 /// Height of the layers in which heights are counted, mm.
 const LAYER_MM: f64 = 1.0;
 /// Layers with more than this share of the heights may be the face.
@@ -40,17 +40,17 @@ pub(super) fn find_face(map: &HeightMap) -> Option<Mask> {
 fn widest_part(map: &HeightMap, layer: f32) -> Option<Mask> {
     let (low, high) = (layer - BELOW_MM, layer + ABOVE_MM);
     let heights = &map.heights;
-    let (columns, rows) = (heights.width() / CELL, heights.height() / CELL);
+    let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
     let in_layer = |x: usize, y: usize| {
         let inside = |at: &&f32| **at > low && **at < high;
         let count = |dy: usize| {
-            let row = &heights.row(y * CELL + dy)[x * CELL..][..CELL];
+            let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
             row.iter().filter(inside).count()
         };
-        2 * (0..CELL).map(count).sum::<usize>() >= CELL * CELL
+        2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
     };
     let cells = Grid::from_fn(columns, rows, in_layer);
-    let reach = (MIN_WIDTH_MM / (CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
+    let reach = (MIN_WIDTH_MM / (FACE_CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
     ConnectedComponents::label(&opened(&cells, reach)).largest()
 }
 
@@ -80,6 +80,19 @@ fn layers(map: &HeightMap) -> Vec<f32> {
         }
     }
     found
+}
+
+/// Returns the cells of a map that contains only a face, in which at least half of the pixels have a height.
+pub(super) fn cells_of_face(map: &HeightMap) -> Mask {
+    let heights = &map.heights;
+    let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
+    Grid::from_fn(columns, rows, |x, y| {
+        let count = |dy: usize| {
+            let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
+            row.iter().filter(|height| **height != NO_HEIGHT).count()
+        };
+        2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
+    })
 }
 
 /// Erodes and dilates cells by `reach` in all directions.

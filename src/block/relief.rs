@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::face_layer::{face_angle, find_face};
+use super::face_layer::{FACE_CELL, cells_of_face, face_angle};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use crate::raster::{Grid, Mask};
 
@@ -38,13 +38,10 @@ pub struct Relief {
     pub angle_rad: f64,
 }
 
-/// Side of a cell of [`Relief::face`], in pixels of the height map.
-pub(super) const FACE_CELL: usize = 4;
-
 impl Relief {
-    /// Computes the soft relief of one side; `None` if it shows no face.
+    /// Computes the soft relief of a map that contains only a face; `None` if no surface fits it.
     pub fn of(map: &HeightMap) -> Option<Self> {
-        let face = find_face(map)?;
+        let face = cells_of_face(map);
         let surface = top_surface(map, &face)?;
         let soft = soften(map, &face, &surface);
         Some(Self {
