@@ -57,6 +57,12 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         inputs_missing: Vec::new(),
         inputs_changed: Vec::new(),
     };
+    // The files of a pair that was cut from a block are artifacts of the block.
+    let cut = [&pair.inputs.mesh_path, &pair.inputs.print_path];
+    let cut = cut
+        .into_iter()
+        .filter_map(|path| ArtifactRef::at_path(path));
+    check.named.extend(cut);
     for (stage, result) in &pair.results {
         let files: Option<ArtifactSet> = serde_json::from_str(&result.files).ok();
         let files = files.unwrap_or_default();
@@ -102,6 +108,9 @@ fn damage(pair: &AuditedPair, kind: Kind, stage: Stage, what: impl Into<String>)
 /// Checks that the rows of the pair agree with the state of its job.
 fn state(pair: &AuditedPair) -> Vec<Finding> {
     let Some((status, cursor)) = pair.job else {
+        if pair.is_retired {
+            return Vec::new();
+        }
         return vec![damage(pair, Kind::JobMissing, Stage::Fit, "it has no job")];
     };
     let mut found = Vec::new();
@@ -265,6 +274,7 @@ mod tests {
             },
             job: Some((status, cursor)),
             has_failure: false,
+            is_retired: false,
             results: Stage::ALL.map(|stage| (stage, result.clone())).into(),
             metrics: BTreeMap::new(),
         }

@@ -303,6 +303,7 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
         character: row.character.clone(),
         block: row.block.clone(),
         meta: row.meta.clone().into_iter().collect(),
+        prior: None,
     })
 }
 

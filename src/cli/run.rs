@@ -14,10 +14,10 @@ use super::progress::ProgressReporter;
 use super::table::{columns, count};
 use super::time_text::duration;
 use super::{select, signals};
-use crate::catalog::{Catalog, Plan, RerunPolicy};
+use crate::catalog::{BlockPlanEntry, Catalog, Plan, RerunPolicy};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
-use crate::runner::{self, RunOptions, RunPart, RunSummary, Stop};
+use crate::runner::{self, BlockSummary, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use crate::store::Project;
 
 /// Arguments of `run`.
@@ -182,7 +182,10 @@ pub(super) async fn drive(
 pub(super) const fn code(summary: &RunSummary) -> ExitCode {
     if summary.stopped {
         ExitCode::Stopped
-    } else if summary.failed_in_all > 0 || summary.too_many_failures {
+    } else if summary.failed_in_all > 0
+        || summary.blocks.failed_in_all > 0
+        || summary.too_many_failures
+    {
         ExitCode::SomeFailed
     } else {
         ExitCode::Done
@@ -199,6 +202,18 @@ pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: 
 }
 
 fn headline(summary: &RunSummary) -> String {
+    let pairs = pair_headline(summary);
+    let BlockSummary {
+        done, failed, left, ..
+    } = summary.blocks;
+    if done + failed + left == 0 {
+        return pairs;
+    }
+    let blocks = count(done, "block");
+    format!("{blocks} done, {failed} failed, {left} left; {pairs}")
+}
+
+fn pair_headline(summary: &RunSummary) -> String {
     let (took, left) = (duration(summary.elapsed_ms), summary.left);
     let done = count(summary.done, "pair");
     if summary.stopped {
@@ -252,6 +267,7 @@ fn as_json(summary: &RunSummary) -> Value {
         "failed": summary.failed,
         "failed_in_all": summary.failed_in_all,
         "left": summary.left,
+        "blocks": summary.blocks,
         "stages": summary.stages,
         "stopped": summary.stopped,
         "too_many_failures": summary.too_many_failures,
@@ -260,10 +276,13 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn print_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
-    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan});
-    context.print(&json, || plan_text(plan, running))?;
-    if plan.pairs() > 0 || plan.leased > 0 && !running {
+fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+    let (blocks, plan) = (&plan.blocks, &plan.pairs);
+    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
+    context.print(&json, || {
+        plan_text(plan, running) + &block_plan_text(blocks)
+    })?;
+    if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next("run");
     }
     Ok(ExitCode::Done)
@@ -290,6 +309,22 @@ fn plan_text(plan: &Plan, running: bool) -> String {
         vec![pairs, from, entry.to_string()]
     });
     format!("{}\n{}", parts.join(", "), columns(rows, "><<"))
+}
+
+/// Returns a line for each block that would run.
+fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
+    if blocks.is_empty() {
+        return String::new();
+    }
+    let rows = blocks.iter().map(|entry| {
+        let (block, from) = (format!("  {}", entry.block), format!("from {}", entry.from));
+        vec![block, from, entry.why.to_string()]
+    });
+    let number = count(blocks.len() as u64, "block");
+    format!(
+        "{number} would run, which may add pairs\n{}",
+        columns(rows, "<<<")
+    )
 }
 
 #[cfg(test)]
