@@ -3,6 +3,9 @@
 use super::message::{boxes, for_count, list, quoted};
 use crate::domain::sanitize;
 
+/// Maximum number of characters of a reason, which may quote the file.
+const MAX_REASON: usize = 300;
+
 /// Why labels could not be read. The message begins with the name of the file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}: {problem}", sanitize(.file, 4096))]
@@ -45,7 +48,7 @@ pub enum LabelsProblem {
     #[error("the root element of the XML is {}, not \"PcGts\"; of XML, only PAGE-XML is read", quoted(.0))]
     UnknownXml(String),
     /// The syntax is not valid.
-    #[error("the {format} is damaged: {reason}; save the labels again")]
+    #[error("the {format} is damaged: {}; save the labels again", sanitize(.reason, MAX_REASON))]
     Damaged {
         /// JSON, XML, CSV or YOLO.
         format: &'static str,
@@ -61,7 +64,7 @@ pub enum LabelsProblem {
         line: usize,
     },
     /// A part of the file is not what the format demands.
-    #[error("{place}: {reason}; correct or remove it")]
+    #[error("{place}: {}; correct or remove it", sanitize(.reason, MAX_REASON))]
     Malformed {
         /// The part, such as `box 3`.
         place: String,

@@ -1,11 +1,17 @@
 //! A box reduced to its centre and size.
 
+use std::ops::RangeInclusive;
+
 /// Share of boxes that may be larger than characters; one may be in any case.
 const TOO_LARGE: f64 = 0.04;
 /// Boxes below this share of the largest of the others do not count for the usual size.
 const SMALLEST_FULL: f64 = 0.6;
 /// Boxes below this share of the usual size are small.
 const SMALL: f64 = 0.7;
+/// Sizes of characters in the size of notes.
+const LARGE: RangeInclusive<f64> = 1.6..=3.5;
+/// Smallest number of columns in which characters stand among notes.
+const MIN_COLUMNS: usize = 3;
 
 /// Centre and size of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,12 +46,6 @@ impl Spot {
         }
     }
 
-    /// Turns the centre counter-clockwise on the page by an angle in radians.
-    pub(super) fn turn(&mut self, angle: f64) {
-        let (sin, cos) = angle.sin_cos();
-        (self.u, self.v) = (self.u * cos + self.v * sin, self.v * cos - self.u * sin);
-    }
-
     /// Returns whether the box is small, such as a note, if full boxes have this size.
     pub(super) fn is_small(&self, full_size: f64) -> bool {
         self.size < SMALL * full_size
@@ -63,5 +63,20 @@ pub(super) fn full_size(spots: &[Spot]) -> f64 {
     let large = sizes[sizes.len().saturating_sub(1 + larger)];
     let first = sizes.partition_point(|size| *size < SMALLEST_FULL * large);
     let full = &sizes[first..];
-    full[full.len() / 2]
+    let usual = full[full.len() / 2];
+    among_notes(spots, usual).unwrap_or(usual)
+}
+
+/// Returns the median size of the large boxes if a page consists nearly only of notes of a usual size. Characters among
+/// notes stand in several columns, titles in one or two.
+fn among_notes(spots: &[Spot], usual: f64) -> Option<f64> {
+    let is_large = |spot: &&Spot| LARGE.contains(&(spot.size / usual));
+    let mut large: Vec<&Spot> = spots.iter().filter(is_large).collect();
+    large.sort_by(|a, b| a.u.total_cmp(&b.u));
+    let columns = large.chunk_by(|a, b| b.u - a.u <= usual).count();
+    if columns < MIN_COLUMNS {
+        return None;
+    }
+    large.sort_by(|a, b| a.size.total_cmp(&b.size));
+    Some(large[large.len() / 2].size)
 }

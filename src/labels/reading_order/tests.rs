@@ -42,6 +42,36 @@ impl SplitMix {
     }
 }
 
+/// How a page is turned and bent.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bend {
+    /// Clockwise.
+    degrees: f64,
+    /// Sideways shift at the corners, in pixels.
+    keystone: f64,
+    /// Sideways shift at top and bottom, in pixels.
+    bow: f64,
+}
+
+impl Bend {
+    /// Returns the box around a box on a bent page from its place and half its width and height on an even page of ten
+    /// columns and 20 rows.
+    fn bounds(self, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> [f64; 4] {
+        let (across, down) = ((x - 2460.0) / 600.0, (y - 1150.0) / 1050.0);
+        let x = x + self.keystone * across * down + self.bow * down * down;
+        turned([x, y], [w, h], self.degrees)
+    }
+}
+
+impl From<f64> for Bend {
+    fn from(degrees: f64) -> Self {
+        Self {
+            degrees,
+            ..Self::default()
+        }
+    }
+}
+
 /// A page: its boxes with their expected names.
 #[derive(Debug, Default)]
 struct Page {
@@ -50,8 +80,8 @@ struct Page {
 
 impl Page {
     /// Draws columns from the right, each from a height in pixels. Boxes differ from their places at random.
-    fn new(columns: &[(f64, Vec<Cell>)], degrees: f64, random: &mut SplitMix) -> Self {
-        let mut page = Self::default();
+    fn new(columns: &[(f64, Vec<Cell>)], bend: impl Into<Bend>, random: &mut SplitMix) -> Self {
+        let (mut page, bend) = (Self::default(), bend.into());
         for (k, (top, cells)) in columns.iter().enumerate() {
             let middle = 3000.0 - PITCH[0] * k as f64;
             let (mut y, mut row) = (*top, 0);
@@ -81,7 +111,7 @@ impl Page {
                         row,
                         part: *part,
                     };
-                    page.boxes.push((turned(centre, half, degrees), name));
+                    page.boxes.push((bend.bounds(centre, half), name));
                 }
                 y += height * PITCH[1];
             }
@@ -192,6 +222,74 @@ fn pages_with_more_notes_than_characters_are_read() {
     for degrees in [-2.0, 0.0, 3.0] {
         Page::new(&columns, degrees, &mut random).check(&format!("{degrees} degrees"));
     }
+}
+
+#[test]
+fn a_page_of_almost_only_notes_keeps_them_together() {
+    use Cell::{Full, Notes};
+    let mut random = SplitMix(11);
+    let column = |k: usize| {
+        let first = if k.is_multiple_of(2) {
+            vec![Full]
+        } else {
+            vec![]
+        };
+        (90.0, [first, vec![Notes; 30]].concat())
+    };
+    let columns: Vec<_> = (0..10).map(column).collect();
+    Page::new(&columns, 1.5, &mut random).check("five characters among 600 notes");
+}
+
+#[test]
+fn a_title_does_not_make_notes_of_characters() {
+    let mut random = SplitMix(12);
+    let mut page = Page::new(&plain_columns(8, 16, &mut random), 0.0, &mut random);
+    for (_, name) in &mut page.boxes {
+        name.column += 1;
+    }
+    for k in 0..5 {
+        let y = 100.0 + 230.0 * f64::from(k);
+        let name = BoxName {
+            column: 1,
+            row: k + 1,
+            part: None,
+        };
+        page.boxes.push(([3100.0, y, 3300.0, y + 200.0], name));
+    }
+    page.check("a title of twice the size");
+}
+
+#[test]
+fn leaning_and_bent_columns_are_straightened() {
+    for (k, (keystone, bow)) in [(50.0, 0.0), (-50.0, 0.0), (0.0, 45.0), (40.0, -35.0)]
+        .into_iter()
+        .enumerate()
+    {
+        for degrees in [-3.0, 0.0, 2.0] {
+            let mut random = SplitMix(13 + k as u64);
+            let columns = plain_columns(10, 20, &mut random);
+            let bend = Bend {
+                degrees,
+                keystone,
+                bow,
+            };
+            Page::new(&columns, bend, &mut random).check(&format!("{bend:?}"));
+        }
+    }
+}
+
+#[test]
+fn many_boxes_far_apart_are_named() {
+    let mut random = SplitMix(20);
+    let mut edge = || 1e9 * random.unit();
+    let boxes: Vec<[f64; 4]> = (0..30_000)
+        .map(|k| {
+            let ([x, y], size) = ([edge(), edge()], if k % 2 == 0 { 10.0 } else { 4.0 });
+            [x, y, x + size, y + size]
+        })
+        .collect();
+    let names: BTreeSet<BoxName> = reading_order(&boxes).into_iter().collect();
+    assert_eq!(names.len(), boxes.len());
 }
 
 #[test]
