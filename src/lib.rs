@@ -181,6 +181,7 @@
 //! | `page_vec` | vectors on huge pages with a cache of freed pages | |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
+//! | `labels` | boxes of characters on a page: readers of eight formats, writers of VIA and COCO, names in reading order | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
 //! | `block` | a whole block and the image of its page: height maps, registration, characters, cut | `domain`, `simd`, `mesh`, `raster` |
 //! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
@@ -211,6 +212,7 @@ pub mod demo;
 pub mod domain;
 pub mod export;
 mod failpoint;
+pub mod labels;
 pub mod local_server;
 pub mod manifest;
 pub mod mesh;
