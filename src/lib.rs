@@ -180,7 +180,7 @@
 //! | `platform` | operations that differ between operating systems: identity of files, syncing, signals | |
 //! | `page_vec` | vectors on huge pages with a cache of freed pages | |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
-//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
+//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories; lists of blocks | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
 //! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
