@@ -180,7 +180,7 @@
 //! | `platform` | operations that differ between operating systems: identity of files, syncing, signals | |
 //! | `page_vec` | vectors on huge pages with a cache of freed pages | |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
-//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
+//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories; lists of blocks | `domain` |
 //! | `labels` | boxes of characters on a page: readers of eight formats, writers of VIA and COCO, names in reading order | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
 //! | `block` | a whole block and the image of its page: height maps, registration, characters, cut | `domain`, `simd`, `mesh`, `raster` |

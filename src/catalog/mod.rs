@@ -42,7 +42,8 @@ pub use blocks::model::{
     BlockLease, BlockSettings, BlockWork, CutPair, MadeWith, NewCharacter, StoredCharacter,
 };
 pub use blocks::records::{
-    BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock, StoredBlockFailure,
+    AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
+    StoredBlockFailure,
 };
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::commit_delay::Waiting;

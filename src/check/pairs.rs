@@ -73,21 +73,25 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         check.files += files.len() as u64;
         for artifact in files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                let kind = match error {
-                    ArtifactError::Missing(_) => Kind::FileMissing,
-                    ArtifactError::Changed(_) => Kind::FileChanged,
-                    ArtifactError::Io { .. }
-                    | ArtifactError::Moved(_)
-                    | ArtifactError::NoStore(_)
-                    | ArtifactError::Bucket(_) => Kind::FileUnreadable,
-                };
-                let finding = damage(pair, kind, *stage, error.to_string());
+                let finding = damage(pair, kind_of(&error), *stage, error.to_string());
                 check.damage.push(finding);
             }
         }
     }
     inputs(project, pair, &mut check);
     check
+}
+
+/// Returns the kind of damage of an artifact.
+pub(super) const fn kind_of(error: &ArtifactError) -> Kind {
+    match error {
+        ArtifactError::Missing(_) => Kind::FileMissing,
+        ArtifactError::Changed(_) => Kind::FileChanged,
+        ArtifactError::Io { .. }
+        | ArtifactError::Moved(_)
+        | ArtifactError::NoStore(_)
+        | ArtifactError::Bucket(_) => Kind::FileUnreadable,
+    }
 }
 
 fn is_before_cursor(pair: &AuditedPair, stage: Stage) -> bool {
@@ -232,6 +236,8 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
         let input = project.input(stored);
         let note = || format!("{} of {}", input.path().display(), pair.name);
         match stat_input(&input) {
+            // A run of its block writes the file again: the check of the block reports it.
+            Err(InputError::NotThere(_)) if ArtifactRef::at_path(stored).is_some() => {}
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(_) => check.inputs_changed.push(note()),
             Ok(stat) => {

@@ -199,6 +199,11 @@ pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: 
         let number = count(summary.failed_in_all, "pair");
         context.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
+    if summary.blocks.failed_in_all > 0 {
+        let number = count(summary.blocks.failed_in_all, "block");
+        let text = failures.blocks.failures_text();
+        context.info(&format!("{number} failed:\n{}", text.trim_end()));
+    }
 }
 
 fn headline(summary: &RunSummary) -> String {
@@ -243,12 +248,15 @@ fn pair_headline(summary: &RunSummary) -> String {
 /// Returns the commands that make sense after a run.
 pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
     let mut steps = Vec::new();
-    if summary.status.pairs == 0 {
+    if summary.status.pairs == 0 && failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
     if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) > 0 {
         steps.push("run".to_owned());
+    }
+    if let Some(first) = failures.blocks.first_failed() {
+        steps.push(format!("show {}", shell_quoted(&first)));
     }
     if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::block_inputs::as_failure;
+use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use super::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
-use super::block_task::{AfterStage, BlockInProgress, ComputedBlockStage, check_in_place};
 use super::compute_thread::run_blocking;
 use super::error::RunError;
 use super::events::RunEvent;
@@ -32,21 +32,6 @@ macro_rules! while_unavailable {
     }};
 }
 pub(super) use while_unavailable;
-
-/// How a block's task ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum BlockEnd {
-    /// Every stage is stored.
-    Done,
-    /// The block failed.
-    Failed,
-    /// The block will be retried.
-    Retry,
-    /// The block was released unfinished.
-    Released,
-    /// The lease was lost: it expired, or another process of the run recovered the job.
-    LeaseLost,
-}
 
 /// Stores a computed stage. Fails the block instead if the output is not valid.
 pub(super) async fn store_stage(
@@ -216,6 +201,13 @@ pub(super) async fn store_failure(
         }
     };
     Ok(AfterStage::End(end, 0))
+}
+
+/// Checks that the project's directory was not renamed. Otherwise, the run ends instead of failing the block.
+async fn check_in_place(context: &RunContext) -> Result<(), RunError> {
+    let project = context.project.clone();
+    run_blocking(move || project.check_in_place()).await?;
+    Ok(())
 }
 
 /// Converts the characters of a cut to their stored form.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tokio::task::JoinSet;
 
-use super::block_checkpoint::BlockEnd;
+use super::block_progress::BlockEnd;
 use super::block_task::{BlockReport, process_block};
 use super::compute_thread::task_result;
 use super::error::RunError;

@@ -9,16 +9,17 @@ use std::time::Instant;
 use tokio::sync::oneshot;
 
 use super::block_artifacts::StageArtifacts;
-use super::block_checkpoint::{BlockEnd, store_failure, store_stage, while_unavailable};
+use super::block_checkpoint::{store_failure, store_stage, while_unavailable};
 use super::block_inputs::{BlockSources, outdated};
-use super::block_stages::{BlockStageError, BlockStageOutput};
-use super::compute_thread::{panic_text, run_blocking};
+use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::block_stages::BlockStageError;
+use super::compute_thread::panic_text;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
-use crate::domain::{ArtifactSet, BlockStage, BlockStageRecord, FailureClass};
+use crate::domain::{BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
 
 /// Times that a stage may find the result of an earlier stage unusable before the block fails.
@@ -31,30 +32,6 @@ pub(super) struct BlockReport {
     pub(super) end: Result<BlockEnd, RunError>,
     /// Number of pairs that were added or run again.
     pub(super) pairs: u64,
-}
-
-/// A block in progress.
-pub(super) struct BlockInProgress {
-    pub(super) lease: BlockLease,
-    pub(super) work: BlockWork,
-    pub(super) sources: BlockSources,
-    /// Versions of the input files, as far as they are known.
-    pub(super) inputs: BlockInputVersions,
-}
-
-/// A computed stage.
-pub(super) struct ComputedBlockStage {
-    pub(super) output: BlockStageOutput,
-    pub(super) files: ArtifactSet,
-    pub(super) ms: u64,
-}
-
-/// What happens to a block after a stage.
-pub(super) enum AfterStage {
-    /// It goes on with this stage.
-    Continue(BlockInProgress, BlockStage),
-    /// Its task ends. The number of pairs that were added or changed.
-    End(BlockEnd, u64),
 }
 
 /// Runs the remaining stages of a leased block.
@@ -240,11 +217,4 @@ async fn on_thread<T: Send + 'static>(
     };
     stop.store(true, Ordering::Relaxed);
     Err(interruption)
-}
-
-/// Checks that the project's directory was not renamed. Otherwise, the run ends instead of failing the block.
-pub(super) async fn check_in_place(context: &RunContext) -> Result<(), RunError> {
-    let project = context.project.clone();
-    run_blocking(move || project.check_in_place()).await?;
-    Ok(())
 }

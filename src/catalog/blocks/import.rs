@@ -33,7 +33,7 @@ ON CONFLICT (name) DO UPDATE SET
     labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
 RETURNING id";
 
-const NEW_JOB: &str =
+pub(crate) const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
 
 impl Catalog {

@@ -1,7 +1,5 @@
 //! Reads blocks: their results, their state for `status` and `show`, and their input files.
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 use serde_json::Value;
 
@@ -46,6 +44,8 @@ FROM block_result AS r JOIN block AS b ON b.id = r.block WHERE b.name = ?1 ORDER
 const ATTEMPTS: &str = "
 SELECT a.stage, a.class, a.message, a.ms, a.at
 FROM block_attempt AS a JOIN block AS b ON b.id = a.block WHERE b.name = ?1 ORDER BY a.id";
+
+const AUDITED: &str = "SELECT b.id, b.name, j.stage FROM block AS b LEFT JOIN block_job AS j ON j.block = b.id ORDER BY b.id";
 
 /// A stored failure of a block with its stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -130,6 +130,21 @@ pub struct BlockDetail {
     /// Attempts, oldest first.
     pub attempts: Vec<BlockAttemptRecord>,
 }
+
+/// A block with its results, for a check.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditedBlock {
+    /// The block.
+    pub block: BlockId,
+    /// The user's id.
+    pub name: BlockName,
+    /// Index of the next stage, 4 if the block is done. `None` if there is no job.
+    pub cursor: Option<i64>,
+    /// Every stored result, also of stages that are to run again.
+    pub results: Vec<BlockStageRecord>,
+}
+
+from_row! { AuditedBlock { block: "id", name, cursor: "stage", results = Vec::new() } }
 
 /// A block with its input files as last read.
 #[derive(Debug, Clone, PartialEq)]
@@ -275,19 +290,17 @@ impl Catalog {
         .await
     }
 
-    /// Returns the results of the stages of every block, by block.
+    /// Returns every block with the results of its stages, for a check.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn block_results(&self) -> Result<BTreeMap<BlockId, Vec<BlockStageRecord>>> {
+    /// Returns an error if a value is invalid or a database operation fails.
+    pub async fn audited_blocks(&self) -> Result<Vec<AuditedBlock>> {
         let mut conn = self.snapshot().await?;
-        let blocks: Vec<KnownBlock> = query_as(BLOCKS).fetch_all(&mut conn).await?;
-        let mut results = BTreeMap::new();
-        for known in blocks {
-            let records = stage_records(&mut conn, known.block).await?;
-            results.insert(known.block, records);
+        let mut blocks: Vec<AuditedBlock> = query_as(AUDITED).fetch_all(&mut conn).await?;
+        for block in &mut blocks {
+            block.results = stage_records(&mut conn, block.block).await?;
         }
-        Ok(results)
+        Ok(blocks)
     }
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::catalog::blocks::import::NEW_JOB;
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockSettings, MadeWith};
 use crate::catalog::blocks::records::input_versions;
 use crate::catalog::db::conn::Conn;
@@ -231,7 +232,7 @@ impl Catalog {
         .await
     }
 
-    /// Sends blocks back to a stage, never forward, and ends their leases. For repairs, when files of their results are
+    /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files of their results are
     /// missing or damaged.
     ///
     /// # Errors
@@ -240,6 +241,8 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 for (block, stage) in &blocks {
+                    let new = query(NEW_JOB).bind(block.0);
+                    new.execute(&mut *conn).await?;
                     let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
                     reset.execute(&mut *conn).await?;
                 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::catalog::blocks;
+use crate::catalog::blocks::recovery as blocks;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
@@ -152,7 +152,7 @@ impl Catalog {
                 let deaths: i64 = query_scalar(DEATHS).fetch_one(&mut *conn).await?;
                 // Before the pairs: a block is blamed only if its worker holds no pair.
                 let most = u32::try_from(deaths).unwrap_or(u32::MAX);
-                let blocks = blocks::recovery::recover(conn, &workers, most, now).await?;
+                let blocks = blocks::recover(conn, &workers, most, now).await?;
                 let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
                 let found = query.bind(deaths).fetch_all(&mut *conn).await?;
                 let recovered = count_recovered(conn, found, &affected, now).await?;
@@ -212,7 +212,7 @@ async fn overdue(
 ) -> Result<Recovered> {
     let others = holders_but(conn, me).await?;
     let affected = affected_pairs(conn, &others).await?;
-    let blocks = blocks::recovery::recover_overdue(conn, &others, margin_ms, now).await?;
+    let blocks = blocks::recover_overdue(conn, &others, margin_ms, now).await?;
     let query = query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
     let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
     let recovered = count_recovered(conn, found, &affected, now).await?;

@@ -165,8 +165,8 @@ async fn failures_that_may_pass_are_retried_and_others_are_not() {
 async fn a_missing_artifact_of_an_earlier_stage_is_computed_again() {
     let fixture = RunFixture::of_blocks(&["b_1"], "r1 a").await;
     fixture.run(&options(1)).await;
-    let results = fixture.catalog.block_results().await.expect("a read");
-    let face = &results.values().next().expect("a block")[0];
+    let blocks = fixture.catalog.audited_blocks().await.expect("a read");
+    let face = &blocks[0].results[0];
     let path = fixture.project.artifact_path(&face.files["heights.txt"]);
     std::fs::remove_file(&path).expect("removed");
     fixture.write("b_1", "png", "a new scan of the page");
