@@ -22,7 +22,7 @@ const MIN_PART: f64 = 0.25;
 const SUPPORT_STEP_MM: f64 = 10.0;
 const SUPPORT_REACH_MM: f64 = 30.0;
 /// Places with at least this support belong to the part of the face that agrees.
-pub const MIN_SUPPORT: f64 = 0.6;
+const MIN_SUPPORT: f64 = 0.6;
 
 /// How well the places of a face agree with a page.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

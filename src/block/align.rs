@@ -4,7 +4,7 @@ use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
 use super::coarse::{self, CoarsePosition, CoarseRange};
 use super::error::BlockError;
 use super::field::ShiftField;
-use super::height_map::{HeightMap, StoredHeights};
+use super::height_map::{HEIGHT_STEP_MM, HeightMap, StoredHeights};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
@@ -134,7 +134,11 @@ struct Candidate {
 ///
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
-pub fn align(sides: &[Face], page: &PageInk) -> Result<Alignment, BlockError> {
+pub fn align(sides: &[&Face], page: &PageInk) -> Result<Alignment, BlockError> {
+    if sides.is_empty() {
+        let found = "no side has a large flat part".to_owned();
+        return Err(BlockError::NoFace { found });
+    }
     let mut best: Option<Alignment> = None;
     for search in [
         SearchRange::Narrow,
@@ -157,6 +161,8 @@ pub fn align(sides: &[Face], page: &PageInk) -> Result<Alignment, BlockError> {
     match best {
         Some(alignment) if alignment.agreement.is_sure() => Ok(alignment),
         best => Err(BlockError::Refused {
+            width_mm: sides[0].map.heights.width() as f64 * HEIGHT_STEP_MM,
+            height_mm: sides[0].map.heights.height() as f64 * HEIGHT_STEP_MM,
             share: 100.0 * best.map_or(0.0, |best| best.agreement.share),
             needed: 100.0 * MIN_AGREEMENT,
         }),
@@ -164,7 +170,7 @@ pub fn align(sides: &[Face], page: &PageInk) -> Result<Alignment, BlockError> {
 }
 
 /// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(sides: &[Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
+fn refined(sides: &[&Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
     let mut best: Option<Candidate> = None;
     for (side, block) in sides.iter().enumerate() {
         let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
@@ -181,7 +187,7 @@ fn refined(sides: &[Face], page: &PageInk, search: SearchRange) -> Option<Alignm
         }
     }
     let best = best?;
-    let block = &sides[best.side];
+    let block = sides[best.side];
     let (mut map, mut last) = (best.map, None);
     let mut shrunk = ROUNDS[0].0.shrink;
     let mut relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);

@@ -1,8 +1,9 @@
 //! The interface between block jobs and the stages that compute them.
 
 use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
 
@@ -53,6 +54,9 @@ pub trait BlockArtifacts: Sync {
     fn read(&self, record: &BlockStageRecord, role: &str) -> Result<Vec<u8>, BlockStageError>;
 }
 
+/// Bytes between two looks at whether the run stops.
+const READ_STEP: u64 = 4 << 20;
+
 /// An input file of a block, which may be opened as often as needed. Its content is the same each time: the runner
 /// compares size, modification time and hash before and after a stage.
 #[derive(Debug, Clone)]
@@ -92,6 +96,41 @@ impl BlockFile {
     /// Returns an error if it cannot be opened.
     pub fn open(&self) -> Result<File, BlockStageError> {
         self.input.open().map_err(BlockStageError::from)
+    }
+
+    /// Reads the whole file, up to `limit` bytes.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be read, is longer, or the run stops meanwhile.
+    pub fn read(&self, limit: u64, stop: &AtomicBool) -> Result<Vec<u8>, BlockStageError> {
+        if self.bytes > limit {
+            let text = format!(
+                "it has {} bytes, more than the limit of {limit}",
+                self.bytes
+            );
+            return Err(self.failed(FailureClass::BadInput, text));
+        }
+        let mut file = self.open()?;
+        let mut bytes = Vec::with_capacity(self.bytes as usize);
+        loop {
+            if stop.load(Ordering::Relaxed) {
+                return Err(BlockStageError::Stopped);
+            }
+            let part = (&mut file).take(READ_STEP).read_to_end(&mut bytes);
+            match part.map_err(|error| self.unreadable(error))? {
+                0 => return Ok(bytes),
+                _ if bytes.len() as u64 > limit => {
+                    let text = format!("it grew beyond the limit of {limit} bytes");
+                    return Err(self.failed(FailureClass::BadInput, text));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Returns the failure of a read of this file.
+    pub fn unreadable(&self, error: io::Error) -> BlockStageError {
+        InputError::io(self.input.path(), error).into()
     }
 
     /// Returns a failure of this file that a retry does not change, with its name before the message.

@@ -68,7 +68,7 @@ pub async fn plan(
     let mut blocks = Vec::new();
     if selection.is_none() {
         block_inputs::store_changes(project, catalog, &limits).await?;
-        let settings = block_settings(&BlockPipeline);
+        let settings = block_settings(&BlockPipeline::new(options));
         blocks = catalog.plan_blocks(&settings, options.rerun).await?;
     }
     Ok(RunPlan { pairs, blocks })
@@ -101,7 +101,7 @@ pub async fn run(
     page_vec::keep_memory(options.memory);
     let executors = Executors {
         pairs: Arc::new(PipelineExecutor::new(project, settings, options)),
-        blocks: Arc::new(BlockPipeline),
+        blocks: Arc::new(BlockPipeline::new(options)),
     };
     let fingerprints = fingerprints(settings);
     run_with(
