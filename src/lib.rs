@@ -55,6 +55,18 @@
 //! text of a cell).
 //! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
+//! ## Whole blocks
+//!
+//! A whole **block** is the scan of a carved face with the image of its page. Its job has the stages `face`, `align`,
+//! `boxes` and `cut`, and rows of its own in the catalog (`catalog/blocks`). A process works on one block at a time, and on
+//! pairs only while it has no block: `block_slot.rs` in `runner` leases it, `block_task.rs` reads the versions of its
+//! files and computes a stage on a thread, and `block_checkpoint.rs` stores the result before the next stage begins. The
+//! stages are called through the trait in `block_stages.rs`. `catalog/blocks/cut.rs` stores the last stage and its pairs in
+//! one transaction: it adds new pairs, sends changed ones back to the first stage, and retires those whose boxes are gone.
+//! A retired pair has no row in `job`, only one in `retired_pair` (`catalog/blocks/retired.rs`), so that no other statement
+//! has to leave it out. `catalog/blocks/staleness.rs` compares what each result was made with (settings, hashes of the
+//! files, attributes) with the present, for the start of a run and for `--dry-run`.
+//!
 //! ## Two databases
 //!
 //! The catalog is a file of SQLite, or in PostgreSQL so that several computers can share it. `db/conn.rs` holds a connection

@@ -70,7 +70,7 @@ pub(super) async fn store_stage(
         inputs: block.inputs.clone(),
         ms,
         at: context.clock.now(),
-        next_deadline: context.deadline(),
+        next_deadline: context.block_deadline(),
         alive_since: context.alive_since(),
     };
     let after = match stage.next() {

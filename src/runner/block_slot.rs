@@ -56,7 +56,7 @@ impl BlockSlot {
             return Ok(false);
         }
         let context = &self.context;
-        let (deadline, alive_since) = (context.deadline(), context.alive_since());
+        let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
         let catalog = &context.catalog;
         let claimed = catalog.retry_while_unavailable(async || {
             catalog.claim_block(worker, deadline, alive_since).await

@@ -158,7 +158,7 @@ pub(super) async fn run_with(
         let ended = RunEnd {
             counts: RunCounts::default(),
             left,
-            blocks: catalog.outstanding_blocks().await?,
+            blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
             status,
             compute_time: Duration::ZERO,
         };
@@ -207,7 +207,7 @@ pub(super) async fn run_with(
     let ended = RunEnd {
         counts,
         left,
-        blocks: catalog.outstanding_blocks().await?,
+        blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
         status,
         compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
     };
@@ -339,6 +339,17 @@ async fn selection(
         return Err(RunError::NoSuchPair(unknown));
     }
     Ok(Some(catalog.select(names).await?))
+}
+
+/// Counts the blocks that are left to run and those that failed. A run of named pairs does not work on blocks.
+async fn outstanding_blocks(
+    catalog: &Catalog,
+    selection: Option<&PairSelection>,
+) -> Result<OutstandingBlocks, RunError> {
+    match selection {
+        None => Ok(catalog.outstanding_blocks().await?),
+        Some(_) => Ok(OutstandingBlocks::default()),
+    }
 }
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.

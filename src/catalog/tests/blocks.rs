@@ -550,3 +550,63 @@ async fn judge(world: &World, pair: &str) {
     let stored = world.catalog.verdict_set(vec![verdict], 5).await;
     stored.expect("stored");
 }
+
+#[tokio::test]
+async fn verdicts_of_a_retired_pair_are_kept_but_not_counted() {
+    let world = world().await;
+    world.finish_block(vec![character("a", "a")]).await;
+    world.finish_one().await;
+    judge(&world, "b_a").await;
+    let fingerprints = super::fingerprints([1; 4]);
+    let status = world.catalog.status(&fingerprints).await.expect("a read");
+    assert_eq!((status.pairs, status.verdicts[&Verdict::Pass]), (1, 1));
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let reset = vec![(known[0].block, BlockStage::Cut)];
+    world.catalog.reset_blocks(reset).await.expect("reset");
+    assert_eq!(world.finish_block(Vec::new()).await, stored(0, 0, 0, 1));
+    let status = world.catalog.status(&fingerprints).await.expect("a read");
+    assert_eq!((status.pairs, status.verdicts[&Verdict::Pass]), (0, 0));
+    assert_eq!(
+        world.catalog.verdict_log(None).await.expect("a read").len(),
+        1
+    );
+    // An import of the same pair brings it back too.
+    let row = super::row("b_a");
+    world.catalog.import(vec![row], 2).await.expect("imported");
+    world.assert_counters().await;
+    assert_eq!(status_of(&world, "b_a").await, Some(JobStatus::Done));
+    assert_eq!(world.catalog.retired_pairs().await.expect("a read"), []);
+}
+
+#[tokio::test]
+async fn a_copy_holds_blocks_and_retired_pairs() {
+    let world = world().await;
+    let cut = vec![character("a", "a"), character("b", "b")];
+    world.finish_block(cut).await;
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let reset = vec![(known[0].block, BlockStage::Cut)];
+    world.catalog.reset_blocks(reset).await.expect("reset");
+    world.finish_block(vec![character("a", "a")]).await;
+    let target = super::Place::new();
+    let copy = target.create().await.expect("a catalog");
+    world
+        .catalog
+        .copy_to(&copy, |_, _| {})
+        .await
+        .expect("copied");
+    let states = |catalog: crate::catalog::Catalog| async move {
+        let states = catalog.block_states().await.expect("a read");
+        let characters = catalog.block_characters(&block("b")).await;
+        let retired = catalog.retired_pairs().await.expect("a read");
+        (states, characters.expect("a read"), retired)
+    };
+    let found = states(copy.clone()).await;
+    assert_eq!(found, states(world.catalog.clone()).await);
+    assert_eq!(found.2, [name("b_b")]);
+    let counters = copy.counters().await.expect("counters");
+    assert_eq!(counters, copy.recount().await.expect("a recount"));
+    // New rows of the copy get new numbers.
+    let imported = copy.import_blocks(vec![attributes("c")], 3).await;
+    assert_eq!(imported.expect("imported").added, 1);
+    assert_eq!(copy.faulty_rows().await.expect("a read"), []);
+}
