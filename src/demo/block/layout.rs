@@ -1,0 +1,288 @@
+//! The layout of a page: columns of characters from right to left inside a frame of rules.
+//!
+//! All positions are in mm in the face frame: u to the right and v down, as the print is read. The origin is the middle
+//! of the block.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::column::{Column, ColumnText};
+use super::kind::BlockRanges;
+use super::text_source::TextSource;
+use crate::demo::draw::within;
+use crate::demo::polygon::BoundsMm;
+
+/// Most characters of a page, without notes.
+const MAX_CELLS: usize = 520;
+/// Fewest and most rows of a column.
+const ROWS: [usize; 2] = [10, 22];
+/// Fewest columns.
+const MIN_COLUMNS: usize = 7;
+
+/// Gap between the frame and the first and last characters, mm.
+const HEAD_MM: f64 = 0.8;
+
+/// One character of a page.
+#[derive(Debug, Clone)]
+pub(super) struct TextCell {
+    /// Name by column and row, such as `c03-r12` or `c03-r12a`.
+    pub name: String,
+    /// The character.
+    pub character: char,
+    /// Middle of its cell, mm.
+    pub centre: [f64; 2],
+    /// Side of the font's em square, mm.
+    pub em_mm: f64,
+    /// Rotation, rad, clockwise on the print.
+    pub angle_rad: f64,
+    /// Whether it belongs to a note.
+    pub is_note: bool,
+    /// Whether it belongs to the middle strip.
+    pub is_strip: bool,
+}
+
+/// A straight rule.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PageRule {
+    /// End points, mm.
+    pub ends: [[f64; 2]; 2],
+    /// Half the width, mm.
+    pub half_width_mm: f64,
+}
+
+/// A fish tail: a black rectangle with a V-shaped notch in one side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FishTail {
+    /// Middle, mm.
+    pub centre: [f64; 2],
+    /// Half the width and half the height, mm.
+    pub half_mm: [f64; 2],
+    /// 1 if the notch is at the bottom, -1 if it is at the top.
+    pub notch: f64,
+}
+
+/// The text of a page and where it stands.
+#[derive(Debug, Clone)]
+pub(super) struct PageLayout {
+    /// The characters, column by column from the right, each from the top.
+    pub cells: Vec<TextCell>,
+    /// Frame, rules between columns and those beside the middle strip.
+    pub rules: Vec<PageRule>,
+    /// Ornaments of the middle strip.
+    pub fish_tails: Vec<FishTail>,
+    /// Outer edge of the frame.
+    pub outer: BoundsMm,
+    /// Position of the fold, mm, if the page is folded.
+    pub fold_u: Option<f64>,
+}
+
+/// Sizes of the parts of a page, mm.
+#[derive(Debug, Clone, Copy)]
+struct Measures {
+    row_pitch: f64,
+    column_pitch: f64,
+    rows: usize,
+    columns: usize,
+    /// Width of the middle strip; 0 without one.
+    strip: f64,
+    /// Gap between the outer and the inner rule of the frame.
+    frame_gap: f64,
+    outer_half_width: f64,
+    inner_half_width: f64,
+}
+
+impl PageLayout {
+    /// Draws the layout and the text of a page.
+    pub(super) fn draw(
+        ranges: &BlockRanges,
+        is_folded: bool,
+        texts: &TextSource,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
+        let measures = Measures::draw(ranges, is_folded, rng);
+        let width = measures.column_pitch * measures.columns as f64 + measures.strip;
+        let height = measures.row_pitch * measures.rows as f64 + 2.0 * HEAD_MM;
+        let inner = BoundsMm {
+            min: [-width / 2.0, -height / 2.0],
+            max: [width / 2.0, height / 2.0],
+        };
+        let margin = measures.outer_line() + measures.outer_half_width;
+        let mut page = Self {
+            cells: Vec::new(),
+            rules: Vec::new(),
+            fish_tails: Vec::new(),
+            outer: BoundsMm {
+                min: inner.min.map(|c| c - margin),
+                max: inner.max.map(|c| c + margin),
+            },
+            fold_u: is_folded.then_some(0.0),
+        };
+        page.add_frame(inner, &measures);
+        page.add_columns(inner, &measures, ranges, texts, rng);
+        page
+    }
+
+    fn add_frame(&mut self, inner: BoundsMm, measures: &Measures) {
+        let outer_line = measures.outer_line();
+        for (offset, half_width_mm) in [
+            (0.0, measures.inner_half_width),
+            (outer_line, measures.outer_half_width),
+        ] {
+            let [u0, v0] = inner.min.map(|c| c - offset);
+            let [u1, v1] = inner.max.map(|c| c + offset);
+            let corners = [[u0, v0], [u1, v0], [u1, v1], [u0, v1]];
+            for i in 0..4 {
+                self.rules.push(PageRule {
+                    ends: [corners[i], corners[(i + 1) % 4]],
+                    half_width_mm,
+                });
+            }
+        }
+    }
+
+    /// Adds the columns from the right, with rules between them, and the middle strip.
+    fn add_columns(
+        &mut self,
+        inner: BoundsMm,
+        measures: &Measures,
+        ranges: &BlockRanges,
+        texts: &TextSource,
+        rng: &mut ChaCha8Rng,
+    ) {
+        let notes = within(ranges.notes, rng);
+        let has_rules = rng.random_bool(0.85);
+        let rule_half_width = rng.random_range(0.12..0.22);
+        let text = ColumnText::draw(measures.row_pitch, measures.column_pitch, notes, rng);
+        let strip_at = measures.columns / 2;
+        let mut right = inner.max[0];
+        let mut number = 0;
+        for index in 0..measures.columns {
+            if measures.strip > 0.0 && index == strip_at {
+                number += 1;
+                let strip = Column {
+                    number,
+                    middle_u: right - measures.strip / 2.0,
+                    width: measures.strip,
+                    top: inner.min[1],
+                    rows: measures.rows,
+                };
+                self.add_strip(&strip, measures, texts, rng);
+                right -= measures.strip;
+            }
+            number += 1;
+            let column = Column {
+                number,
+                middle_u: right - measures.column_pitch / 2.0,
+                width: measures.column_pitch,
+                top: inner.min[1] + HEAD_MM,
+                rows: measures.rows,
+            };
+            let is_last = index + 1 == measures.columns;
+            self.cells.extend(text.fill(&column, is_last, texts, rng));
+            right -= measures.column_pitch;
+            let beside_strip = measures.strip > 0.0 && index + 1 == strip_at;
+            if (has_rules || beside_strip) && !is_last {
+                self.add_vertical_rule(right, inner, rule_half_width);
+            }
+            if measures.strip > 0.0 && index + 1 == strip_at {
+                self.add_vertical_rule(right - measures.strip, inner, rule_half_width);
+            }
+        }
+    }
+
+    fn add_vertical_rule(&mut self, u: f64, inner: BoundsMm, half_width_mm: f64) {
+        self.rules.push(PageRule {
+            ends: [[u, inner.min[1]], [u, inner.max[1]]],
+            half_width_mm,
+        });
+    }
+
+    /// Adds the middle strip: a fish tail, the title below it, a second fish tail, and the number of the leaf.
+    fn add_strip(
+        &mut self,
+        strip: &Column,
+        measures: &Measures,
+        texts: &TextSource,
+        rng: &mut ChaCha8Rng,
+    ) {
+        let em_mm = (0.78 * measures.strip).min(0.85 * measures.row_pitch);
+        let half_mm = [
+            measures.strip / 2.0 - 0.9,
+            rng.random_range(0.35..0.6) * measures.strip,
+        ];
+        let pitch = em_mm * 1.12;
+        let height = measures.row_pitch * measures.rows as f64;
+        let first = strip.top + height * rng.random_range(0.14..0.24);
+        let u = strip.middle_u;
+        self.fish_tails.push(FishTail {
+            centre: [u, first],
+            half_mm,
+            notch: 1.0,
+        });
+        let mut v = first + half_mm[1] + 0.4 * pitch;
+        let mut row = 0;
+        let title = rng.random_range(2..5_usize);
+        for index in 0..title + rng.random_range(1..4_usize) {
+            if index == title {
+                v = v.max(strip.top + height * 0.6) + half_mm[1];
+                if rng.random_bool(0.6) {
+                    self.fish_tails.push(FishTail {
+                        centre: [u, v],
+                        half_mm,
+                        notch: -1.0,
+                    });
+                }
+                v += half_mm[1] + 0.4 * pitch;
+            }
+            row += 1;
+            v += pitch;
+            self.cells.push(TextCell {
+                name: format!("c{:02}-r{row:02}", strip.number),
+                character: texts.character(rng),
+                centre: [u, v - pitch / 2.0],
+                em_mm,
+                angle_rad: rng.random_range(-0.02..0.02),
+                is_note: false,
+                is_strip: true,
+            });
+        }
+    }
+}
+
+impl Measures {
+    /// Returns the distance of the frame's outer rule from the inner one, mm.
+    fn outer_line(&self) -> f64 {
+        self.inner_half_width + self.frame_gap + self.outer_half_width
+    }
+
+    fn draw(ranges: &BlockRanges, is_folded: bool, rng: &mut ChaCha8Rng) -> Self {
+        let scale = within(ranges.scale, rng);
+        let row_pitch = scale * rng.random_range(10.0..13.6);
+        let height = rng.random_range(175.0..222.0);
+        let rows = ((height / row_pitch) as usize).clamp(ROWS[0], ROWS[1]);
+        let column_pitch = row_pitch * rng.random_range(1.1..1.42);
+        let strip = if is_folded {
+            row_pitch * rng.random_range(0.75..1.0)
+        } else {
+            0.0
+        };
+        let width = rng.random_range(235.0..300.0);
+        let fitting = ((width - strip) / column_pitch) as usize;
+        let columns = fitting.clamp(MIN_COLUMNS, (MAX_CELLS / rows).max(MIN_COLUMNS));
+        Self {
+            row_pitch,
+            column_pitch,
+            rows,
+            // Both halves of a folded page have the same number of columns.
+            columns: if is_folded {
+                columns - columns % 2
+            } else {
+                columns
+            },
+            strip,
+            frame_gap: rng.random_range(0.9..1.6),
+            outer_half_width: rng.random_range(0.5..1.0),
+            inner_half_width: rng.random_range(0.15..0.25),
+        }
+    }
+}
