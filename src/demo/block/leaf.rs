@@ -154,6 +154,8 @@ impl PageScene {
             (gutter, clip, shift, [self.sheet.min[0], other_fold - shift])
         };
         self.gutter_u = Some(gutter);
+        // Beyond the gutter lies the other leaf.
+        self.clip_u[usize::from(!is_left)] = gutter;
         let shift_v = rng.random_range(-3.0..3.0);
         let angle = rng.random_range(-0.008..0.008);
         self.other = Some((clip, [shift_u, shift_v], angle));
