@@ -185,7 +185,11 @@ impl TruthSide<'_> {
             return false;
         };
         let corners = [0, 1, 2, 3].map(|k| {
-            let u = if k % 2 == 0 { bounds.min[0] } else { bounds.max[0] };
+            let u = if k % 2 == 0 {
+                bounds.min[0]
+            } else {
+                bounds.max[0]
+            };
             let v = if k < 2 { bounds.min[1] } else { bounds.max[1] };
             [u, v]
         });
@@ -232,7 +236,9 @@ impl TruthSide<'_> {
             let intact = deep.filter(|(point, _)| is_intact(*point, least));
             intact.map(|(point, _)| *point).collect::<Vec<_>>()
         });
-        let enough = choices.into_iter().find(|points| points.len() >= 3 * LANDMARKS);
+        let enough = choices
+            .into_iter()
+            .find(|points| points.len() >= 3 * LANDMARKS);
         let points = enough.unwrap_or_else(|| carved.iter().map(|(point, _)| *point).collect());
         spread(&points, LANDMARKS)
             .into_iter()
@@ -268,8 +274,13 @@ fn spread(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
             let to_point = (other[0] - point[0]).hypot(other[1] - point[1]);
             *distance = distance.min(to_point);
         }
-        let farthest = distances.iter().zip(points).max_by(|a, b| a.0.total_cmp(b.0));
-        next = farthest.filter(|(distance, _)| **distance > 0.0).map(|(_, point)| *point);
+        let farthest = distances
+            .iter()
+            .zip(points)
+            .max_by(|a, b| a.0.total_cmp(b.0));
+        next = farthest
+            .filter(|(distance, _)| **distance > 0.0)
+            .map(|(_, point)| *point);
     }
     chosen
 }

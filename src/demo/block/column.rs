@@ -13,8 +13,6 @@ pub(super) struct Column {
     pub number: usize,
     /// Middle, along u.
     pub middle_u: f64,
-    /// Width.
-    pub width: f64,
     /// Upper end, along v.
     pub top: f64,
     /// Number of rows of full-size characters.
@@ -46,7 +44,12 @@ enum Segment {
 
 impl ColumnText {
     /// Draws sizes for columns with the given pitches in mm. `notes` is the share of columns that contain notes.
-    pub(super) fn draw(row_pitch: f64, column_pitch: f64, notes: f64, rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(
+        row_pitch: f64,
+        column_pitch: f64,
+        notes: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let em_mm = (row_pitch * rng.random_range(0.9..0.97)).min(column_pitch - 1.2);
         let note_pitch = row_pitch * rng.random_range(0.5..0.62);
         let note_offset = (column_pitch - 1.0) / 4.0;
@@ -118,7 +121,9 @@ impl ColumnText {
         let mut segments = vec![Segment::Blank; indent];
         let mut row = indent;
         if self.notes > 0.0 && rng.random_bool(self.notes.min(1.0)) {
-            let rows = rng.random_range(2..7_usize).min(end.saturating_sub(indent).max(1));
+            let rows = rng
+                .random_range(2..7_usize)
+                .min(end.saturating_sub(indent).max(1));
             let start = rng.random_range(indent..=end.saturating_sub(rows).max(indent));
             segments.extend((row..start).map(|_| self.character_or_blank(rng)));
             segments.push(Segment::Notes { rows });

@@ -83,12 +83,7 @@ impl FaceField {
     }
 
     /// Raises the samples within a box to the values of a function of the position.
-    fn raise(
-        &mut self,
-        reach: BoundsMm,
-        owner: u16,
-        mut inside: impl FnMut([f64; 2]) -> f64,
-    ) {
+    fn raise(&mut self, reach: BoundsMm, owner: u16, mut inside: impl FnMut([f64; 2]) -> f64) {
         let last = [self.values.width() - 1, self.values.height() - 1].map(|c| c as f64);
         let limit = |point: [f64; 2]| {
             let sample = self.sample(point);

@@ -162,7 +162,6 @@ impl PageLayout {
                 let strip = Column {
                     number,
                     middle_u: right - measures.strip / 2.0,
-                    width: measures.strip,
                     top: inner.min[1],
                     rows: measures.rows,
                 };
@@ -173,7 +172,6 @@ impl PageLayout {
             let column = Column {
                 number,
                 middle_u: right - measures.column_pitch / 2.0,
-                width: measures.column_pitch,
                 top: inner.min[1] + HEAD_MM,
                 rows: measures.rows,
             };
@@ -284,5 +282,76 @@ impl Measures {
             outer_half_width: rng.random_range(0.5..1.0),
             inner_half_width: rng.random_range(0.15..0.25),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::PageLayout;
+    use crate::demo::block::kind::BlockKind;
+    use crate::demo::block::seeding::part_rng;
+    use crate::demo::block::text_source::TextSource;
+    use crate::demo::glyph::Glyphs;
+
+    fn layouts(kind: BlockKind) -> Vec<PageLayout> {
+        let glyphs = Glyphs::embedded();
+        let texts = TextSource::draw(&glyphs, &mut part_rng(1, 0));
+        let draw = |seed: u64| {
+            let mut rng = part_rng(seed, 3);
+            PageLayout::draw(kind.ranges(), seed % 2 == 0, &texts, &mut rng)
+        };
+        (0..24).map(draw).collect()
+    }
+
+    #[test]
+    fn names_are_unique_and_columns_run_from_right_to_left() {
+        for page in layouts(BlockKind::Notes) {
+            let names: BTreeSet<&str> = page.cells.iter().map(|cell| cell.name.as_str()).collect();
+            assert_eq!(names.len(), page.cells.len());
+            for (one, next) in page.cells.iter().zip(&page.cells[1..]) {
+                if one.name[..3] == next.name[..3] {
+                    let is_below = next.centre[1] > one.centre[1] - 0.5;
+                    assert!(is_below, "{} before {}", one.name, next.name);
+                } else {
+                    assert!(next.centre[0] < one.centre[0], "{}", next.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pages_hold_as_many_characters_as_real_ones() {
+        for kind in [BlockKind::Plain, BlockKind::Fine] {
+            for page in layouts(kind) {
+                assert!(
+                    (85..=560).contains(&page.cells.len()),
+                    "{}",
+                    page.cells.len()
+                );
+                let size = [0, 1].map(|i| page.outer.max[i] - page.outer.min[i]);
+                assert!((180.0..310.0).contains(&size[0]), "{size:?}");
+                assert!((130.0..235.0).contains(&size[1]), "{size:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn notes_have_half_the_size_and_do_not_overlap() {
+        let mut notes = 0;
+        for page in layouts(BlockKind::Notes) {
+            let largest = page.cells.iter().map(|cell| cell.em_mm).fold(0.0, f64::max);
+            let all: Vec<_> = page.cells.iter().filter(|cell| cell.is_note).collect();
+            notes += all.len();
+            for (k, cell) in all.iter().enumerate() {
+                assert!(cell.em_mm < 0.68 * largest, "{} of {largest}", cell.em_mm);
+                for other in &all[k + 1..] {
+                    let apart = [0, 1].map(|i| (cell.centre[i] - other.centre[i]).abs());
+                    assert!(apart[0].max(apart[1]) > 0.8 * cell.em_mm, "{}", cell.name);
+                }
+            }
+        }
+        assert!(notes > 500, "{notes}");
     }
 }

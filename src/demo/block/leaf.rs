@@ -105,7 +105,11 @@ impl PageScene {
         for axis in 0..2 {
             for end in 0..2 {
                 let outward = if end == 0 { -1.0 } else { 1.0 };
-                let at = if end == 0 { text.min[axis] } else { text.max[axis] };
+                let at = if end == 0 {
+                    text.min[axis]
+                } else {
+                    text.max[axis]
+                };
                 let is_fold = axis == 0
                     && match ranges.extent {
                         PageExtent::Whole => false,

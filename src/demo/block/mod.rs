@@ -32,6 +32,9 @@ mod text_source;
 mod via_labels;
 mod world;
 
+#[cfg(test)]
+mod tests;
+
 pub use block_truth::{BlockCharacterTruth, BlockLandmark, BlockTruth};
 pub use kind::BlockKind;
 pub use mesh_file::BlockMeshFormat;

@@ -120,12 +120,16 @@ impl PageRendering<'_> {
             if carved < -INK_REACH_MM {
                 return (speck, None);
             }
-            let lost = leaf.damage.map_or(f64::NEG_INFINITY, |damage| damage.lost_mm(face, true));
+            let lost = leaf
+                .damage
+                .map_or(f64::NEG_INFINITY, |damage| damage.lost_mm(face, true));
             let cover = self.ink.cover(face, carved.min(-lost), px_mm);
             if cover <= 0.0 {
                 return (speck, None);
             }
-            let cracked = leaf.damage.is_some_and(|damage| damage.is_cracked_in_print(face));
+            let cracked = leaf
+                .damage
+                .is_some_and(|damage| damage.is_cracked_in_print(face));
             let density = self.ink.density(face) * if cracked { 0.12 } else { 1.0 };
             let is_stroke = index == 0 && cover > 0.5;
             let character = is_stroke.then(|| leaf.field.owner(face)).flatten();

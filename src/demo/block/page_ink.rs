@@ -64,7 +64,8 @@ impl PageInk {
     /// Returns the ink density, 0..=1, of a printed stroke.
     pub(super) fn density(&self, [u, v]: [f64; 2]) -> f64 {
         let pressure = smoothstep(-0.9, 0.4, self.pressure.two_octaves(u / 45.0, v / 45.0));
-        let dry = self.dryness * smoothstep(0.1, 0.9, self.dry_patches.two_octaves(u / 14.0, v / 14.0));
+        let dry =
+            self.dryness * smoothstep(0.1, 0.9, self.dry_patches.two_octaves(u / 14.0, v / 14.0));
         let bristle = self.bristles.two_octaves(u / 0.3, v / 0.3);
         let edge = lerp(1.4, 0.2, dry);
         let missing = 0.85 * smoothstep(edge, edge + 0.45, bristle);

@@ -50,9 +50,8 @@ impl PageMap {
         rng: &mut ChaCha8Rng,
     ) -> (Self, [usize; 2]) {
         let warp_mm = within(ranges.warp_mm, rng);
-        let waves = [0; 2].map(|_: i32| {
-            WAVE_SHARES.map(|share| SheetWave::draw(share * warp_mm, rng))
-        });
+        let waves =
+            [0; 2].map(|_: i32| WAVE_SHARES.map(|share| SheetWave::draw(share * warp_mm, rng)));
         let shrink = [0; 2].map(|_: i32| 1.0 - within(ranges.shrink, rng));
         let shear = rng.random_range(-1.0..1.0) * ranges.shear;
         let angle = (rng.random_range(-1.0..1.0) * ranges.rotation_deg).to_radians();
@@ -173,4 +172,46 @@ fn inverse([[a, b], [c, d]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
         [d / determinant, -b / determinant],
         [-c / determinant, a / determinant],
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PageMap;
+    use crate::demo::block::kind::BlockKind;
+    use crate::demo::block::seeding::part_rng;
+    use crate::demo::polygon::BoundsMm;
+
+    const VIEW: BoundsMm = BoundsMm {
+        min: [-150.0, -110.0],
+        max: [150.0, 110.0],
+    };
+
+    #[test]
+    fn inverse_leads_back_and_the_image_contains_the_view() {
+        for (seed, kind) in (0..30).zip(BlockKind::ALL.into_iter().cycle()) {
+            let (map, size) = PageMap::draw(kind.ranges(), VIEW, &mut part_rng(seed, 0));
+            for point in [[0.0, 0.0], [-149.0, 109.0], [149.0, -109.0], [-20.0, 75.0]] {
+                let pixel = map.page_from_face(point);
+                let back = map.face_from_page(pixel);
+                assert!((back[0] - point[0]).hypot(back[1] - point[1]) < 1e-6);
+                assert!(pixel[0] >= 0.0 && pixel[0] < size[0] as f64);
+                assert!(pixel[1] >= 0.0 && pixel[1] < size[1] as f64);
+            }
+        }
+    }
+
+    #[test]
+    fn a_turned_page_is_not_mirrored() {
+        for seed in 0..8 {
+            let ranges = BlockKind::QuarterTurn.ranges();
+            let (map, _) = PageMap::draw(ranges, VIEW, &mut part_rng(seed, 0));
+            let [origin, right, down] =
+                [[0.0, 0.0], [50.0, 0.0], [0.0, 50.0]].map(|point| map.page_from_face(point));
+            let [a, b] = [right, down].map(|end| [end[0] - origin[0], end[1] - origin[1]]);
+            assert!(a[0] * b[1] - a[1] * b[0] > 0.0);
+            assert!((1..=3).contains(&map.turns));
+            let is_sideways = a[1].abs() > a[0].abs();
+            assert_eq!(is_sideways, map.turns % 2 == 1, "seed {seed}");
+        }
+    }
 }

@@ -98,7 +98,11 @@ fn write_side(solid: &BlockSolid, side: FaceSide, out: &mut impl Write) -> io::R
 }
 
 fn write_points(points: &[[f32; 3]], out: &mut impl Write) -> io::Result<()> {
-    let bytes: Vec<u8> = points.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    let bytes: Vec<u8> = points
+        .iter()
+        .flatten()
+        .flat_map(|c| c.to_le_bytes())
+        .collect();
     out.write_all(&bytes)
 }
 

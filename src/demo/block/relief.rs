@@ -197,8 +197,7 @@ impl CarvedGround {
         let bent = 0.6 * self.unevenness.at(u / 12.0 + 40.0, v / 12.0);
         let [along, across] = self.gouge_axis.along_across([u, v]);
         let marks = self.gouges.at(along / 7.0, across / 1.3 + bent).abs();
-        let floor = self.depth_mm
-            + 0.25 * self.unevenness.two_octaves(u / 9.0, v / 9.0)
+        let floor = self.depth_mm + 0.25 * self.unevenness.two_octaves(u / 9.0, v / 9.0)
             - self.gouge_mm * (1.0 - 2.0 * marks)
             + 0.04 * self.tool_marks.two_octaves(u / 0.5, v / 0.5);
         // Smooth minimum of wall and floor with a rounding of 0.3 mm.

@@ -25,7 +25,9 @@ pub(super) fn hash(seed: u64, x: u64, y: u64) -> u64 {
 /// numbers of 16 bits.
 pub(super) fn hashed_normal(seed: u64, x: u64, y: u64) -> f64 {
     let bits = hash(seed, x, y);
-    let sum = (0..4).map(|k| ((bits >> (16 * k)) & 0xFFFF) as f64).sum::<f64>();
+    let sum = (0..4)
+        .map(|k| ((bits >> (16 * k)) & 0xFFFF) as f64)
+        .sum::<f64>();
     // A uniform number on 0..1 has a variance of 1/12.
     (sum / 65_536.0 - 2.0) * 3.0_f64.sqrt()
 }

@@ -161,7 +161,11 @@ impl BlockSolid {
         let outward = (rough + noise) * (4.0 * t * (1.0 - t)).min(1.0);
         let [nx, ny] = [0, 1].map(|i| {
             let share = point[i] / self.half_mm[i];
-            if share.abs() > 0.97 { share.signum() } else { 0.0 }
+            if share.abs() > 0.97 {
+                share.signum()
+            } else {
+                0.0
+            }
         });
         [x + nx * outward, y + ny * outward, z]
     }

@@ -45,11 +45,8 @@ impl SupportMesh {
             let down = ring.saturating_sub(rings) as f64 * 3.0;
             for spoke in 0..spokes {
                 let (sin, cos) = (std::f64::consts::TAU * spoke as f64 / spokes as f64).sin_cos();
-                self.vertices.push([
-                    centre[0] + along * cos,
-                    centre[1] + along * sin,
-                    z - down,
-                ]);
+                self.vertices
+                    .push([centre[0] + along * cos, centre[1] + along * sin, z - down]);
             }
         }
         let is_hidden = |corner: &u32| {
@@ -59,9 +56,8 @@ impl SupportMesh {
         let mut triangles = Vec::new();
         for ring in 0..rings + 2 {
             for spoke in 0..spokes {
-                let at = |ring: usize, spoke: usize| {
-                    first + (ring * spokes + spoke % spokes) as u32
-                };
+                let at =
+                    |ring: usize, spoke: usize| first + (ring * spokes + spoke % spokes) as u32;
                 let quad = [
                     at(ring, spoke),
                     at(ring + 1, spoke),

@@ -33,9 +33,7 @@ pub(super) fn via_project(
         "regions": regions,
         "file_attributes": {},
     });
-    let text_attribute = |description: &str| {
-        json!({"type": "text", "description": description, "default_value": ""})
-    };
+    let text_attribute = |description: &str| json!({"type": "text", "description": description, "default_value": ""});
     let project = json!({
         "_via_settings": {"project": {"name": "block"}},
         "_via_img_metadata": {key.clone(): image},
@@ -55,7 +53,8 @@ pub(super) fn via_project(
 fn region(drawn: &LabelledBox, rng: &mut ChaCha8Rng) -> Value {
     let [x0, y0, x1, y1] = box_edges(drawn.ink).map(|edge| edge + 0.5);
     let (width, height) = (x1 - x0, y1 - y0);
-    let mut move_edge = |edge: f64, size: f64| (edge + rng.random_range(-SLACK..SLACK) * size).round();
+    let mut move_edge =
+        |edge: f64, size: f64| (edge + rng.random_range(-SLACK..SLACK) * size).round();
     let [left, right] = [x0, x1].map(|edge| move_edge(edge, width));
     let [top, bottom] = [y0, y1].map(|edge| move_edge(edge, height));
     json!({

@@ -262,9 +262,10 @@ fn scan_block(
     let ranges = choice.kind.ranges();
     let texts = [Some(&front), back.as_ref()];
     let half_mm = [0, 1].map(|axis| {
-        let reach = texts.iter().flatten().map(|(layout, _)| {
-            layout.outer.max[axis].max(-layout.outer.min[axis])
-        });
+        let reach = texts
+            .iter()
+            .flatten()
+            .map(|(layout, _)| layout.outer.max[axis].max(-layout.outer.min[axis]));
         reach.fold(0.0, f64::max) + rng.random_range(5.0..14.0)
     });
     let thickness_mm = rng.random_range(18.0..25.0);
