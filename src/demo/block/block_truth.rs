@@ -88,16 +88,24 @@ pub struct BlockCharacterTruth {
     pub centre: [f64; 3],
     /// Points on its strokes.
     pub landmarks: Vec<BlockLandmark>,
-    /// Whether it belongs to a note of half the size.
-    pub note: bool,
-    /// Whether it belongs to the middle strip.
-    pub strip: bool,
+    /// To which part of the text it belongs.
+    #[serde(flatten)]
+    pub part: BlockTextPart,
     /// Share of its stroke area that the block lost.
     pub lost: f64,
     /// Whether more than a quarter of its stroke area is lost.
     pub damaged: bool,
     /// Whether the page shows all of it.
     pub on_page: bool,
+}
+
+/// Part of the text of a page; neither for the main text.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct BlockTextPart {
+    /// A note of half the size.
+    pub note: bool,
+    /// The middle strip.
+    pub strip: bool,
 }
 
 /// A point on a stroke.
@@ -132,7 +140,7 @@ impl TruthSide<'_> {
         let bounds = self.relief.field.bounds(index);
         let [u0, v0] = bounds.min;
         let [u1, v1] = bounds.max;
-        let middle = [(u0 + u1) / 2.0, (v0 + v1) / 2.0];
+        let middle = [f64::midpoint(u0, u1), f64::midpoint(v0, v1)];
         let lost = self.lost_share(index, bounds);
         let ink = ink.filter(|_| self.map.is_some());
         BlockCharacterTruth {
@@ -143,8 +151,10 @@ impl TruthSide<'_> {
             box_mm: [u0, v0, u1, v1],
             centre: self.mesh_point(middle),
             landmarks: self.landmarks(index, bounds),
-            note: cell.is_note,
-            strip: cell.is_strip,
+            part: BlockTextPart {
+                note: cell.is_note,
+                strip: cell.is_strip,
+            },
             lost,
             damaged: lost > DAMAGED_SHARE,
             on_page: ink.is_some() && self.shows(index),

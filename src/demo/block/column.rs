@@ -125,15 +125,15 @@ impl ColumnText {
                 .random_range(2..7_usize)
                 .min(end.saturating_sub(indent).max(1));
             let start = rng.random_range(indent..=end.saturating_sub(rows).max(indent));
-            segments.extend((row..start).map(|_| self.character_or_blank(rng)));
+            segments.extend((row..start).map(|_| Self::character_or_blank(rng)));
             segments.push(Segment::Notes { rows });
             row = start + rows;
         }
-        segments.extend((row..end.max(row)).map(|_| self.character_or_blank(rng)));
+        segments.extend((row..end.max(row)).map(|_| Self::character_or_blank(rng)));
         segments
     }
 
-    fn character_or_blank(&self, rng: &mut ChaCha8Rng) -> Segment {
+    fn character_or_blank(rng: &mut ChaCha8Rng) -> Segment {
         // A blank cell sets off a new sentence or a name.
         if rng.random_bool(0.012) {
             Segment::Blank

@@ -35,12 +35,14 @@ pub enum BlockKind {
     Fine,
     /// The page of another block.
     WrongPage,
+    /// Text on both sides, notes, a warped sheet and damage, most of them milder.
+    Mixed,
 }
 
 enum_names! { pub BlockKind, "a kind of block":
     Plain = "plain", Notes = "notes", Warp = "warp", QuarterTurn = "quarter-turn", Back = "back",
     HalfPage = "half-page", OpenedBook = "opened-book", Broken = "broken", Holder = "holder",
-    Turntable = "turntable", ScannerBed = "scanner-bed", Fine = "fine", WrongPage = "wrong-page",
+    Turntable = "turntable", ScannerBed = "scanner-bed", Fine = "fine", WrongPage = "wrong-page", Mixed = "mixed",
 }
 
 /// Which part of the page an image shows.
@@ -224,6 +226,19 @@ const WRONG_PAGE: BlockRanges = BlockRanges {
     ..PLAIN
 };
 
+const MIXED: BlockRanges = BlockRanges {
+    notes: [0.2, 0.5],
+    double_faced: 1.0,
+    rotation_deg: 2.5,
+    shrink: [0.0, 0.02],
+    shear: 0.005,
+    warp_mm: [0.4, 1.0],
+    px_per_mm: [9.0, 12.0],
+    lost: [4.0, 10.0],
+    cracks: [1.0, 2.0],
+    ..PLAIN
+};
+
 impl BlockKind {
     /// Returns the ranges of the conditions.
     pub(super) const fn ranges(self) -> &'static BlockRanges {
@@ -241,6 +256,7 @@ impl BlockKind {
             Self::ScannerBed => &SCANNER_BED,
             Self::Fine => &FINE,
             Self::WrongPage => &WRONG_PAGE,
+            Self::Mixed => &MIXED,
         }
     }
 }

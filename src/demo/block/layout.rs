@@ -8,16 +8,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::column::{Column, ColumnText};
 use super::kind::BlockRanges;
+use super::page_measures::PageMeasures;
 use super::text_source::TextSource;
 use crate::demo::draw::within;
 use crate::demo::polygon::BoundsMm;
-
-/// Most characters of a page, without notes.
-const MAX_CELLS: usize = 520;
-/// Fewest and most rows of a column.
-const ROWS: [usize; 2] = [10, 22];
-/// Fewest columns.
-const MIN_COLUMNS: usize = 7;
 
 /// Gap between the frame and the first and last characters, mm.
 const HEAD_MM: f64 = 0.8;
@@ -76,21 +70,6 @@ pub(super) struct PageLayout {
     pub fold_u: Option<f64>,
 }
 
-/// Sizes of the parts of a page, mm.
-#[derive(Debug, Clone, Copy)]
-struct Measures {
-    row_pitch: f64,
-    column_pitch: f64,
-    rows: usize,
-    columns: usize,
-    /// Width of the middle strip; 0 without one.
-    strip: f64,
-    /// Gap between the outer and the inner rule of the frame.
-    frame_gap: f64,
-    outer_half_width: f64,
-    inner_half_width: f64,
-}
-
 impl PageLayout {
     /// Draws the layout and the text of a page.
     pub(super) fn draw(
@@ -99,7 +78,7 @@ impl PageLayout {
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
     ) -> Self {
-        let measures = Measures::draw(ranges, is_folded, rng);
+        let measures = PageMeasures::draw(ranges, is_folded, rng);
         let width = measures.column_pitch * measures.columns as f64 + measures.strip;
         let height = measures.row_pitch * measures.rows as f64 + 2.0 * HEAD_MM;
         let inner = BoundsMm {
@@ -122,7 +101,7 @@ impl PageLayout {
         page
     }
 
-    fn add_frame(&mut self, inner: BoundsMm, measures: &Measures) {
+    fn add_frame(&mut self, inner: BoundsMm, measures: &PageMeasures) {
         let outer_line = measures.outer_line();
         for (offset, half_width_mm) in [
             (0.0, measures.inner_half_width),
@@ -144,7 +123,7 @@ impl PageLayout {
     fn add_columns(
         &mut self,
         inner: BoundsMm,
-        measures: &Measures,
+        measures: &PageMeasures,
         ranges: &BlockRanges,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
@@ -199,7 +178,7 @@ impl PageLayout {
     fn add_strip(
         &mut self,
         strip: &Column,
-        measures: &Measures,
+        measures: &PageMeasures,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
     ) {
@@ -247,44 +226,6 @@ impl PageLayout {
     }
 }
 
-impl Measures {
-    /// Returns the distance of the frame's outer rule from the inner one, mm.
-    fn outer_line(&self) -> f64 {
-        self.inner_half_width + self.frame_gap + self.outer_half_width
-    }
-
-    fn draw(ranges: &BlockRanges, is_folded: bool, rng: &mut ChaCha8Rng) -> Self {
-        let scale = within(ranges.scale, rng);
-        let row_pitch = scale * rng.random_range(10.0..13.6);
-        let height = rng.random_range(175.0..222.0);
-        let rows = ((height / row_pitch) as usize).clamp(ROWS[0], ROWS[1]);
-        let column_pitch = row_pitch * rng.random_range(1.1..1.42);
-        let strip = if is_folded {
-            row_pitch * rng.random_range(0.75..1.0)
-        } else {
-            0.0
-        };
-        let width = rng.random_range(235.0..300.0);
-        let fitting = ((width - strip) / column_pitch) as usize;
-        let columns = fitting.clamp(MIN_COLUMNS, (MAX_CELLS / rows).max(MIN_COLUMNS));
-        Self {
-            row_pitch,
-            column_pitch,
-            rows,
-            // Both halves of a folded page have the same number of columns.
-            columns: if is_folded {
-                columns - columns % 2
-            } else {
-                columns
-            },
-            strip,
-            frame_gap: rng.random_range(0.9..1.6),
-            outer_half_width: rng.random_range(0.5..1.0),
-            inner_half_width: rng.random_range(0.15..0.25),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -300,7 +241,7 @@ mod tests {
         let texts = TextSource::draw(&glyphs, &mut part_rng(1, 0));
         let draw = |seed: u64| {
             let mut rng = part_rng(seed, 3);
-            PageLayout::draw(kind.ranges(), seed % 2 == 0, &texts, &mut rng)
+            PageLayout::draw(kind.ranges(), seed.is_multiple_of(2), &texts, &mut rng)
         };
         (0..24).map(draw).collect()
     }

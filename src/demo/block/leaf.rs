@@ -101,38 +101,42 @@ impl PageScene {
         if let (PageExtent::OpenedBook, Some(other)) = (ranges.extent, other) {
             text = scene.open_book(layout, other, is_left, rng);
         }
+        scene.add_margins(text, ranges, is_left, rng);
+        scene
+    }
+
+    /// Sets the edges of the sheet and of the image around a text. `is_left` says that the block's left half is shown.
+    fn add_margins(
+        &mut self,
+        text: BoundsMm,
+        ranges: &BlockRanges,
+        is_left: bool,
+        rng: &mut ChaCha8Rng,
+    ) {
         let bed_mm = within(ranges.bed_mm, rng);
-        for axis in 0..2 {
-            for end in 0..2 {
-                let outward = if end == 0 { -1.0 } else { 1.0 };
-                let at = if end == 0 {
-                    text.min[axis]
-                } else {
-                    text.max[axis]
+        for (axis, is_max) in [(0, false), (0, true), (1, false), (1, true)] {
+            let is_fold = axis == 0
+                && match ranges.extent {
+                    PageExtent::Whole => false,
+                    PageExtent::Half => is_max == is_left,
+                    PageExtent::OpenedBook => true,
                 };
-                let is_fold = axis == 0
-                    && match ranges.extent {
-                        PageExtent::Whole => false,
-                        PageExtent::Half => (end == 1) == is_left,
-                        PageExtent::OpenedBook => true,
-                    };
-                let margin = rng.random_range(4.0..16.0);
-                let (sheet, view) = if is_fold {
-                    (0.0, bed_mm + rng.random_range(-0.3..4.0))
-                } else if bed_mm > 0.0 {
-                    (margin, margin + bed_mm)
-                } else {
-                    (margin + HIDDEN_SHEET_MM, margin)
-                };
-                let (sheet, view) = (at + outward * sheet, at + outward * view);
-                if end == 0 {
-                    (scene.sheet.min[axis], scene.view.min[axis]) = (sheet, view);
-                } else {
-                    (scene.sheet.max[axis], scene.view.max[axis]) = (sheet, view);
-                }
+            let margin = rng.random_range(4.0..16.0);
+            let (sheet, view) = if is_fold {
+                (0.0, bed_mm + rng.random_range(-0.3..4.0))
+            } else if bed_mm > 0.0 {
+                (margin, margin + bed_mm)
+            } else {
+                (margin + HIDDEN_SHEET_MM, margin)
+            };
+            if is_max {
+                self.sheet.max[axis] = text.max[axis] + sheet;
+                self.view.max[axis] = text.max[axis] + view;
+            } else {
+                self.sheet.min[axis] = text.min[axis] - sheet;
+                self.view.min[axis] = text.min[axis] - view;
             }
         }
-        scene
     }
 
     /// Places a half of another leaf beside the visible half. In a book, the outer margins of both meet at the gutter.

@@ -1,11 +1,12 @@
 //! Whole blocks and their pages: one carved block with a page of text, the scan of it, the image of its page, and the
 //! exact truth.
 //!
-//! `kind` names the kinds and has their ranges. `layout`, `column` and `text_source` draw a page of text, `carved_text` and
+//! `kind` names the kinds and has their ranges. `layout`, `page_measures`, `column` and `text_source` draw a page of text, `carved_text` and
 //! `carved_line` its outlines, which `face_field` collects on a large grid. `relief` and `block_damage` compute the carved
 //! surface, `solid`, `support` and `pose` the scan, which `mesh_file` and `ply_file` write row by row. `leaf`, `page_map`,
 //! `page_sheet`, `page_ink` and `page_image` make the image of the page, and `page_file` encodes it. `block_truth` records
-//! the true alignment, and `via_labels` draws boxes around the characters. `world` makes all of it from a seed.
+//! the true alignment, and `via_labels` draws boxes around the characters. `world` makes all of it from a seed, and `files`
+//! writes it to disk.
 
 mod block_damage;
 mod block_truth;
@@ -13,6 +14,7 @@ mod carved_line;
 mod carved_text;
 mod column;
 mod face_field;
+mod files;
 mod kind;
 mod layout;
 mod leaf;
@@ -21,6 +23,7 @@ mod page_file;
 mod page_image;
 mod page_ink;
 mod page_map;
+mod page_measures;
 mod page_sheet;
 mod ply_file;
 mod pose;
@@ -35,7 +38,8 @@ mod world;
 #[cfg(test)]
 mod tests;
 
-pub use block_truth::{BlockCharacterTruth, BlockLandmark, BlockTruth};
+pub use block_truth::{BlockCharacterTruth, BlockLandmark, BlockTextPart, BlockTruth};
+pub use files::{BlockFiles, BlockOptions, block_options, find_block, write_block};
 pub use kind::BlockKind;
 pub use mesh_file::BlockMeshFormat;
 pub use page_file::PageFileBytes;

@@ -195,7 +195,7 @@ fn text_is_carved_in_mirror_writing_on_both_sides() {
 fn closed_mesh_is_watertight_and_both_formats_agree() {
     let ply = mesh_of(&BACK, BlockMeshFormat::Ply);
     let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
-    for triangle in ply.triangles.iter() {
+    for triangle in &*ply.triangles {
         for k in 0..3 {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };

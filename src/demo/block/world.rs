@@ -112,7 +112,7 @@ impl BlockWorld {
             _ => front.0.clone(),
         };
         let solid = scan_block(choice, front, back, &mut rng);
-        Self::print(choice, solid, layout, side, other)
+        Self::print(choice, solid, layout, side, other.as_ref())
     }
 
     /// Prints a side of a block, or the other text if the page is not of the block.
@@ -121,12 +121,11 @@ impl BlockWorld {
         solid: BlockSolid,
         layout: PageLayout,
         side: FaceSide,
-        other: Option<Text>,
+        other: Option<&Text>,
     ) -> Self {
         let ranges = choice.kind.ranges();
         let mut rng = choice.rng(part::PAGE);
         let relief = solid.relief(side).unwrap_or(&solid.front);
-        let other = other.as_ref();
         let printed = match other {
             Some((layout, _)) if ranges.page_of_other => layout.clone(),
             Some(_) | None => layout.clone(),
