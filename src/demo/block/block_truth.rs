@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use super::layout::TextCell;
 use super::page_image::InkBox;
 use super::page_map::PageMap;
 use super::pose::FaceSide;
 use super::relief::BlockRelief;
 use super::solid::BlockSolid;
+use super::text_cell::TextCell;
 use crate::demo::polygon::BoundsMm;
 use crate::domain::LengthUnit;
 

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::face_field::FAR_MM;
-use super::layout::TextCell;
+use super::text_cell::TextCell;
 use crate::demo::artwork::{chip_edges, knife_outline};
 use crate::demo::glyph::Glyphs;
 use crate::demo::polygon::BoundsMm;

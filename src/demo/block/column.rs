@@ -3,12 +3,12 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::layout::TextCell;
+use super::text_cell::TextCell;
 use super::text_source::TextSource;
 
 /// Room for the text of a column, mm.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Column {
+pub(super) struct TextColumn {
     /// Number from the right, from 1.
     pub number: usize,
     /// Middle, along u.
@@ -34,7 +34,7 @@ pub(super) struct ColumnText {
     notes: f64,
 }
 
-/// Part of a column: so many rows of full-size characters, filled in one way.
+/// Part of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Segment {
     Character,
@@ -66,7 +66,7 @@ impl ColumnText {
     /// Returns the characters of a column from the top. The last column of a page often ends early.
     pub(super) fn fill(
         &self,
-        column: &Column,
+        column: &TextColumn,
         is_last: bool,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,
@@ -107,7 +107,7 @@ impl ColumnText {
         cells
     }
 
-    fn segments(&self, column: &Column, is_last: bool, rng: &mut ChaCha8Rng) -> Vec<Segment> {
+    fn segments(&self, column: &TextColumn, is_last: bool, rng: &mut ChaCha8Rng) -> Vec<Segment> {
         let indent = if rng.random_bool(0.12) {
             rng.random_range(1..3)
         } else {

@@ -1,12 +1,5 @@
 //! The outlines of all strokes of a page, as signed distances on a large grid in the face frame.
 
-use rayon::prelude::*;
-
-use super::carved_line::{add_fish_tail, add_rule};
-use super::carved_text::{CarvedCell, TextCarver};
-use super::layout::PageLayout;
-use super::seeding::part_rng;
-use crate::demo::glyph::Glyphs;
 use crate::demo::polygon::BoundsMm;
 use crate::raster::Grid;
 
@@ -30,51 +23,32 @@ pub(super) struct FaceField {
 }
 
 impl FaceField {
-    /// Draws all characters, rules and ornaments of a page. Each character has its own random numbers, so the result
-    /// does not depend on the number of threads.
-    pub(super) fn draw(layout: &PageLayout, glyphs: &Glyphs, seed: u64, part: u64) -> Self {
-        let mut rng = part_rng(seed, part);
+    /// Creates a field without strokes for a page with the given outer edges.
+    pub(super) fn empty(outer: BoundsMm) -> Self {
         let margin = FAR_MM.abs() + 0.5;
-        let origin = layout.outer.min.map(|c| c - margin);
         let size = [0, 1].map(|i| {
-            ((layout.outer.max[i] - layout.outer.min[i] + 2.0 * margin) / STEP_MM).ceil() as usize
-                + 1
+            let length = outer.max[i] - outer.min[i] + 2.0 * margin;
+            (length / STEP_MM).ceil() as usize + 1
         });
-        let mut field = Self {
-            origin,
+        Self {
+            origin: outer.min.map(|c| c - margin),
             values: Grid::new(size[0], size[1], FAR_MM as f32),
             owners: Grid::new(size[0], size[1], NOBODY),
-            bounds: Vec::with_capacity(layout.cells.len()),
-        };
-        for rule in &layout.rules {
-            add_rule(&mut field, rule, &mut rng);
+            bounds: Vec::new(),
         }
-        for tail in &layout.fish_tails {
-            add_fish_tail(&mut field, tail, &mut rng);
-        }
-        let carver = TextCarver::draw(glyphs, &mut rng);
-        field.add_characters(layout, &carver, seed, part);
-        field
     }
 
-    /// Adds the characters in groups, so that only the samples of one group are kept at a time.
-    fn add_characters(&mut self, layout: &PageLayout, carver: &TextCarver, seed: u64, part: u64) {
-        const GROUP: usize = 64;
-        for (group, cells) in layout.cells.chunks(GROUP).enumerate() {
-            let carved: Vec<CarvedCell> = cells
-                .par_iter()
-                .enumerate()
-                .map(|(k, cell)| {
-                    let stream = part + 1 + (group * GROUP + k) as u64;
-                    carver.carve(cell, &mut part_rng(seed, stream))
-                })
-                .collect();
-            for (k, cell) in carved.iter().enumerate() {
-                self.bounds.push(cell.bounds);
-                let owner = (group * GROUP + k) as u16;
-                self.raise(cell.reach, owner, |point| cell.inside_mm(point));
-            }
-        }
+    /// Adds the strokes of the next character. `inside` returns the signed distance at a point, mm; `bounds` is the box
+    /// of the strokes, and `reach` the box within which they change the field.
+    pub(super) fn add_character(
+        &mut self,
+        bounds: BoundsMm,
+        reach: BoundsMm,
+        inside: impl Fn([f64; 2]) -> f64,
+    ) {
+        let owner = self.bounds.len() as u16;
+        self.bounds.push(bounds);
+        self.raise(reach, owner, inside);
     }
 
     /// Adds strokes that belong to no character. `inside` returns the signed distance at a point, mm.
@@ -83,7 +57,7 @@ impl FaceField {
     }
 
     /// Raises the samples within a box to the values of a function of the position.
-    fn raise(&mut self, reach: BoundsMm, owner: u16, mut inside: impl FnMut([f64; 2]) -> f64) {
+    fn raise(&mut self, reach: BoundsMm, owner: u16, inside: impl Fn([f64; 2]) -> f64) {
         let last = [self.values.width() - 1, self.values.height() - 1].map(|c| c as f64);
         let limit = |point: [f64; 2]| {
             let sample = self.sample(point);

@@ -48,6 +48,21 @@ pub struct BlockFiles {
     pub already_existed: bool,
 }
 
+impl BlockFiles {
+    /// Returns the paths after the folder of the world was moved.
+    #[must_use]
+    pub fn moved_to(self, dir: &Path) -> Self {
+        let moved = |path: PathBuf| dir.join(path.file_name().unwrap_or_default());
+        Self {
+            mesh: moved(self.mesh),
+            page: moved(self.page),
+            labels: moved(self.labels),
+            truth: moved(self.truth),
+            ..self
+        }
+    }
+}
+
 /// Content of `block.json`.
 #[derive(Debug, Serialize, Deserialize)]
 struct BlockStamp {

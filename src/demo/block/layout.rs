@@ -6,34 +6,16 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::column::{Column, ColumnText};
+use super::column::{ColumnText, TextColumn};
 use super::kind::BlockRanges;
 use super::page_measures::PageMeasures;
+use super::text_cell::TextCell;
 use super::text_source::TextSource;
 use crate::demo::draw::within;
 use crate::demo::polygon::BoundsMm;
 
 /// Gap between the frame and the first and last characters, mm.
 const HEAD_MM: f64 = 0.8;
-
-/// One character of a page.
-#[derive(Debug, Clone)]
-pub(super) struct TextCell {
-    /// Name by column and row, such as `c03-r12` or `c03-r12a`.
-    pub name: String,
-    /// The character.
-    pub character: char,
-    /// Middle of its cell, mm.
-    pub centre: [f64; 2],
-    /// Side of the font's em square, mm.
-    pub em_mm: f64,
-    /// Rotation, rad, clockwise on the print.
-    pub angle_rad: f64,
-    /// Whether it belongs to a note.
-    pub is_note: bool,
-    /// Whether it belongs to the middle strip.
-    pub is_strip: bool,
-}
 
 /// A straight rule.
 #[derive(Debug, Clone, Copy)]
@@ -138,7 +120,7 @@ impl PageLayout {
         for index in 0..measures.columns {
             if measures.strip > 0.0 && index == strip_at {
                 number += 1;
-                let strip = Column {
+                let strip = TextColumn {
                     number,
                     middle_u: right - measures.strip / 2.0,
                     top: inner.min[1],
@@ -148,7 +130,7 @@ impl PageLayout {
                 right -= measures.strip;
             }
             number += 1;
-            let column = Column {
+            let column = TextColumn {
                 number,
                 middle_u: right - measures.column_pitch / 2.0,
                 top: inner.min[1] + HEAD_MM,
@@ -177,7 +159,7 @@ impl PageLayout {
     /// Adds the middle strip: a fish tail, the title below it, a second fish tail, and the number of the leaf.
     fn add_strip(
         &mut self,
-        strip: &Column,
+        strip: &TextColumn,
         measures: &PageMeasures,
         texts: &TextSource,
         rng: &mut ChaCha8Rng,

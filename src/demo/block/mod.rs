@@ -1,19 +1,21 @@
 //! Whole blocks and their pages: one carved block with a page of text, the scan of it, the image of its page, and the
 //! exact truth.
 //!
-//! `kind` names the kinds and has their ranges. `layout`, `page_measures`, `column` and `text_source` draw a page of text, `carved_text` and
-//! `carved_line` its outlines, which `face_field` collects on a large grid. `relief` and `block_damage` compute the carved
-//! surface, `solid`, `support` and `pose` the scan, which `mesh_file` and `ply_file` write row by row. `leaf`, `page_map`,
-//! `page_sheet`, `page_ink` and `page_image` make the image of the page, and `page_file` encodes it. `block_truth` records
-//! the true alignment, and `via_labels` draws boxes around the characters. `world` makes all of it from a seed, and `files`
-//! writes it to disk.
+//! `kind` names the kinds and has their ranges. `layout`, `page_measures`, `column`, `text_cell` and `text_source` draw a
+//! page of text. `carved_page` carves it with `carved_text` and `carved_line`, as outlines that `face_field` holds on a
+//! large grid. `relief` and `block_damage` compute the carved surface, and `solid`, `support` and `pose` the scan, which
+//! `mesh_file` writes row by row with `facets`, `stl_file` and `ply_file`. `leaf`, `page_map`, `page_sheet`, `page_ink` and
+//! `page_image` make the image of the page, and `page_file` encodes it. `block_truth` records the true alignment, and
+//! `via_labels` draws boxes around the characters. `world` makes all of it from a seed, and `files` writes it to disk.
 
 mod block_damage;
 mod block_truth;
 mod carved_line;
+mod carved_page;
 mod carved_text;
 mod column;
 mod face_field;
+mod facets;
 mod files;
 mod kind;
 mod layout;
@@ -30,7 +32,9 @@ mod pose;
 mod relief;
 mod seeding;
 mod solid;
+mod stl_file;
 mod support;
+mod text_cell;
 mod text_source;
 mod via_labels;
 mod world;

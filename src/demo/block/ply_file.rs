@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::mesh_file::{BAND, facing, split, triangle_count};
+use super::facets::{BAND, facing, split, triangle_count};
 use super::pose::FaceSide;
 use super::solid::{BlockSolid, ScannedPart};
 

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::block_truth::box_edges;
-use super::layout::TextCell;
+use super::text_cell::TextCell;
 
 /// Largest error of an edge of a drawn box, as a share of the box's width or height.
 const SLACK: f64 = 0.03;

@@ -6,11 +6,13 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::block_truth::{BlockTruth, TruthSide};
+use super::carved_page::carve_page;
 use super::face_field::FaceField;
+use super::facets::triangle_count;
 use super::kind::{BlockKind, PageExtent, Support};
 use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
-use super::mesh_file::{BlockMeshFormat, triangle_count, write_solid};
+use super::mesh_file::{BlockMeshFormat, write_solid};
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
 use super::page_ink::PageInk;
@@ -96,7 +98,7 @@ impl BlockWorld {
         let text = |index: usize| {
             let mut rng = choice.rng(part::LAYOUTS[index]);
             let layout = PageLayout::draw(ranges, is_folded, &texts, &mut rng);
-            let field = FaceField::draw(&layout, &glyphs, choice.part_seed(), part::FIELDS[index]);
+            let field = carve_page(&layout, &glyphs, choice.part_seed(), part::FIELDS[index]);
             (layout, field)
         };
         let front = text(0);
