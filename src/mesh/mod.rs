@@ -8,6 +8,7 @@ mod ply;
 mod stl;
 mod text;
 mod triangle_mesh;
+mod triangle_stream;
 mod weld;
 
 pub mod write;
@@ -15,6 +16,9 @@ mod xyz;
 
 pub use error::{MeshError, MeshLimits, MeshReadError};
 pub use triangle_mesh::{Mesh, Vertices};
+pub use triangle_stream::{
+    STL_HEAD, Triangle, TriangleStream, binary_stl_triangles, pass_over_binary_stl,
+};
 
 use std::io::Read;
 

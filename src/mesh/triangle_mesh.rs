@@ -13,7 +13,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// Creates a mesh in which vertices 0 to 2 form the first triangle, vertices 3 to 5 the second, and so on.
-    pub(super) fn from_soup(vertices: Vertices) -> Self {
+    pub(crate) fn from_soup(vertices: Vertices) -> Self {
         let triangles = (0..vertices.len() as u32)
             .step_by(3)
             .map(|first| [first, first + 1, first + 2])

@@ -59,6 +59,13 @@ impl ConnectedComponents {
         Self { labels, sizes }
     }
 
+    /// Returns the largest component; the first one of several that are equally large. Returns `None` if there is none.
+    pub(crate) fn largest(&self) -> Option<Mask> {
+        let size = *self.sizes.iter().max()?;
+        let largest = self.sizes.iter().position(|other| *other == size)? as u32;
+        Some(self.labels.map(|label| *label == largest))
+    }
+
     /// Returns the pixels of components of at least this area, in pixels.
     pub(crate) fn with_area_at_least(&self, size: usize) -> Mask {
         self.select(|label| self.sizes[label] >= size)

@@ -1,5 +1,6 @@
 //! Images and masks in memory, their decoders and encoders, and warps. [`Grid`] states the pixel convention.
 
+pub(crate) mod blur;
 pub(crate) mod components;
 mod decode;
 mod depth_map;
@@ -8,6 +9,7 @@ pub(crate) mod fonts;
 mod grid;
 mod mask;
 mod minmax_pyramid;
+pub(crate) mod otsu;
 mod resample;
 mod supersample;
 mod warp_depth;

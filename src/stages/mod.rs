@@ -3,7 +3,6 @@
 //! They use no files, no SQL, no async and no clock. Each stage has its own settings, errors and entry function.
 
 mod binarize;
-mod blur;
 pub mod depth;
 mod face;
 pub mod fit;

@@ -10,7 +10,8 @@ use crate::page_vec::{PageVec, fill};
 const FORMAT: &str = "binary STL";
 /// Bytes of the header, including the count.
 pub(crate) const HEADER: usize = 84;
-const FACET: usize = 50;
+/// Bytes of a facet.
+pub(crate) const FACET: usize = 50;
 /// Facets that are checked at a time, and read from a file at a time.
 const CHECKED_FACETS: usize = 128;
 const READ_FACETS: usize = 1280;
@@ -56,7 +57,8 @@ pub(crate) fn read_facets(
     Ok(facets.into_mesh()?)
 }
 
-fn truncated(have: u64, count: u32) -> MeshError {
+/// Returns the error of a file that ends after `have` of `count` triangles.
+pub(crate) fn truncated(have: u64, count: u32) -> MeshError {
     MeshError::Truncated {
         format: FORMAT,
         what: "triangles".into(),
@@ -130,7 +132,7 @@ impl FacetBuffer {
 
 /// Returns the corners of a facet. A facet starts with twelve little-endian 32-bit floats: the normal and three
 /// corners.
-fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
+pub(crate) fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
     let (floats, _) = facet[12..48].as_chunks::<4>();
     let at = |i: usize| f32::from_le_bytes(floats[i]);
     [0, 3, 6].map(|i| [at(i), at(i + 1), at(i + 2)])

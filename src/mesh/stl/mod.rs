@@ -4,7 +4,9 @@ mod ascii;
 mod binary;
 
 pub(super) use ascii::read_ascii;
-pub(super) use binary::{HEADER, read_binary, read_facets, whole_binary_count};
+pub(super) use binary::{
+    FACET, HEADER, binary_count, corners, read_binary, read_facets, truncated, whole_binary_count,
+};
 
 #[cfg(test)]
 mod tests {

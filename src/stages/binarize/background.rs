@@ -1,8 +1,8 @@
 //! Estimates the brightness of the background by a grey-scale closing. The closing removes narrow dark areas, which are
 //! ink, and keeps wide dark areas, which are stains.
 
+use crate::raster::blur::gaussian_blur;
 use crate::raster::{Grid, Mask, resample};
-use crate::stages::blur::gaussian_blur;
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;

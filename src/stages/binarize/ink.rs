@@ -1,9 +1,9 @@
 //! Finds the ink of a print: which pixels the print covers, whether ink is dark or light, and which pixels are ink.
 
 use super::background::{self, NARROW, STROKE};
-use super::otsu::{self, Split};
 use super::polarity::polarity;
 use crate::raster::components::{ConnectedComponents, remove_specks};
+use crate::raster::otsu::{self, Split};
 use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::pose::SoftMask;
 

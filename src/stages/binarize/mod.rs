@@ -2,12 +2,11 @@
 
 mod background;
 mod ink;
-mod otsu;
 mod outlined;
 mod polarity;
 
+pub(super) use crate::raster::otsu::{Split, split, split_inner};
 pub(super) use ink::BinarizeError;
 pub(super) use ink::{InkMask, fixed, hypotheses};
-pub(super) use otsu::{Split, split, split_inner};
 pub(super) use outlined::{hypotheses_within, inside};
 pub(super) use polarity::rim_share;

@@ -1,6 +1,6 @@
 //! Polarity of the print: whether ink is darker or lighter than the background.
 
-use super::otsu::Split;
+use crate::raster::otsu::Split;
 use crate::raster::{Grid, Mask};
 
 /// If the sum of the evidence is below minus this value, ink is clearly darker than the background.

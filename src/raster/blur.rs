@@ -1,6 +1,6 @@
 //! Gaussian blur by three box filters (Wells 1986, doi:10.1109/TPAMI.1986.4767776).
 
-use crate::raster::Grid;
+use super::Grid;
 use crate::simd::dispatch;
 
 /// Sigma below which values stay unchanged, in pixels.
@@ -9,7 +9,7 @@ const MIN_SIGMA: f64 = 0.5;
 /// Blurs values with a Gaussian of `sigma` pixels. Returns the values unchanged if `sigma` is below half a pixel.
 ///
 /// Values beyond the border count as zero. To correct for this, divide by the blurred mask of the valid pixels.
-pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
+pub(crate) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < MIN_SIGMA {
         return values.clone();
     }
@@ -17,7 +17,7 @@ pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
 }
 
 /// Blurs a transposed image like [`gaussian_blur`]. Returns the blurred image untransposed.
-pub(super) fn gaussian_blur_transposed(transposed: Grid<f32>, sigma: f64) -> Grid<f32> {
+pub(crate) fn gaussian_blur_transposed(transposed: Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < MIN_SIGMA {
         return transposed.transposed();
     }

@@ -1,0 +1,262 @@
+//! Finds the side of a block and the map of its face to a page, or refuses.
+
+use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
+use super::coarse::{self, CoarsePosition, CoarseRange};
+use super::error::BlockError;
+use super::field::ShiftField;
+use super::height_map::{HEIGHT_STEP_MM, HeightMap, StoredHeights};
+use super::page_ink::PageInk;
+use super::page_map::PageMap;
+use super::relief::Relief;
+use super::windows::{ShrunkRelief, WindowSizes, match_windows};
+use crate::raster::Grid;
+
+/// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,
+/// degrees.
+const MAX_ANGLE_DEG: f64 = 6.0;
+/// Rotations of the search in which the outline of the face says nothing: all.
+const ALL_ANGLES_DEG: f64 = 45.0;
+/// Step of rotations, degrees.
+const ANGLE_STEP_DEG: f64 = 1.5;
+/// Scales that are searched, in relation to the one at which ink and strokes have the same extent.
+const SCALE_RATIOS: [f64; 9] = [0.88, 0.91, 0.94, 0.97, 1.0, 1.03, 1.06, 1.09, 1.12];
+/// Scales of the second search, page pixels per mm, and the ratio of two neighbours.
+const WIDE_SCALES: [f64; 2] = [4.0, 30.0];
+const WIDE_RATIO: f64 = 1.03;
+/// Positions of each side that are compared by windows.
+const CANDIDATES: usize = 5;
+/// Windows that compare positions, and the distance over which their shifts are smooth, mm.
+const COMPARED: WindowSizes = sizes(6, 50.0, 36.0, 8.0);
+const COMPARED_SIGMA_MM: f64 = 80.0;
+/// Windows that are farther from the field count nothing in the comparison, mm.
+const COMPARED_MM: f64 = 2.0;
+/// Window sizes of the rounds.
+const ROUNDS: [(WindowSizes, f64, Option<f64>); 5] = [
+    (sizes(6, 50.0, 20.0, 9.0), 60.0, None),
+    (sizes(3, 32.0, 13.0, 3.5), 45.0, None),
+    (sizes(3, 26.0, 9.0, 2.0), 45.0, Some(20.0)),
+    (sizes(2, 18.0, 7.0, 1.2), 45.0, Some(14.0)),
+    (sizes(2, 14.0, 6.0, 0.9), 45.0, Some(12.0)),
+];
+const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> WindowSizes {
+    WindowSizes {
+        shrink,
+        side_mm,
+        step_mm,
+        reach_mm,
+    }
+}
+
+/// The face on one side of a block.
+#[derive(Debug, Clone)]
+pub struct Face {
+    /// Heights.
+    pub map: HeightMap,
+    /// Strokes.
+    pub relief: Relief,
+}
+
+impl Face {
+    /// Computes the relief of stored heights; `None` if no surface fits them.
+    pub fn of(stored: &StoredHeights) -> Option<Self> {
+        let map = HeightMap::from(stored);
+        let relief = Relief::of(&map)?;
+        Some(Self { map, relief })
+    }
+}
+
+/// A page on one side of a block.
+#[derive(Debug, Clone)]
+pub struct Alignment {
+    /// Index of the side.
+    pub side: usize,
+    /// Map of the face to the page.
+    pub map: PageMap,
+    /// Evidence.
+    pub agreement: Agreement,
+    /// Where on the face the page agrees.
+    pub support: Support,
+}
+
+/// What is searched for coarse positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SearchRange {
+    /// The whole page, nearly parallel to the outline of the face.
+    Narrow,
+    /// A page that shows only a part of the face, or more than the face: any resolution.
+    AllScales,
+    /// A face with an outline that is no rectangle: any rotation.
+    AllAngles,
+}
+
+impl SearchRange {
+    /// Returns the rotations and scales for one side.
+    fn range(self, side: &Face, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
+        let max_angle_deg = match self {
+            Self::Narrow | Self::AllScales => MAX_ANGLE_DEG,
+            Self::AllAngles => ALL_ANGLES_DEG,
+        };
+        let steps = (max_angle_deg / ANGLE_STEP_DEG) as i32;
+        let angle =
+            |step: i32| f64::from(step) * ANGLE_STEP_DEG.to_radians() - side.relief.angle_rad;
+        let scales = if self == Self::AllScales {
+            let count = (WIDE_SCALES[1] / WIDE_SCALES[0]).ln() / WIDE_RATIO.ln();
+            (0..=count as i32)
+                .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
+                .collect()
+        } else {
+            let expected = expected_scale(relief, page);
+            expected
+                .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
+                .unwrap_or_default()
+        };
+        CoarseRange {
+            angles: (-steps..=steps).map(angle).collect(),
+            scales,
+            min_overlap: if self == Self::AllScales { 0.3 } else { 0.6 },
+            count: if self == Self::AllScales {
+                2 * CANDIDATES
+            } else {
+                CANDIDATES
+            },
+        }
+    }
+}
+
+/// A position while it is refined.
+struct Candidate {
+    side: usize,
+    map: PageMap,
+    quality: f64,
+}
+
+/// Aligns a page with the sides of a block.
+///
+/// # Errors
+/// Returns an error if no side shows a face or the page does not belong to the block.
+pub fn align(sides: &[&Face], page: &PageInk) -> Result<Alignment, BlockError> {
+    if sides.is_empty() {
+        let found = "no side has a large flat part".to_owned();
+        return Err(BlockError::NoFace { found });
+    }
+    let mut best: Option<Alignment> = None;
+    for search in [
+        SearchRange::Narrow,
+        SearchRange::AllScales,
+        SearchRange::AllAngles,
+    ] {
+        let found = refined(sides, page, search);
+        let quality = |found: &Option<Alignment>| {
+            found
+                .as_ref()
+                .map_or(-1.0, |found| found.agreement.quality())
+        };
+        if quality(&found) > quality(&best) {
+            best = found;
+        }
+        if best.as_ref().is_some_and(|best| best.agreement.is_sure()) {
+            break;
+        }
+    }
+    match best {
+        Some(alignment) if alignment.agreement.is_sure() => Ok(alignment),
+        best => Err(BlockError::Refused {
+            width_mm: sides[0].map.heights.width() as f64 * HEIGHT_STEP_MM,
+            height_mm: sides[0].map.heights.height() as f64 * HEIGHT_STEP_MM,
+            share: 100.0 * best.map_or(0.0, |best| best.agreement.share),
+            needed: 100.0 * MIN_AGREEMENT,
+        }),
+    }
+}
+
+/// Searches coarse positions, chooses the one whose places agree best, and refines it.
+fn refined(sides: &[&Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
+    let mut best: Option<Candidate> = None;
+    for (side, block) in sides.iter().enumerate() {
+        let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
+        for position in coarse::search(&relief, page, &search.range(block, &relief, page)) {
+            let Some(candidate) = first_round(side, &relief, page, &position) else {
+                continue;
+            };
+            if best
+                .as_ref()
+                .is_none_or(|best| candidate.quality > best.quality)
+            {
+                best = Some(candidate);
+            }
+        }
+    }
+    let best = best?;
+    let block = sides[best.side];
+    let (mut map, mut last) = (best.map, None);
+    let mut shrunk = ROUNDS[0].0.shrink;
+    let mut relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);
+    for (sizes, sigma, fine) in ROUNDS {
+        if sizes.shrink != shrunk {
+            shrunk = sizes.shrink;
+            relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);
+        }
+        let windows = match_windows(&relief, page, &map, &sizes);
+        let field = ShiftField::fit(&windows, sigma, fine)?;
+        map = map.shifted(&field.at_all(&map.node_positions()));
+        last = Some((windows, field));
+    }
+    let (windows, field) = last?;
+    let (agreement, support) = Agreement::of(&windows, &field);
+    Some(Alignment {
+        side: best.side,
+        map,
+        agreement,
+        support,
+    })
+}
+
+/// Refines a coarse position by one round of windows, and says how well they agree.
+fn first_round(
+    side: usize,
+    relief: &ShrunkRelief,
+    page: &PageInk,
+    position: &CoarsePosition,
+) -> Option<Candidate> {
+    let bounds = relief.face_bounds()?;
+    let corner = |x: usize, y: usize| [x, y].map(|at| at as f64 * relief.pixel_mm);
+    let low = corner(bounds[0], bounds[1]);
+    let high = corner(bounds[2], bounds[3]);
+    let place = |at: [f64; 2]| [0, 1].map(|k: usize| relief.origin_mm[k] + at[k]);
+    let mut map = PageMap::affine(&position.page_from_face, place(low), place(high));
+    let windows = match_windows(relief, page, &map, &COMPARED);
+    let field = ShiftField::fit(&windows, COMPARED_SIGMA_MM, None)?;
+    let quality = agreement::mean_near(&windows, &field, COMPARED_MM);
+    map = map.shifted(&field.at_all(&map.node_positions()));
+    Some(Candidate { side, map, quality })
+}
+
+/// Returns the scale at which the ink has the extent of the strokes, page pixels per mm.
+fn expected_scale(relief: &ShrunkRelief, page: &PageInk) -> Option<f64> {
+    let face = extent(&relief.soft)? * relief.pixel_mm;
+    let ink = page.reduced(4);
+    Some(extent(&ink)? * page.size()[0] as f64 / ink.width() as f64 / face)
+}
+
+/// Returns the geometric mean of the standard deviations of a distribution along its two axes, pixels.
+fn extent(weights: &Grid<f32>) -> Option<f64> {
+    let (mut all, mut x1, mut y1) = (0.0, 0.0, 0.0);
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for y in 0..weights.height() {
+        for (x, weight) in weights.row(y).iter().enumerate() {
+            let (x, y, weight) = (x as f64, y as f64, f64::from(*weight));
+            all += weight;
+            x1 += weight * x;
+            y1 += weight * y;
+            xx += weight * x * x;
+            yy += weight * y * y;
+            xy += weight * x * y;
+        }
+    }
+    if all <= 0.0 {
+        return None;
+    }
+    let (x, y) = (x1 / all, y1 / all);
+    let determinant = (xx / all - x * x) * (yy / all - y * y) - (xy / all - x * y).powi(2);
+    (determinant > 0.0).then(|| determinant.powf(0.25))
+}

@@ -1,0 +1,316 @@
+//! Cuts the mesh and the print of each character out of a block and its page.
+
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+use rayon::prelude::*;
+
+use super::align::Face;
+use super::characters::PlacedCharacter;
+use super::relief::surface_height;
+use crate::domain::Affine2;
+use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
+use crate::raster::{Grid, PrintImage};
+
+/// Margin around a character's box, mm: ground for the plane and the threshold, but few strokes of neighbours.
+const MARGIN_MM: f64 = 0.8;
+/// Heights that are cut, relative to the surface under the tops, mm: no walls, no other side, no holder.
+const BELOW_MM: f64 = 6.0;
+const ABOVE_MM: f64 = 2.0;
+/// Cells of the grid that finds the characters of a point, mm.
+const CELL_MM: f64 = 0.5;
+/// Triangles in memory before they are written to the spill file.
+const MAX_BUFFERED: usize = 1 << 20;
+/// Triangles that one task assigns.
+const TASK: usize = 8192;
+/// Bytes of a triangle in the spill file.
+const RECORD: usize = 9 * 8;
+
+/// Why characters cannot be cut.
+#[derive(Debug, thiserror::Error)]
+pub enum CutError {
+    /// The mesh cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshReadError),
+    /// The temporary file cannot be written or read.
+    #[error("the temporary file of the cut cannot be written or read")]
+    Spill(#[source] io::Error),
+    /// The result cannot be stored.
+    #[error("the mesh of a character cannot be written")]
+    Store(#[source] io::Error),
+}
+
+/// Which characters a point of the face belongs to.
+#[derive(Debug, Clone)]
+pub struct CutPlan<'a> {
+    side: &'a Face,
+    boxes: Vec<[f64; 4]>,
+    origin_mm: [f64; 2],
+    columns: usize,
+    /// First entry of each cell in `members`, and the end of the last one.
+    starts: Vec<u32>,
+    members: Vec<u32>,
+}
+
+impl<'a> CutPlan<'a> {
+    /// Plans the cut of characters.
+    pub fn of(side: &'a Face, characters: &[PlacedCharacter]) -> Self {
+        let grown = |[u0, v0, u1, v1]: [f64; 4]| {
+            [
+                u0 - MARGIN_MM,
+                v0 - MARGIN_MM,
+                u1 + MARGIN_MM,
+                v1 + MARGIN_MM,
+            ]
+        };
+        let boxes: Vec<[f64; 4]> = characters.iter().map(|c| grown(c.face_box)).collect();
+        let bound = |k: usize, combine: fn(f64, f64) -> f64| {
+            boxes.iter().map(|b| b[k]).reduce(combine).unwrap_or(0.0)
+        };
+        let origin_mm = [bound(0, f64::min), bound(1, f64::min)];
+        let ends = [bound(2, f64::max), bound(3, f64::max)];
+        let cell = |k: usize, at: f64| ((at - origin_mm[k]) / CELL_MM) as usize;
+        let columns = cell(0, ends[0]) + 1;
+        let rows = cell(1, ends[1]) + 1;
+        let cells_of = |[u0, v0, u1, v1]: [f64; 4]| {
+            (cell(1, v0)..=cell(1, v1))
+                .flat_map(move |y| (cell(0, u0)..=cell(0, u1)).map(move |x| y * columns + x))
+        };
+        let mut starts = vec![0_u32; columns * rows + 1];
+        for at in boxes.iter().flat_map(|b| cells_of(*b)) {
+            starts[at + 1] += 1;
+        }
+        for k in 1..starts.len() {
+            starts[k] += starts[k - 1];
+        }
+        let mut next = starts.clone();
+        let mut members = vec![0; starts[columns * rows] as usize];
+        for (number, face_box) in (0..).zip(&boxes) {
+            for at in cells_of(*face_box) {
+                members[next[at] as usize] = number;
+                next[at] += 1;
+            }
+        }
+        Self {
+            side,
+            boxes,
+            origin_mm,
+            columns,
+            starts,
+            members,
+        }
+    }
+
+    /// Calls `found` with each character that a triangle belongs to: the middle of the triangle lies in the box and near
+    /// the surface under the tops.
+    fn characters(&self, triangle: &Triangle, mut found: impl FnMut(u32)) {
+        let third = |k: usize| (triangle[0][k] + triangle[1][k] + triangle[2][k]) / 3.0;
+        let map = &self.side.map;
+        let [u, v, n] = map.frame.face_from_mesh([third(0), third(1), third(2)]);
+        let x = (u - self.origin_mm[0]) / CELL_MM;
+        let y = (v - self.origin_mm[1]) / CELL_MM;
+        if !(x >= 0.0 && y >= 0.0 && x < self.columns as f64) {
+            return;
+        }
+        let cell = y as usize * self.columns + x as usize;
+        let Some([start, end]) = self
+            .starts
+            .get(cell..cell + 2)
+            .map(|ends| [ends[0], ends[1]])
+        else {
+            return;
+        };
+        if start == end {
+            return;
+        }
+        let above = n - f64::from(surface_height(map, &self.side.relief.surface, [u, v]));
+        if !(-BELOW_MM..=ABOVE_MM).contains(&above) {
+            return;
+        }
+        for number in &self.members[start as usize..end as usize] {
+            let [u0, v0, u1, v1] = self.boxes[*number as usize];
+            if u >= u0 && u <= u1 && v >= v0 && v <= v1 {
+                found(*number);
+            }
+        }
+    }
+}
+
+/// Triangles of characters, some of them in a temporary file.
+struct Spill<'a, F> {
+    file: &'a mut F,
+    buffered: Vec<Vec<Triangle>>,
+    count: usize,
+    /// Position and number of triangles of each part in the file, by character.
+    parts: Vec<Vec<(u64, usize)>>,
+    end: u64,
+}
+
+impl<F: Read + Write + Seek> Spill<'_, F> {
+    fn push(&mut self, number: u32, triangle: Triangle) -> io::Result<()> {
+        self.buffered[number as usize].push(triangle);
+        self.count += 1;
+        if self.count >= MAX_BUFFERED {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Writes all triangles in memory to the file.
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(self.end))?;
+        let mut bytes = Vec::new();
+        for (triangles, parts) in self.buffered.iter_mut().zip(&mut self.parts) {
+            if triangles.is_empty() {
+                continue;
+            }
+            bytes.clear();
+            bytes.extend(
+                triangles
+                    .as_flattened()
+                    .as_flattened()
+                    .iter()
+                    .flat_map(|v| v.to_le_bytes()),
+            );
+            self.file.write_all(&bytes)?;
+            parts.push((self.end, triangles.len()));
+            self.end += bytes.len() as u64;
+            triangles.clear();
+        }
+        self.count = 0;
+        Ok(())
+    }
+
+    /// Returns all triangles of a character, in the order of the mesh.
+    fn take(&mut self, number: usize) -> io::Result<Vec<Triangle>> {
+        let mut triangles = Vec::new();
+        for (at, count) in std::mem::take(&mut self.parts[number]) {
+            let mut bytes = vec![0; count * RECORD];
+            self.file.seek(SeekFrom::Start(at))?;
+            self.file.read_exact(&mut bytes)?;
+            for record in bytes.as_chunks::<RECORD>().0 {
+                let (floats, _) = record.as_chunks::<8>();
+                let float = |k: usize| f64::from_le_bytes(floats[k]);
+                triangles.push([0, 3, 6].map(|k| [float(k), float(k + 1), float(k + 2)]));
+            }
+        }
+        triangles.append(&mut self.buffered[number]);
+        Ok(triangles)
+    }
+}
+
+/// Cuts the meshes of all characters in one pass over the mesh of the block. Calls `store` with each character's index
+/// and mesh, in order. The mesh keeps the frame and unit of the block. `spill` is an empty temporary file; memory does
+/// not depend on the size of the scan.
+///
+/// # Errors
+/// Returns an error if the mesh cannot be read, or the temporary file or a result cannot be written.
+pub fn cut_meshes(
+    mesh: &mut dyn TriangleStream,
+    plan: &CutPlan<'_>,
+    spill: &mut (impl Read + Write + Seek),
+    mut store: impl FnMut(usize, Mesh) -> io::Result<()>,
+) -> Result<(), CutError> {
+    let count = plan.boxes.len();
+    let mut spill = Spill {
+        file: spill,
+        buffered: vec![Vec::new(); count],
+        count: 0,
+        parts: vec![Vec::new(); count],
+        end: 0,
+    };
+    let mut failed = None;
+    let passed = mesh.pass(&mut |triangles| {
+        let assigned: Vec<Vec<(u32, Triangle)>> = triangles
+            .par_chunks(TASK)
+            .map(|part| {
+                let mut assigned = Vec::new();
+                for triangle in part {
+                    plan.characters(triangle, |number| assigned.push((number, *triangle)));
+                }
+                assigned
+            })
+            .collect();
+        for (number, triangle) in assigned.into_iter().flatten() {
+            if let Err(error) = spill.push(number, triangle) {
+                let kind = error.kind();
+                failed = Some(error);
+                return Err(io::Error::from(kind).into());
+            }
+        }
+        Ok(())
+    });
+    if let Some(error) = failed {
+        return Err(CutError::Spill(error));
+    }
+    passed?;
+    for number in 0..count {
+        let triangles = spill.take(number).map_err(CutError::Spill)?;
+        store(number, welded(&triangles)).map_err(CutError::Store)?;
+    }
+    Ok(())
+}
+
+/// Joins triangles at corners with equal coordinates.
+fn welded(triangles: &[Triangle]) -> Mesh {
+    let corners = triangles.as_flattened();
+    let is_single = corners
+        .as_flattened()
+        .iter()
+        .all(|v| f64::from(*v as f32) == *v);
+    let vertices = if is_single {
+        Vertices::Single(
+            corners
+                .iter()
+                .map(|corner| corner.map(|v| v as f32))
+                .collect(),
+        )
+    } else {
+        corners.iter().copied().collect()
+    };
+    Mesh::from_soup(vertices).welded()
+}
+
+/// The print of one character, cut out of its page.
+#[derive(Debug, Clone)]
+pub struct PrintCrop {
+    /// 8-bit colours, turned by quarter turns so that the character is upright.
+    pub rgb: Grid<[u8; 3]>,
+    /// Maps pixels of the crop to pixels of the page.
+    pub page_from_crop: Affine2,
+}
+
+/// Cuts the print of one box out of a page, with a margin in pixels. `quarter_turns` is the number of quarter turns from
+/// x to y by which the page is turned. Returns `None` if the box lies outside the page.
+pub fn cut_print(
+    page: &PrintImage,
+    [left, top, right, bottom]: [f64; 4],
+    margin_px: f64,
+    quarter_turns: u8,
+) -> Option<PrintCrop> {
+    let rgb = &page.rgb;
+    let range = |low: f64, high: f64, count: usize| {
+        let first = (low - margin_px).round().max(0.0);
+        let last = (high + margin_px).round().min(count as f64 - 1.0);
+        (last >= first).then(|| (first as usize, (last - first) as usize + 1))
+    };
+    let (x0, width) = range(left, right, rgb.width())?;
+    let (y0, height) = range(top, bottom, rgb.height())?;
+    let (w, h) = (width as f64 - 1.0, height as f64 - 1.0);
+    let (x, y) = (x0 as f64, y0 as f64);
+    // Upright pixels (i, j) to pixels of the page.
+    let (size, map) = match quarter_turns % 4 {
+        0 => ([width, height], [[1.0, 0.0, x], [0.0, 1.0, y]]),
+        1 => ([height, width], [[0.0, -1.0, x + w], [1.0, 0.0, y]]),
+        2 => ([width, height], [[-1.0, 0.0, x + w], [0.0, -1.0, y + h]]),
+        _ => ([height, width], [[0.0, 1.0, x], [-1.0, 0.0, y + h]]),
+    };
+    let page_from_crop = Affine2(map);
+    let pixel = |i: usize, j: usize| {
+        let [x, y] = page_from_crop.apply([i as f64, j as f64]);
+        rgb.at(x as usize, y as usize).map(|c| (c >> 8) as u8)
+    };
+    Some(PrintCrop {
+        rgb: Grid::from_fn(size[0], size[1], pixel),
+        page_from_crop,
+    })
+}

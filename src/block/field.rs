@@ -1,0 +1,207 @@
+//! A smooth field of shifts from the matches of windows: moving least squares, robust against wrong matches.
+
+use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
+
+use super::windows::WindowMatch;
+
+/// Windows below this correlation are left out.
+pub(super) const MIN_NCC: f64 = 0.35;
+/// Ridge on the slopes of the local fit, as a share of its weight.
+const RIDGE: f64 = 0.05;
+/// Weight of "no shift" in the local fit, as a share of one sure window: far from all windows the field is 0.
+const PRIOR: f64 = 1e-4;
+/// Rounds of reweighting.
+const ROUNDS: usize = 4;
+/// Least residual at which a window counts a quarter, mm.
+const MIN_SCALE_MM: f64 = 0.06;
+/// Least share of the sharper direction's certainty that the weaker direction counts with.
+const MIN_CERTAINTY: f64 = 0.02;
+
+/// One window in the fit.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    at: [f64; 2],
+    shift: [f64; 2],
+    /// Certainty along xx, yy and xy; its larger eigenvalue is at most 1.
+    certainty: [f64; 3],
+    weight: f64,
+}
+
+/// Unknowns of a local fit: shift, slope along u and along v, for both components.
+type Vector6 = SVector<f64, 6>;
+type Matrix6 = SMatrix<f64, 6, 6>;
+
+/// A smooth field of shifts over the face.
+#[derive(Debug, Clone)]
+pub(super) struct ShiftField {
+    samples: Vec<Sample>,
+    sigma_mm: f64,
+    /// A second, finer field of the residuals.
+    fine: Option<Box<ShiftField>>,
+}
+
+impl ShiftField {
+    /// Fits a field that is locally linear over `sigma_mm`. If `fine_sigma_mm` is given, the residuals are fitted again
+    /// over that distance. Returns `None` with fewer than three windows.
+    pub(super) fn fit(
+        matches: &[WindowMatch],
+        sigma_mm: f64,
+        fine_sigma_mm: Option<f64>,
+    ) -> Option<Self> {
+        let mut field = Self {
+            samples: samples_of(matches),
+            sigma_mm,
+            fine: None,
+        };
+        if field.samples.len() < 3 {
+            return None;
+        }
+        field.reweight();
+        if let Some(fine_sigma_mm) = fine_sigma_mm {
+            let positions: Vec<[f64; 2]> = field.samples.iter().map(|s| s.at).collect();
+            let coarse = field.at_all(&positions);
+            let mut fine = Self {
+                samples: field.samples.clone(),
+                sigma_mm: fine_sigma_mm,
+                fine: None,
+            };
+            for (sample, coarse) in fine.samples.iter_mut().zip(&coarse) {
+                sample.shift = [sample.shift[0] - coarse[0], sample.shift[1] - coarse[1]];
+            }
+            field.fine = Some(Box::new(fine));
+        }
+        Some(field)
+    }
+
+    /// Lowers the weights of windows that disagree with the others.
+    fn reweight(&mut self) {
+        let full: Vec<f64> = self.samples.iter().map(|s| s.weight).collect();
+        let positions: Vec<[f64; 2]> = self.samples.iter().map(|s| s.at).collect();
+        for _ in 0..ROUNDS {
+            let fitted = self.at_all(&positions);
+            let residuals: Vec<f64> = self
+                .samples
+                .iter()
+                .zip(&fitted)
+                .map(|(sample, fitted)| sample.residual(*fitted))
+                .collect();
+            let mut sorted = residuals.clone();
+            let middle = sorted.len() / 2;
+            let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+            let scale = (2.5 * median).max(MIN_SCALE_MM);
+            for ((sample, full), residual) in self.samples.iter_mut().zip(&full).zip(&residuals) {
+                let ratio = residual / scale;
+                sample.weight = full / (1.0 + ratio * ratio).powi(2);
+            }
+        }
+    }
+
+    /// Returns the shifts at many points, mm.
+    pub(super) fn at_all(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        points.par_iter().map(|point| self.at(*point)).collect()
+    }
+
+    /// Returns the shift at a point, mm.
+    pub(super) fn at(&self, point: [f64; 2]) -> [f64; 2] {
+        let mut normal = Matrix6::zeros();
+        let mut right = Vector6::zeros();
+        let mut total = 0.0;
+        for sample in &self.samples {
+            let offset = [0, 1].map(|k: usize| (sample.at[k] - point[k]) / self.sigma_mm);
+            let distance = offset[0] * offset[0] + offset[1] * offset[1];
+            // A Gaussian with compact support: 0 from 3.3 sigma on.
+            if distance > 11.0 {
+                continue;
+            }
+            let near = (1.0 - distance / 11.0).powi(5);
+            let weight = sample.weight * near;
+            total += weight;
+            let [xx, yy, xy] = sample.certainty.map(|c| c * weight);
+            let basis = [1.0, offset[0], offset[1]];
+            let pull = [
+                xx * sample.shift[0] + xy * sample.shift[1],
+                xy * sample.shift[0] + yy * sample.shift[1],
+            ];
+            for i in 0..3 {
+                for j in 0..3 {
+                    let product = basis[i] * basis[j];
+                    normal[(i, j)] += xx * product;
+                    normal[(i + 3, j + 3)] += yy * product;
+                    normal[(i, j + 3)] += xy * product;
+                    normal[(i + 3, j)] += xy * product;
+                }
+                right[i] += basis[i] * pull[0];
+                right[i + 3] += basis[i] * pull[1];
+            }
+        }
+        for k in [0, 3] {
+            normal[(k, k)] += PRIOR;
+            normal[(k + 1, k + 1)] += RIDGE * total + PRIOR;
+            normal[(k + 2, k + 2)] += RIDGE * total + PRIOR;
+        }
+        let Some(cholesky) = normal.cholesky() else {
+            return [0.0; 2];
+        };
+        let fitted = cholesky.solve(&right);
+        let fine = self.fine.as_ref().map_or([0.0; 2], |fine| fine.at(point));
+        [fitted[0] + fine[0], fitted[3] + fine[1]]
+    }
+}
+
+impl Sample {
+    /// Returns the residual along the directions that the window shows, mm.
+    fn residual(&self, fitted: [f64; 2]) -> f64 {
+        let [dx, dy] = [0, 1].map(|k: usize| self.shift[k] - fitted[k]);
+        let [xx, yy, xy] = self.certainty;
+        (xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy)
+            .max(0.0)
+            .sqrt()
+    }
+}
+
+/// Returns the windows with enough correlation, with weights.
+fn samples_of(matches: &[WindowMatch]) -> Vec<Sample> {
+    let usable = || matches.iter().filter(|m| m.ncc > MIN_NCC);
+    let mut sharpest: Vec<f64> = usable().map(|m| eigenvalues(m.curvature)[1]).collect();
+    if sharpest.is_empty() {
+        return Vec::new();
+    }
+    let middle = sharpest.len() / 2;
+    let typical = *sharpest.select_nth_unstable_by(middle, f64::total_cmp).1;
+    usable()
+        .map(|window| Sample {
+            at: window.at,
+            shift: window.shift,
+            certainty: certainty(window.curvature, typical),
+            weight: (window.ncc - MIN_NCC) / (1.0 - MIN_NCC),
+        })
+        .collect()
+}
+
+/// Returns the eigenvalues of a symmetric matrix given as xx, yy, xy; the smaller one first.
+fn eigenvalues([xx, yy, xy]: [f64; 3]) -> [f64; 2] {
+    let (mean, half) = (f64::midpoint(xx, yy), (xx - yy) / 2.0);
+    let radius = half.hypot(xy);
+    [mean - radius, mean + radius]
+}
+
+/// Returns the certainty of a match: its curvature in relation to half of the typical one, limited to 1 in each
+/// direction. A window that shows only a rule is certain across it, and not along it.
+fn certainty(curvature: [f64; 3], typical: f64) -> [f64; 3] {
+    let [xx, yy, xy] = curvature;
+    let [low, high] = eigenvalues(curvature);
+    let limited = [low, high].map(|value| (value / (0.5 * typical)).clamp(MIN_CERTAINTY, 1.0));
+    let gap = high - low;
+    if gap < 1e-12 {
+        return [limited[1], limited[1], 0.0];
+    }
+    // P projects on the direction of the larger eigenvalue: (M - low I) / (high - low).
+    let [pxx, pyy, pxy] = [(xx - low) / gap, (yy - low) / gap, xy / gap];
+    let spread = limited[1] - limited[0];
+    [
+        limited[0] + spread * pxx,
+        limited[0] + spread * pyy,
+        spread * pxy,
+    ]
+}

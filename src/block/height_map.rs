@@ -1,0 +1,284 @@
+//! Height maps of both sides of a block, from one pass over its triangles.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::face_layer::{FACE_CELL, find_face};
+use super::orientation::Orientation;
+use crate::mesh::{MeshReadError, Triangle, TriangleStream};
+use crate::raster::Grid;
+
+/// Spacing of height maps, mm. Strokes are about 1 mm wide; scans have points every 0.1 to 0.3 mm.
+pub const HEIGHT_STEP_MM: f64 = 0.15;
+/// Triangles that one task draws.
+const TASK: usize = 8192;
+/// The height of a pixel that no triangle covers.
+pub(super) const NO_HEIGHT: f32 = f32::NEG_INFINITY;
+
+/// Heights of one side over the plane through the centre of the block, mm; negative infinity where nothing was scanned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeightMap {
+    /// The frame of the side: n points away from the block.
+    pub frame: Orientation,
+    /// Coordinates u and v of the centre of the top-left pixel, mm.
+    pub origin_mm: [f64; 2],
+    /// Heights along n, mm, drawn with u to the right and v down.
+    pub heights: Grid<f32>,
+}
+
+/// Step of stored heights, mm.
+const STORED_STEP_MM: f32 = 0.0005;
+/// Stored value of [`NO_HEIGHT`].
+const NOT_STORED: u16 = 0;
+
+/// A height map of a face as it is stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredHeights {
+    /// Position of the map, and what its values mean.
+    pub header: HeightHeader,
+    /// 0 where there is no face; others are multiples of 0.5 um over `low_mm`.
+    pub values: Grid<u16>,
+}
+
+/// The numbers of [`StoredHeights`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HeightHeader {
+    /// The frame of the side.
+    pub frame: Orientation,
+    /// Coordinates u and v of the centre of the top-left pixel, mm.
+    pub origin_mm: [f64; 2],
+    /// Height of the value 1, mm.
+    pub low_mm: f32,
+}
+
+impl HeightMap {
+    /// Returns the face in this map for storage: cropped to it, without other heights, and rounded to 0.5 um. Returns `None`
+    /// if no face is found.
+    pub fn face(&self) -> Option<StoredHeights> {
+        let face = find_face(self)?;
+        let bounds = face.bounding_box()?;
+        let (x0, y0) = (bounds.x0 * FACE_CELL, bounds.y0 * FACE_CELL);
+        let size = [bounds.width() * FACE_CELL, bounds.height() * FACE_CELL];
+        let is_face = |x: usize, y: usize| face.at(x / FACE_CELL, y / FACE_CELL);
+        let middle = {
+            let on_face = |(x, y): (usize, usize)| is_face(x, y).then(|| self.heights.at(x, y));
+            let places = (0..size[1]).step_by(FACE_CELL).flat_map(|y| {
+                (0..size[0])
+                    .step_by(FACE_CELL)
+                    .map(move |x| (x0 + x, y0 + y))
+            });
+            let mut heights: Vec<f32> = places.filter_map(on_face).collect();
+            heights.retain(|height| *height != NO_HEIGHT);
+            let middle = heights.len() / 2;
+            (!heights.is_empty())
+                .then(|| *heights.select_nth_unstable_by(middle, f32::total_cmp).1)?
+        };
+        let low_mm = middle - STORED_STEP_MM * 32_768.0;
+        let value = |x: usize, y: usize| {
+            let height = self.heights.at(x0 + x, y0 + y);
+            if height == NO_HEIGHT || !is_face(x0 + x, y0 + y) {
+                return NOT_STORED;
+            }
+            let steps = ((height - low_mm) / STORED_STEP_MM).round();
+            if (1.0..=65_535.0).contains(&steps) {
+                steps as u16
+            } else {
+                NOT_STORED
+            }
+        };
+        Some(StoredHeights {
+            header: HeightHeader {
+                frame: self.frame,
+                origin_mm: [
+                    self.origin_mm[0] + x0 as f64 * HEIGHT_STEP_MM,
+                    self.origin_mm[1] + y0 as f64 * HEIGHT_STEP_MM,
+                ],
+                low_mm,
+            },
+            values: Grid::from_fn(size[0], size[1], value),
+        })
+    }
+}
+
+impl From<&StoredHeights> for HeightMap {
+    fn from(stored: &StoredHeights) -> Self {
+        let HeightHeader {
+            frame,
+            origin_mm,
+            low_mm,
+        } = stored.header;
+        let height = |value: &u16| match *value {
+            NOT_STORED => NO_HEIGHT,
+            value => low_mm + f32::from(value) * STORED_STEP_MM,
+        };
+        Self {
+            frame,
+            origin_mm,
+            heights: stored.values.map(height),
+        }
+    }
+}
+
+/// Heights that many threads raise at the same time.
+struct SharedHeights {
+    width: usize,
+    height: usize,
+    /// Keys of the heights, in the order of the heights.
+    keys: Vec<AtomicU32>,
+}
+
+/// Key of [`NO_HEIGHT`].
+const NO_KEY: u32 = 0;
+
+/// Returns an integer that orders like the float. No finite float has the key 0.
+const fn key_of(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 1 {
+        !bits
+    } else {
+        bits | 1 << 31
+    }
+}
+
+const fn height_of(key: u32) -> f32 {
+    if key == NO_KEY {
+        NO_HEIGHT
+    } else if key >> 31 == 1 {
+        f32::from_bits(key & !(1 << 31))
+    } else {
+        f32::from_bits(!key)
+    }
+}
+
+impl SharedHeights {
+    fn new(width: usize, height: usize) -> Self {
+        let keys = (0..width * height)
+            .map(|_| AtomicU32::new(NO_KEY))
+            .collect();
+        Self {
+            width,
+            height,
+            keys,
+        }
+    }
+
+    #[inline]
+    fn raise(&self, place: usize, value: f32) {
+        let key = key_of(value);
+        let at = &self.keys[place];
+        if at.load(Ordering::Relaxed) < key {
+            at.fetch_max(key, Ordering::Relaxed);
+        }
+    }
+
+    fn into_grid(self) -> Grid<f32> {
+        let heights = self.keys.into_iter().map(|key| height_of(key.into_inner()));
+        let heights: Vec<f32> = heights.collect();
+        Grid::from_vec(self.width, self.height, heights).expect("one height for each pixel")
+    }
+}
+
+/// The two sides of a block while they are drawn. Both are drawn in the pixels of the front.
+struct BothSides {
+    front: SharedHeights,
+    back: SharedHeights,
+}
+
+impl BothSides {
+    /// Draws a triangle with corners in pixels and mm: on the front its heights, on the back their negatives.
+    #[inline]
+    fn draw(&self, [a, b, c]: [[f32; 3]; 3]) {
+        let low = |k: usize| a[k].min(b[k]).min(c[k]).ceil().max(0.0);
+        let high = |k: usize| a[k].max(b[k]).max(c[k]).floor();
+        let (left, top) = (low(0), low(1));
+        let right = high(0).min(self.front.width as f32 - 1.0);
+        let bottom = high(1).min(self.front.height as f32 - 1.0);
+        // Most triangles of a fine scan contain no pixel centre.
+        if left > right || top > bottom {
+            return;
+        }
+        let [ab, ac] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+        let area = ab[0] * ac[1] - ab[1] * ac[0];
+        if area == 0.0 {
+            return;
+        }
+        let (ux, uy) = (ac[1] / area, -ac[0] / area);
+        let (vx, vy) = (-ab[1] / area, ab[0] / area);
+        // Pixels on an edge belong to both triangles; a rounding error must leave no gap.
+        let inside = -1e-4_f32;
+        let mut y = top;
+        while y <= bottom {
+            let mut x = left;
+            while x <= right {
+                let (dx, dy) = (x - a[0], y - a[1]);
+                let (s, t) = (ux * dx + uy * dy, vx * dx + vy * dy);
+                if s >= inside && t >= inside && s + t <= 1.0 - inside {
+                    let height = a[2] + s * ab[2] + t * ac[2];
+                    let place = y as usize * self.front.width + x as usize;
+                    self.front.raise(place, height);
+                    self.back.raise(place, -height);
+                }
+                x += 1.0;
+            }
+            y += 1.0;
+        }
+    }
+}
+
+/// Draws the height maps of the front (along n) and of the back of a block.
+///
+/// # Errors
+/// Returns an error if the mesh cannot be read.
+pub fn draw_height_maps(
+    mesh: &mut dyn TriangleStream,
+    frame: &Orientation,
+) -> Result<[HeightMap; 2], MeshReadError> {
+    let [half_u, half_v, _] = frame.half_extent_mm;
+    let cells = |half: f64| (half / HEIGHT_STEP_MM).ceil() as usize;
+    let (cells_u, cells_v) = (cells(half_u), cells(half_v));
+    let (width, height) = (2 * cells_u + 1, 2 * cells_v + 1);
+    let sides = BothSides {
+        front: SharedHeights::new(width, height),
+        back: SharedHeights::new(width, height),
+    };
+    let to_pixels = |triangle: &Triangle| {
+        triangle.map(|corner| {
+            let [u, v, n] = frame.face_from_mesh(corner);
+            let x = u / HEIGHT_STEP_MM + cells_u as f64;
+            let y = v / HEIGHT_STEP_MM + cells_v as f64;
+            [x as f32, y as f32, n as f32]
+        })
+    };
+    mesh.pass(&mut |triangles| {
+        triangles.par_chunks(TASK).for_each(|part| {
+            for triangle in part {
+                sides.draw(to_pixels(triangle));
+            }
+        });
+        Ok(())
+    })?;
+    let origin_mm = [cells_u, cells_v].map(|cells| -(cells as f64) * HEIGHT_STEP_MM);
+    let front = HeightMap {
+        frame: *frame,
+        origin_mm,
+        heights: sides.front.into_grid(),
+    };
+    // The other side has the opposite v axis, so its rows are in reverse order.
+    let mut back = HeightMap {
+        frame: frame.other_side(),
+        origin_mm,
+        heights: sides.back.into_grid(),
+    };
+    let rows = back.heights.height();
+    let columns = back.heights.width();
+    for y in 0..rows / 2 {
+        let (upper, lower) = back
+            .heights
+            .data_mut()
+            .split_at_mut((rows - 1 - y) * columns);
+        upper[y * columns..][..columns].swap_with_slice(&mut lower[..columns]);
+    }
+    Ok([front, back])
+}

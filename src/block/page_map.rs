@@ -1,0 +1,229 @@
+//! The map from the face of a block to the pixels of its page.
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::Affine2;
+use crate::raster::Grid;
+
+/// Spacing of the nodes, mm. Paper shrinks and warps smoothly over several centimetres.
+const NODE_STEP_MM: f64 = 5.0;
+/// Nodes beyond the face on each side, so that points at its edge have four nodes in each direction.
+const MARGIN_NODES: usize = 3;
+/// Points of a row that are mapped exactly; those between are interpolated linearly.
+const ROW_STEP: usize = 8;
+/// Steps of Newton's method that invert the map.
+const INVERSE_STEPS: usize = 12;
+
+/// Maps points of the face (u, v in mm) to pixels of the page: bicubic interpolation (Catmull-Rom) between nodes every
+/// 5 mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PageMap {
+    /// Position of the first node, mm.
+    origin_mm: [f64; 2],
+    /// Page pixels of the nodes.
+    nodes: Grid<[f64; 2]>,
+}
+
+/// A [`PageMap`] as it is stored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StoredPageMap {
+    /// Position of the first node, mm.
+    pub origin_mm: [f64; 2],
+    /// Number of columns.
+    pub columns: usize,
+    /// Page pixels of the nodes, row by row.
+    pub nodes_px: Vec<[f64; 2]>,
+}
+
+impl From<&PageMap> for StoredPageMap {
+    fn from(map: &PageMap) -> Self {
+        Self {
+            origin_mm: map.origin_mm,
+            columns: map.nodes.width(),
+            nodes_px: map.nodes.data().to_vec(),
+        }
+    }
+}
+
+impl TryFrom<StoredPageMap> for PageMap {
+    type Error = String;
+
+    fn try_from(stored: StoredPageMap) -> Result<Self, String> {
+        let rows = stored
+            .nodes_px
+            .len()
+            .checked_div(stored.columns)
+            .unwrap_or(0);
+        let nodes = Grid::from_vec(stored.columns, rows, stored.nodes_px);
+        match nodes {
+            Some(nodes) if stored.columns >= 4 && rows >= 4 => Ok(Self {
+                origin_mm: stored.origin_mm,
+                nodes,
+            }),
+            _ => Err("the nodes of a page map do not form a grid of at least 4 x 4".to_owned()),
+        }
+    }
+}
+
+impl PageMap {
+    /// Creates the map of an affine transformation over a rectangle of the face, in mm.
+    pub fn affine(page_from_face: &Affine2, low_mm: [f64; 2], high_mm: [f64; 2]) -> Self {
+        let margin = MARGIN_NODES as f64 * NODE_STEP_MM;
+        let origin_mm = low_mm.map(|low| low - margin);
+        let count = |k: usize| {
+            ((high_mm[k] - low_mm[k]) / NODE_STEP_MM).ceil() as usize + 2 * MARGIN_NODES + 1
+        };
+        let node = |x: usize, y: usize| {
+            page_from_face.apply([
+                origin_mm[0] + x as f64 * NODE_STEP_MM,
+                origin_mm[1] + y as f64 * NODE_STEP_MM,
+            ])
+        };
+        Self {
+            origin_mm,
+            nodes: Grid::from_fn(count(0), count(1), node),
+        }
+    }
+
+    /// Returns the pixel of the page at a point of the face. Beyond the nodes, the map continues nearly linearly.
+    pub fn page_from_face(&self, face: [f64; 2]) -> [f64; 2] {
+        let (x, weights_x) = self.cell(face, 0);
+        let (y, weights_y) = self.cell(face, 1);
+        let mut page = [0.0; 2];
+        for (row, down) in weights_y.iter().enumerate() {
+            let nodes = &self.nodes.row(y + row)[x..x + 4];
+            for (node, across) in nodes.iter().zip(&weights_x) {
+                page[0] += down * across * node[0];
+                page[1] += down * across * node[1];
+            }
+        }
+        page
+    }
+
+    /// Returns the first of the four nodes around a coordinate, and their weights.
+    fn cell(&self, face: [f64; 2], k: usize) -> (usize, [f64; 4]) {
+        let count = [self.nodes.width(), self.nodes.height()][k];
+        let at = (face[k] - self.origin_mm[k]) / NODE_STEP_MM;
+        let first = (at.floor() - 1.0).clamp(0.0, count as f64 - 4.0);
+        let t = at - first - 1.0;
+        let weights = if (0.0..=1.0).contains(&t) {
+            let (t2, t3) = (t * t, t * t * t);
+            [
+                (-t3 + 2.0 * t2 - t) / 2.0,
+                1.5 * t3 - 2.5 * t2 + 1.0,
+                (-3.0 * t3 + 4.0 * t2 + t) / 2.0,
+                (t3 - t2) / 2.0,
+            ]
+        } else if t < 0.0 {
+            // Continues the line through the first two nodes.
+            [-t, 1.0 + t, 0.0, 0.0]
+        } else {
+            [0.0, 0.0, 2.0 - t, t - 1.0]
+        };
+        (first as usize, weights)
+    }
+
+    /// Returns the pixels of a row of points of the face: `count` points from `first`, `step_mm` apart along u.
+    pub fn row(&self, first: [f64; 2], step_mm: f64, count: usize) -> Vec<[f64; 2]> {
+        let mut row = Vec::with_capacity(count + ROW_STEP);
+        let exact = |k: usize| self.page_from_face([first[0] + k as f64 * step_mm, first[1]]);
+        let mut from = exact(0);
+        for start in (0..count).step_by(ROW_STEP) {
+            let to = exact(start + ROW_STEP);
+            for k in 0..ROW_STEP {
+                let share = k as f64 / ROW_STEP as f64;
+                row.push([0, 1].map(|axis: usize| from[axis] + share * (to[axis] - from[axis])));
+            }
+            from = to;
+        }
+        row.truncate(count);
+        row
+    }
+
+    /// Returns the derivative of the map at a point: page pixels per mm along u (first column) and v.
+    pub fn derivative(&self, [u, v]: [f64; 2]) -> [[f64; 2]; 2] {
+        let step = 0.5;
+        let along = |du: f64, dv: f64| {
+            let before = self.page_from_face([u - du, v - dv]);
+            let after = self.page_from_face([u + du, v + dv]);
+            [0, 1].map(|k: usize| (after[k] - before[k]) / (2.0 * step))
+        };
+        let (by_u, by_v) = (along(step, 0.0), along(0.0, step));
+        [[by_u[0], by_v[0]], [by_u[1], by_v[1]]]
+    }
+
+    /// Returns the point of the face at a pixel of the page.
+    pub fn face_from_page(&self, page: [f64; 2]) -> [f64; 2] {
+        let mut face = self.middle();
+        for _ in 0..INVERSE_STEPS {
+            let at = self.page_from_face(face);
+            let error = [page[0] - at[0], page[1] - at[1]];
+            let [[a, b], [c, d]] = self.derivative(face);
+            let determinant = a * d - b * c;
+            if determinant == 0.0 {
+                break;
+            }
+            let step = [
+                (d * error[0] - b * error[1]) / determinant,
+                (a * error[1] - c * error[0]) / determinant,
+            ];
+            face = [face[0] + step[0], face[1] + step[1]];
+            if step[0].hypot(step[1]) < 1e-6 {
+                break;
+            }
+        }
+        face
+    }
+
+    /// Returns the mean scale at the middle of the map, page pixels per mm.
+    pub fn scale(&self) -> f64 {
+        let [[a, b], [c, d]] = self.derivative(self.middle());
+        (a * d - b * c).abs().sqrt()
+    }
+
+    /// Returns the positions of the nodes on the face, row by row, mm.
+    pub fn node_positions(&self) -> Vec<[f64; 2]> {
+        let columns = self.nodes.width();
+        let at = |k: usize| {
+            [
+                self.origin_mm[0] + (k % columns) as f64 * NODE_STEP_MM,
+                self.origin_mm[1] + (k / columns) as f64 * NODE_STEP_MM,
+            ]
+        };
+        (0..self.nodes.data().len()).map(at).collect()
+    }
+
+    /// Returns the map whose page pixel at each node is that of this map at the node plus a shift in mm.
+    #[must_use]
+    pub fn shifted(&self, shifts_mm: &[[f64; 2]]) -> Self {
+        let positions = self.node_positions();
+        let nodes: Vec<[f64; 2]> = positions
+            .iter()
+            .zip(shifts_mm)
+            .map(|(at, shift)| self.page_from_face([at[0] + shift[0], at[1] + shift[1]]))
+            .collect();
+        let (width, height) = (self.nodes.width(), self.nodes.height());
+        Self {
+            origin_mm: self.origin_mm,
+            nodes: Grid::from_vec(width, height, nodes).expect("one shift for each node"),
+        }
+    }
+
+    /// Returns the rotation from the face to the page at the middle of the map, from x to y, radians.
+    pub fn angle_rad(&self) -> f64 {
+        let [[a, b], [c, d]] = self.derivative(self.middle());
+        (c - b).atan2(a + d)
+    }
+
+    /// Returns the number of quarter turns, from x to y, nearest to the rotation from the face to the page.
+    pub fn quarter_turns(&self) -> u8 {
+        let turns = (self.angle_rad() / std::f64::consts::FRAC_PI_2).round() as i64;
+        turns.rem_euclid(4) as u8
+    }
+
+    /// Returns the middle of the map, mm.
+    fn middle(&self) -> [f64; 2] {
+        let sides = [self.nodes.width(), self.nodes.height()];
+        [0, 1].map(|k: usize| self.origin_mm[k] + (sides[k] as f64 - 1.0) / 2.0 * NODE_STEP_MM)
+    }
+}

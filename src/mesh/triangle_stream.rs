@@ -1,0 +1,110 @@
+//! Passes over the triangles of a mesh without the whole mesh in memory.
+
+use std::io::Read;
+
+use super::error::{self, MeshError, MeshLimits, MeshReadError};
+use super::stl;
+use super::triangle_mesh::Mesh;
+use crate::domain::FileKind;
+use crate::page_vec::fill;
+
+/// Corners of a triangle in the frame and unit of the mesh.
+pub type Triangle = [[f64; 3]; 3];
+
+/// Triangles that are visited at a time.
+const BATCH: usize = 1 << 16;
+
+/// Visits the triangles of a mesh in the order of the file, up to 65,536 at a time.
+pub trait TriangleStream {
+    /// Passes over all triangles once.
+    ///
+    /// # Errors
+    /// Returns an error if the mesh cannot be read or `visit` returns one.
+    fn pass(
+        &mut self,
+        visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
+    ) -> Result<(), MeshReadError>;
+}
+
+impl TriangleStream for &Mesh {
+    fn pass(
+        &mut self,
+        visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
+    ) -> Result<(), MeshReadError> {
+        let mut batch = Vec::with_capacity(BATCH.min(self.triangles.len()));
+        for corners in self.triangles.chunks(BATCH) {
+            batch.clear();
+            batch.extend(
+                corners
+                    .iter()
+                    .map(|corners| corners.map(|corner| self.vertices.at(corner as usize))),
+            );
+            visit(&batch)?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the number of triangles of a binary STL from its first 84 bytes and its length; `None` if it is something else.
+///
+/// # Errors
+/// Returns an error if the file is a binary STL that ends early.
+pub fn binary_stl_triangles(head: &[u8], len: u64, name: &str) -> Result<Option<u32>, MeshError> {
+    if FileKind::of(head) == FileKind::Ply {
+        return Ok(None);
+    }
+    if let Some(count) = stl::whole_binary_count(head, len) {
+        return Ok(Some(count));
+    }
+    let is_named_stl = name.to_ascii_lowercase().ends_with(".stl");
+    let is_binary = head.iter().any(|byte| *byte == 0 || *byte >= 0x80);
+    match stl::binary_count(head) {
+        Some(count) if is_named_stl && is_binary => {
+            let have = len.saturating_sub(stl::HEADER as u64) / stl::FACET as u64;
+            if have < u64::from(count) {
+                return Err(stl::truncated(have, count));
+            }
+            Ok(None)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Bytes at the beginning of a file that [`binary_stl_triangles`] needs.
+pub const STL_HEAD: usize = stl::HEADER;
+
+/// Passes over the facets of a binary STL, which is read a part at a time.
+///
+/// `source` starts after the header.
+///
+/// # Errors
+/// Returns an error if the file ends early, a number is not finite, or `visit` returns one.
+pub fn pass_over_binary_stl(
+    source: &mut impl Read,
+    count: u32,
+    limits: &MeshLimits,
+    visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
+) -> Result<(), MeshReadError> {
+    limits.check_triangles(u64::from(count))?;
+    let mut bytes = vec![0; stl::FACET * BATCH.min(count as usize)];
+    let mut batch = Vec::with_capacity(BATCH.min(count as usize));
+    let mut left = count as usize;
+    while left > 0 {
+        let most = bytes.len().min(stl::FACET * left);
+        let bytes = &mut bytes[..most];
+        let have = fill(source, bytes)?;
+        if have < bytes.len() {
+            let read = count as usize - left + have / stl::FACET;
+            return Err(stl::truncated(read as u64, count).into());
+        }
+        let (facets, _) = bytes.as_chunks::<{ stl::FACET }>();
+        batch.clear();
+        for facet in facets {
+            batch.push(stl::corners(facet).map(|corner| corner.map(f64::from)));
+        }
+        error::check_all_finite(batch.as_flattened(), 3 * (count as usize - left))?;
+        visit(&batch)?;
+        left -= facets.len();
+    }
+    Ok(())
+}
