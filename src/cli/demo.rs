@@ -10,11 +10,12 @@ use super::busy::Busy;
 use super::config::{ConfigShowArgs, as_toml};
 use super::contact_sheet::{self, ContactSheetArgs};
 use super::context::Context;
-use super::demo_block::{self, BlockDemo};
+use super::demo_block;
 use super::demo_folder::{DemoContent, STOPPED, check_directory, replace_data};
 use super::exit::ExitCode;
 use super::files;
 use super::import::{self, ImportArgs};
+use super::import_blocks;
 use super::report;
 use super::run::{self, drive};
 use super::screen::Palette;
@@ -66,11 +67,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
             seed: args.seed,
             spacing_mm: args.spacing,
         };
-        let demo = BlockDemo {
-            options,
-            has_labels: !args.no_labels,
-        };
-        return demo_block::create(&dir, demo, context).await;
+        return block_demo(&dir, options, &args, context).await;
     }
     let options = DemoOptions {
         pairs: args.pairs,
@@ -92,11 +89,37 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         context.next("run");
         return Ok(ExitCode::Done);
     }
-    align(&dir, context).await
+    align(&dir, None, context).await
 }
 
-/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are.
-async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
+/// Creates a whole block, imports and runs it.
+async fn block_demo(
+    dir: &Path,
+    options: BlockOptions,
+    args: &DemoArgs,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    let Some(files) = demo_block::create_files(dir, options, context).await? else {
+        context.info(STOPPED);
+        return Ok(ExitCode::Stopped);
+    };
+    let import = demo_block::import_args(&files, !args.no_labels);
+    let outcome = import_blocks::import_blocks(&import, context).await?;
+    import_blocks::print_outcome(&outcome, context);
+    if args.no_run {
+        context.next("run");
+        return Ok(ExitCode::Done);
+    }
+    align(dir, Some(&files.truth), context).await
+}
+
+/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are. `block_truth` is the file
+/// with the true alignment of a whole block.
+async fn align(
+    dir: &Path,
+    block_truth: Option<&Path>,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
     let (project, catalog) = context.open().await?;
     let options = run::from_config(&config);
@@ -108,6 +131,13 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
             context.next(&command);
         }
         return Ok(run::code(&summary));
+    }
+    if let Some(file) = block_truth {
+        let (_, catalog) = context.open().await?;
+        let stored = demo_block::store_truths(file, &catalog).await;
+        catalog.close().await;
+        let stored = count(stored?, "true alignment");
+        context.info(&format!("{stored} of the cut pairs stored"));
     }
     report::print(context).await?;
     let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
@@ -121,17 +151,9 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
 
 /// Parses the distance of a block's vertices.
 fn spacing(text: &str) -> Result<f64, String> {
-    let spacing: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
     let range = SPACING_MM;
-    if range.contains(&spacing) {
-        Ok(spacing)
-    } else {
-        Err(format!(
-            "not within {} to {} mm",
-            range.start(),
-            range.end()
-        ))
-    }
+    let spacing = text.parse().ok().filter(|spacing| range.contains(spacing));
+    spacing.ok_or_else(|| format!("not a number from {} to {} mm", range.start(), range.end()))
 }
 
 fn demo_dir(args: &DemoArgs, context: &Context) -> PathBuf {

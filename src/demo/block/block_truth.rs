@@ -1,13 +1,14 @@
 //! Ground truth of a block and its page.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::kind::BlockKind;
 use super::page_image::InkBox;
-use super::page_map::PageMap;
 use super::pose::FaceSide;
 use super::relief::BlockRelief;
 use super::solid::BlockSolid;
 use super::text_cell::TextCell;
+use super::true_map::TruePageMap;
 use crate::demo::polygon::BoundsMm;
 use crate::domain::LengthUnit;
 
@@ -26,12 +27,12 @@ const MAP_STEP_MM: f64 = 20.0;
 ///
 /// Positions on the page are in pixels; (0, 0) is the middle of the first pixel, so a box of whole pixels ends at
 /// half-integers. The face frame of the printed side has u to the right and v down as the print is read, in mm.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BlockTruth {
     /// Version of this structure.
     pub schema: u32,
-    /// Name of the kind.
-    pub kind: &'static str,
+    /// The kind.
+    pub kind: BlockKind,
     /// Seed of the world.
     pub seed: u64,
     /// Spacing of the mesh's vertices, mm.
@@ -72,7 +73,7 @@ pub struct BlockTruth {
 }
 
 /// The true position of a character.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BlockCharacterTruth {
     /// Name by column and row, such as `c03-r12` or, for notes, `c03-r12a`.
     pub name: String,
@@ -100,7 +101,7 @@ pub struct BlockCharacterTruth {
 }
 
 /// Part of the text of a page; neither for the main text.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct BlockTextPart {
     /// A note of half the size.
     pub note: bool,
@@ -109,7 +110,7 @@ pub struct BlockTextPart {
 }
 
 /// A point on a stroke.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct BlockLandmark {
     /// The point at the height of the stroke tops, in the mesh's frame and unit.
     pub mesh: [f64; 3],
@@ -122,7 +123,7 @@ pub(super) struct TruthSide<'a> {
     pub solid: &'a BlockSolid,
     pub side: FaceSide,
     pub relief: &'a BlockRelief,
-    pub map: Option<&'a PageMap>,
+    pub map: Option<&'a TruePageMap>,
     /// Visible part along u.
     pub clip_u: [f64; 2],
     /// Width and height of the page image, pixels.

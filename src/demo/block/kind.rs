@@ -58,7 +58,7 @@ pub(super) enum PageExtent {
 
 /// What holds the block in the scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Support {
+pub(super) enum BlockSupport {
     /// Nothing.
     Nothing,
     /// Jaws at two sides, higher than the face.
@@ -85,7 +85,7 @@ pub(super) struct BlockRanges {
     /// Which part of the page the image shows.
     pub extent: PageExtent,
     /// What holds the block in the scan.
-    pub support: Support,
+    pub support: BlockSupport,
     /// Quarter turns of the image.
     pub turns: NumberRange,
     /// Largest rotation of the image, degrees.
@@ -129,7 +129,7 @@ const PLAIN: BlockRanges = BlockRanges {
     page_of_back: false,
     page_of_other: false,
     extent: PageExtent::Whole,
-    support: Support::Nothing,
+    support: BlockSupport::Nothing,
     turns: [0.0, 0.0],
     rotation_deg: 1.5,
     shrink: [0.0, 0.015],
@@ -200,12 +200,12 @@ const BROKEN: BlockRanges = BlockRanges {
 };
 
 const HOLDER: BlockRanges = BlockRanges {
-    support: Support::Holder,
+    support: BlockSupport::Holder,
     ..PLAIN
 };
 
 const TURNTABLE: BlockRanges = BlockRanges {
-    support: Support::Turntable,
+    support: BlockSupport::Turntable,
     ..PLAIN
 };
 

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
+use super::impression::{INK_REACH_MM, Impression};
 use super::leaf::PrintedLeaf;
-use super::page_ink::{INK_REACH_MM, PageInk};
-use super::page_map::PageMap;
 use super::page_sheet::PageSheet;
+use super::true_map::TruePageMap;
 use crate::demo::noise::lerp;
 use crate::raster::Grid;
 
@@ -23,8 +23,8 @@ pub(super) struct PageRendering<'a> {
     /// The leaf of which boxes are measured, and others.
     pub leaves: Vec<PrintedLeaf<'a>>,
     pub sheet: &'a PageSheet,
-    pub ink: &'a PageInk,
-    pub map: &'a PageMap,
+    pub ink: &'a Impression,
+    pub map: &'a TruePageMap,
     /// Width and height, pixels.
     pub size: [usize; 2],
     /// Number of characters of the first leaf.

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::kind::Support;
+use super::kind::BlockSupport;
 
 /// Distance of the vertices of a support, mm.
 const STEP_MM: f64 = 2.5;
@@ -18,16 +18,16 @@ pub(super) struct SupportMesh {
 impl SupportMesh {
     /// Draws the support of a block with the given half sizes and thickness, mm.
     pub(super) fn draw(
-        support: Support,
+        support: BlockSupport,
         half_mm: [f64; 2],
         thickness_mm: f64,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let mut mesh = Self::default();
         match support {
-            Support::Nothing => {}
-            Support::Turntable => mesh.add_turntable(half_mm, thickness_mm, rng),
-            Support::Holder => mesh.add_holder(half_mm, thickness_mm, rng),
+            BlockSupport::Nothing => {}
+            BlockSupport::Turntable => mesh.add_turntable(half_mm, thickness_mm, rng),
+            BlockSupport::Holder => mesh.add_holder(half_mm, thickness_mm, rng),
         }
         mesh
     }

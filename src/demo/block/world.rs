@@ -9,14 +9,13 @@ use super::block_truth::{BlockTruth, TruthSide};
 use super::carved_page::carve_page;
 use super::face_field::FaceField;
 use super::facets::triangle_count;
-use super::kind::{BlockKind, PageExtent, Support};
+use super::impression::Impression;
+use super::kind::{BlockKind, BlockSupport, PageExtent};
 use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
 use super::mesh_file::{BlockMeshFormat, write_solid};
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
-use super::page_ink::PageInk;
-use super::page_map::PageMap;
 use super::page_sheet::PageSheet;
 use super::pose::{BlockPose, FaceSide, SideFrame};
 use super::relief::BlockRelief;
@@ -24,6 +23,7 @@ use super::seeding::{hash, part_rng};
 use super::solid::{BlockSolid, ScanNoise, ScannedPart};
 use super::support::SupportMesh;
 use super::text_source::TextSource;
+use super::true_map::TruePageMap;
 use super::via_labels::{LabelledBox, via_project};
 use crate::demo::draw::within;
 use crate::demo::glyph::Glyphs;
@@ -69,7 +69,7 @@ pub struct BlockWorld {
     /// The layout of the printed side.
     layout: PageLayout,
     side: FaceSide,
-    map: PageMap,
+    map: TruePageMap,
     scene: PageScene,
     page: PageFileBytes,
     /// The layout on the page, which is another one if the page does not belong to the block.
@@ -134,9 +134,9 @@ impl BlockWorld {
         };
         let beside = other.map(|(layout, _)| layout);
         let scene = PageScene::draw(ranges, &printed, beside, &mut rng);
-        let (map, size) = PageMap::draw(ranges, scene.view, &mut rng);
+        let (map, size) = TruePageMap::draw(ranges, scene.view, &mut rng);
         let sheet = PageSheet::draw(scene.sheet, scene.gutter_u, &mut rng);
-        let ink = PageInk::draw(&mut rng);
+        let ink = Impression::draw(&mut rng);
         let own = match other {
             Some((_, field)) if ranges.page_of_other => {
                 PrintedLeaf::of_page(field, None, scene.clip_u)
@@ -201,7 +201,7 @@ impl BlockWorld {
         let outer = self.layout.outer;
         BlockTruth {
             schema: 1,
-            kind: self.choice.kind.name(),
+            kind: self.choice.kind,
             seed: self.choice.seed,
             spacing_mm: self.choice.spacing_mm,
             triangles: self.triangles(),
@@ -272,8 +272,8 @@ fn scan_block(
     let thickness_mm = rng.random_range(18.0..25.0);
     let part = match (&back, ranges.support) {
         (Some(_), _) => ScannedPart::Everything,
-        (None, Support::Holder | Support::Turntable) => ScannedPart::FaceAndWalls,
-        (None, Support::Nothing) => {
+        (None, BlockSupport::Holder | BlockSupport::Turntable) => ScannedPart::FaceAndWalls,
+        (None, BlockSupport::Nothing) => {
             let parts = [
                 ScannedPart::Face,
                 ScannedPart::FaceAndWalls,

@@ -10,7 +10,7 @@ pub(super) const INK_REACH_MM: f64 = 0.45;
 
 /// One inked impression of a whole block.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PageInk {
+pub(super) struct Impression {
     colour: [f64; 3],
     spread_mm: f64,
     spread: Noise,
@@ -26,7 +26,7 @@ pub(super) struct PageInk {
     speck_from: f64,
 }
 
-impl PageInk {
+impl Impression {
     /// Draws the ink of an impression.
     pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         let grey = rng.random_range(18.0..46.0);

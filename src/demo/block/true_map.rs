@@ -28,7 +28,7 @@ struct SheetWave {
 
 /// A smooth warp, then shrinkage, shear and rotation, then perspective, then quarter turns and the resolution.
 #[derive(Debug, Clone)]
-pub(super) struct PageMap {
+pub(super) struct TruePageMap {
     waves: [[SheetWave; 3]; 2],
     linear: [[f64; 2]; 2],
     /// Inverse of `linear`.
@@ -41,7 +41,7 @@ pub(super) struct PageMap {
     shift_px: [f64; 2],
 }
 
-impl PageMap {
+impl TruePageMap {
     /// Draws the map of an image that shows at least a box of the face frame. Returns it with the image's width and
     /// height in pixels.
     pub(super) fn draw(
@@ -176,7 +176,7 @@ fn inverse([[a, b], [c, d]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::PageMap;
+    use super::TruePageMap;
     use crate::demo::block::kind::BlockKind;
     use crate::demo::block::seeding::part_rng;
     use crate::demo::polygon::BoundsMm;
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn inverse_leads_back_and_the_image_contains_the_view() {
         for (seed, kind) in (0..30).zip(BlockKind::ALL.into_iter().cycle()) {
-            let (map, size) = PageMap::draw(kind.ranges(), VIEW, &mut part_rng(seed, 0));
+            let (map, size) = TruePageMap::draw(kind.ranges(), VIEW, &mut part_rng(seed, 0));
             for point in [[0.0, 0.0], [-149.0, 109.0], [149.0, -109.0], [-20.0, 75.0]] {
                 let pixel = map.page_from_face(point);
                 let back = map.face_from_page(pixel);
@@ -204,7 +204,7 @@ mod tests {
     fn a_turned_page_is_not_mirrored() {
         for seed in 0..8 {
             let ranges = BlockKind::QuarterTurn.ranges();
-            let (map, _) = PageMap::draw(ranges, VIEW, &mut part_rng(seed, 0));
+            let (map, _) = TruePageMap::draw(ranges, VIEW, &mut part_rng(seed, 0));
             let [origin, right, down] =
                 [[0.0, 0.0], [50.0, 0.0], [0.0, 50.0]].map(|point| map.page_from_face(point));
             let [a, b] = [right, down].map(|end| [end[0] - origin[0], end[1] - origin[1]]);
