@@ -7,6 +7,7 @@ mod attacks;
 mod backup;
 mod bit_flips;
 mod blocks;
+mod block_demo;
 mod browser;
 mod check;
 mod cli;
