@@ -115,7 +115,7 @@ fn find_poses(
     let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
     let print_px = longest(&print.known);
     if let Some(expected) = expected {
-        let near = near_expected(&print_base, wood, &found, expected, print_px);
+        let near = near_expected(&print_base, wood, &found, expected, &print.known);
         prefer_expected(&mut found, near);
     }
     require_upright(&found)?;
@@ -140,8 +140,14 @@ fn near_expected(
     wood: &ImagePyramid,
     found: &[PoseCandidate],
     expected: &Affine2,
-    print_px: f64,
+    known: &Mask,
 ) -> Option<PoseCandidate> {
+    let bounds = known.bounding_box()?;
+    let print_px = bounds.longest_side() as f64;
+    let print_middle = [
+        (bounds.x0 + bounds.x1 - 1) as f64 / 2.0,
+        (bounds.y0 + bounds.y1 - 1) as f64 / 2.0,
+    ];
     if expected.determinant() <= 0.0 {
         return None;
     }
@@ -153,12 +159,8 @@ fn near_expected(
         score: 0.0,
         mirrored: false,
     };
-    let middle = moving
-        .work_from_image
-        .inverse()
-        .map_or([0.0; 2], |image_from_work| {
-            image_from_work.apply(moving.centre())
-        });
+    // The point of the depth map that is expected at the middle of the print.
+    let middle = expected.inverse()?.apply(print_middle);
     let is_near = |pose: &PoseCandidate| {
         let ratio = pose.fixed_from_moving.scale() / start.fixed_from_moving.scale();
         let [a, b] = [pose, &start].map(|pose| pose.fixed_from_moving.apply(middle));
