@@ -20,6 +20,9 @@ const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
+/// One of so many triangles shows how far the block extends along its axes, with a margin in mm.
+const EXTENT_SAMPLE: usize = 64;
+const EXTENT_MARGIN_MM: f64 = 3.0;
 
 /// The frame of a block: axes along the face, and the unit.
 ///
@@ -47,7 +50,6 @@ struct AreaSums {
     first: Vector3<f64>,
     second: Matrix3<f64>,
     normals: Matrix3<f64>,
-    bounds: [Vector3<f64>; 2],
 }
 
 impl AreaSums {
@@ -57,10 +59,6 @@ impl AreaSums {
             first: Vector3::new(0.0, 0.0, 0.0),
             second: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             normals: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            bounds: [
-                Vector3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-                Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-            ],
         }
     }
 
@@ -71,8 +69,6 @@ impl AreaSums {
             let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
             let normal = (b - a).cross(&(c - a));
             let area = normal.norm();
-            sums.bounds[0] = sums.bounds[0].inf(&a).inf(&b).inf(&c);
-            sums.bounds[1] = sums.bounds[1].sup(&a).sup(&b).sup(&c);
             if area <= 0.0 {
                 continue;
             }
@@ -90,8 +86,6 @@ impl AreaSums {
         self.first += other.first;
         self.second += other.second;
         self.normals += other.normals;
-        self.bounds[0] = self.bounds[0].inf(&other.bounds[0]);
-        self.bounds[1] = self.bounds[1].sup(&other.bounds[1]);
     }
 }
 
@@ -108,6 +102,7 @@ impl Orientation {
         let mut sums = AreaSums::empty();
         let mut count = 0;
         let mut origin = None;
+        let mut sample: Vec<Vector3<f32>> = Vec::new();
         mesh.pass(&mut |triangles| {
             // Positions relative to the first corner keep their precision far from the origin.
             let origin = *origin.get_or_insert_with(|| Vector3::from(triangles[0][0]));
@@ -118,17 +113,20 @@ impl Orientation {
             for part in &parts {
                 sums.add(part);
             }
+            let corners = triangles.iter().step_by(EXTENT_SAMPLE).flatten();
+            sample.extend(corners.map(|corner| (Vector3::from(*corner) - origin).cast::<f32>()));
             count += triangles.len() as u64;
             Ok::<(), MeshReadError>(())
         })?;
         let Some(origin) = origin.filter(|_| sums.area > 0.0) else {
             return Err(BlockError::NoArea { triangles: count });
         };
-        Ok(Self::of_sums(&sums, origin, unit, count))
+        Ok(Self::of_sums(&sums, &sample, origin, unit, count))
     }
 
     fn of_sums(
         sums: &AreaSums,
+        sample: &[Vector3<f32>],
         origin: Vector3<f64>,
         unit: Option<LengthUnit>,
         triangles: u64,
@@ -149,13 +147,9 @@ impl Orientation {
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
         let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
         let half_extent_mm = axes.map(|axis| {
-            let corner = |k: usize| {
-                let bound = |axis: usize| sums.bounds[k >> axis & 1][axis];
-                Vector3::new(bound(0), bound(1), bound(2)) - mean
-            };
-            let farthest = (0..8)
-                .map(|k| axis.dot(&corner(k)).abs())
-                .fold(0.0, f64::max);
+            let distance = |point: &Vector3<f32>| axis.dot(&(point.cast::<f64>() - mean)).abs();
+            let farthest = sample.iter().map(distance).fold(0.0, f64::max);
+            let farthest = farthest + EXTENT_MARGIN_MM / mm;
             farthest.min(REACH * deviation(&axis).max(long_side / 20.0)) * mm
         });
         Self {
