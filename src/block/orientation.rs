@@ -75,7 +75,9 @@ impl AreaSums {
             let middle = (a + b + c) / 3.0;
             sums.area += area;
             sums.first += middle * area;
-            sums.second += middle * middle.transpose() * area;
+            // Exact for a triangle of any size.
+            let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            sums.second += (corners + middle * middle.transpose() * 9.0) * (area / 12.0);
             sums.normals += normal * normal.transpose() / area;
         }
         sums
@@ -195,5 +197,78 @@ fn with_fixed_sign(axis: Vector3<f64>) -> Vector3<f64> {
         -axis
     } else {
         axis
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Rotation3, Vector3};
+
+    use super::Orientation;
+    use crate::block::BlockError;
+    use crate::domain::LengthUnit;
+    use crate::mesh::{Mesh, Vertices};
+
+    /// A plate of 320 x 200 x 20 mm in any pose, in a unit of `mm` millimetres.
+    fn plate(mm: f64) -> (Mesh, Rotation3<f64>) {
+        let rotation = Rotation3::from_euler_angles(0.7, -0.4, 1.9);
+        let corner = |k: usize| {
+            let half = [160.0, 100.0, 10.0];
+            let sign = |axis: usize| if k >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            Vector3::new(sign(0) * half[0], sign(1) * half[1], sign(2) * half[2])
+        };
+        let place = |k: usize| (rotation * corner(k) + Vector3::new(900.0, -50.0, 30.0)) / mm;
+        let vertices: Vertices = (0..8).map(|k| place(k).into()).collect();
+        let quads = [
+            [0, 1, 3, 2],
+            [4, 6, 7, 5],
+            [0, 4, 5, 1],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 5, 7, 3],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+            .collect();
+        (
+            Mesh {
+                vertices,
+                triangles,
+            },
+            rotation,
+        )
+    }
+
+    #[test]
+    fn axes_and_unit_of_a_plate_are_found() {
+        for unit in LengthUnit::ALL {
+            let (mesh, rotation) = plate(unit.mm());
+            let found = Orientation::find(&mut &mesh, None).unwrap();
+            assert_eq!(found.mm, unit.mm());
+            let normal = Vector3::from(found.axes[2]).dot(&(rotation * Vector3::z()));
+            let long = Vector3::from(found.axes[0]).dot(&(rotation * Vector3::x()));
+            assert!(normal.abs() > 0.9999 && long.abs() > 0.9999);
+            let [u, v, n] = found.axes.map(Vector3::from);
+            assert!((u.cross(&v) - n).norm() < 1e-9);
+            assert!((found.half_extent_mm[0] - 163.0).abs() < 1.0, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_given_unit_is_used() {
+        let (mesh, _) = plate(1.0);
+        let found = Orientation::find(&mut &mesh, Some(LengthUnit::Cm)).unwrap();
+        assert_eq!(found.mm, 10.0);
+    }
+
+    #[test]
+    fn a_mesh_without_area_is_refused() {
+        let mesh = Mesh {
+            vertices: [[0.0; 3]; 3].into_iter().collect(),
+            triangles: [[0, 1, 2]].into_iter().collect(),
+        };
+        let refused = Orientation::find(&mut &mesh, None);
+        assert!(matches!(refused, Err(BlockError::NoArea { triangles: 1 })));
     }
 }
