@@ -36,7 +36,7 @@ pub(super) use while_unavailable;
 /// Stores a computed stage. Fails the block instead if the output is not valid.
 pub(super) async fn store_stage(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     stage: BlockStage,
     computed: ComputedBlockStage,
 ) -> Result<AfterStage, RunError> {
@@ -93,7 +93,7 @@ pub(super) async fn store_stage(
 
 async fn advance(
     context: &RunContext,
-    mut block: BlockInProgress,
+    mut block: Box<BlockInProgress>,
     record: BlockStageRecord,
     checkpoint: BlockCheckpoint,
     next: BlockStage,
@@ -115,7 +115,7 @@ async fn advance(
 
 async fn finish_cut(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     checkpoint: BlockCheckpoint,
     characters: Vec<NewCharacter>,
 ) -> Result<AfterStage, RunError> {
@@ -156,7 +156,7 @@ async fn finish_cut(
 /// Stores a failure of a stage.
 pub(super) async fn store_failure(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     stage: BlockStage,
     error: BlockStageError,
     ms: Option<u64>,
