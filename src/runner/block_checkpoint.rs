@@ -12,8 +12,8 @@ use super::policy;
 use super::run_context::RunContext;
 use super::stage_output::result_hash;
 use crate::catalog::{
-    BlockCheckpoint, BlockFailure, BlockFailureAction, CutOutcome, CutPair, CutSummary,
-    InputVersion, MadeWith, NewCharacter,
+    BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
+    MadeWith, NewCharacter,
 };
 use crate::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
@@ -125,9 +125,9 @@ async fn finish_cut(
         catalog.finish_cut(lease.clone(), checkpoint.clone(), characters.clone())
     );
     let summary = match stored? {
-        CutOutcome::Stored(summary) => summary,
-        CutOutcome::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
-        CutOutcome::NameTaken(taken) => {
+        CutReply::Stored(summary) => summary,
+        CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
+        CutReply::NameTaken(taken) => {
             let text = format!(
                 "there is a pair {taken} that was not cut from this block; import the block with another --name"
             );

@@ -10,6 +10,7 @@ mod block_artifacts;
 mod block_checkpoint;
 mod block_inputs;
 mod block_pipeline;
+mod block_plan;
 mod block_progress;
 mod block_slot;
 mod block_stages;

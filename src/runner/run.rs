@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use super::block_inputs;
 use super::block_pipeline::BlockPipeline;
+use super::block_plan;
 use super::block_stages::BlockStages;
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
@@ -23,7 +23,7 @@ use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
-use crate::catalog::{BlockSettings, Catalog, DeadWorker, Fingerprints, PairSelection};
+use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection};
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
@@ -35,11 +35,6 @@ const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
-}
-
-/// Returns the settings of the stages of blocks.
-pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
-    BlockSettings::new(|stage| stages.settings(stage))
 }
 
 /// What computes the stages of a run.
@@ -240,25 +235,9 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
-        self.plan_blocks(&limits).await
-    }
-
-    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
-    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
-        if self.selection.is_some() {
-            return Ok(());
+        if self.selection.is_none() {
+            block_plan::requeue(self.project, catalog, self.blocks, options, &limits, now).await?;
         }
-        let (catalog, policy) = (self.catalog, self.options.rerun);
-        block_inputs::store_changes(self.project, catalog, limits).await?;
-        let settings = block_settings(self.blocks);
-        let requeued = catalog.retry_while_unavailable(async || {
-            catalog.requeue_stale_blocks(&settings, policy).await
-        });
-        requeued.await?;
-        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        let ended = catalog
-            .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await);
-        ended.await?;
         Ok(())
     }
 

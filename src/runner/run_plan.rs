@@ -2,10 +2,11 @@
 
 use super::block_inputs;
 use super::block_pipeline::BlockPipeline;
+use super::block_plan::block_settings;
 use super::error::RunError;
 use super::input_changes;
 use super::options::RunOptions;
-use super::run::{block_settings, fingerprints, read_limits, selection};
+use super::run::{fingerprints, read_limits, selection};
 use super::stop::Stop;
 use crate::catalog::{BlockPlanEntry, Catalog, Plan};
 use crate::stages::Settings;

@@ -31,7 +31,7 @@ pub struct CutSummary {
 
 /// What became of the checkpoint of a cut.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CutOutcome {
+pub enum CutReply {
     /// It was stored.
     Stored(CutSummary),
     /// The lease was lost; nothing was stored.
@@ -65,7 +65,7 @@ impl Catalog {
         lease: BlockLease,
         stage: BlockCheckpoint,
         characters: Vec<NewCharacter>,
-    ) -> Result<CutOutcome> {
+    ) -> Result<CutReply> {
         self.in_transaction(move |conn| {
             Box::pin(async move { finish(conn, &lease, &stage, &characters).await })
         })
@@ -78,7 +78,7 @@ async fn finish(
     lease: &BlockLease,
     stage: &BlockCheckpoint,
     found: &[NewCharacter],
-) -> Result<CutOutcome> {
+) -> Result<CutReply> {
     let name = query_scalar(NAME).bind(lease.block.0);
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
@@ -89,11 +89,11 @@ async fn finish(
         .fetch_optional(&mut *conn)
         .await?;
     if let Some(taken) = taken {
-        return Ok(CutOutcome::NameTaken(taken));
+        return Ok(CutReply::NameTaken(taken));
     }
     match checkpoint::store(conn, lease, stage).await? {
-        Stored::LeaseLost => return Ok(CutOutcome::LeaseLost),
-        Stored::Before => return Ok(CutOutcome::Stored(CutSummary::default())),
+        Stored::LeaseLost => return Ok(CutReply::LeaseLost),
+        Stored::Before => return Ok(CutReply::Stored(CutSummary::default())),
         Stored::Now => {}
     }
     let mut deltas = Deltas::default();
@@ -101,7 +101,7 @@ async fn finish(
     let gone = characters::store(conn, lease.block, &name, found).await?;
     let retired = retired::retire(conn, &gone, stage.at, &mut deltas).await?;
     deltas.apply(conn).await?;
-    Ok(CutOutcome::Stored(CutSummary { retired, ..summary }))
+    Ok(CutReply::Stored(CutSummary { retired, ..summary }))
 }
 
 /// Returns the pairs to import, each with its files.

@@ -3,7 +3,7 @@
 use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::catalog::{
-    BlockAttributes, BlockInputVersions, BlockReason, CheckpointOutcome, CutOutcome, NewVerdict,
+    BlockAttributes, BlockInputVersions, BlockReason, CheckpointOutcome, CutReply, NewVerdict,
     ReviewContext,
 };
 use crate::domain::{BlockCharacterState, BlockStage, JobStatus, Stage, ThresholdMetric, Verdict};
@@ -117,7 +117,7 @@ async fn a_pair_that_is_not_of_the_block_is_not_replaced() {
     let row = super::row("b_a");
     world.catalog.import(vec![row], 1).await.expect("imported");
     let cut = world.finish_block(vec![character("a", "a")]).await;
-    assert_eq!(cut, CutOutcome::NameTaken(name("b_a")));
+    assert_eq!(cut, CutReply::NameTaken(name("b_a")));
     let states = world.catalog.block_states().await.expect("a read");
     assert_eq!(states[0].next_stage, Some(BlockStage::Cut));
     assert_eq!(world.character_states().await, []);

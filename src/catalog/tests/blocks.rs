@@ -5,7 +5,7 @@ use serde_json::json;
 use super::{World, register};
 use crate::catalog::{
     BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutOutcome, CutPair, CutSummary,
+    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutPair, CutReply, CutSummary,
     DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy,
 };
 use crate::domain::{
@@ -97,7 +97,7 @@ impl World {
     }
 
     /// Runs the remaining stages of the next block. The last one cuts these characters.
-    pub(super) async fn finish_block(&self, characters: Vec<NewCharacter>) -> CutOutcome {
+    pub(super) async fn finish_block(&self, characters: Vec<NewCharacter>) -> CutReply {
         let (mut lease, work) = self.leased_block().await;
         while lease.cursor() != BlockStage::Cut {
             let stage = done(&work, lease.cursor());
@@ -145,8 +145,8 @@ pub(super) async fn world() -> World {
     world
 }
 
-pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> CutOutcome {
-    CutOutcome::Stored(CutSummary {
+pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> CutReply {
+    CutReply::Stored(CutSummary {
         added,
         changed,
         unchanged,
