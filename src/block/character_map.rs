@@ -4,14 +4,14 @@ use super::align::Face;
 use super::characters::PlacedCharacter;
 use super::page_map::PageMap;
 use super::relief::surface_height;
-use crate::domain::Affine2;
+use crate::domain::{Affine2, PrintFromMesh};
 
 /// The affine map at the middle of a character.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CharacterMap {
     /// Row 1 and 2 give the pixel of the page of a point `[x, y, z, 1]` of the mesh, row 3 its height over the tops of the
     /// strokes in mesh units.
-    pub page_from_mesh: [[f64; 4]; 3],
+    pub page_from_mesh: PrintFromMesh,
 }
 
 impl CharacterMap {
@@ -42,20 +42,21 @@ impl CharacterMap {
             rows[2][3] -= frame.axes[2][axis] * frame.centre[axis];
         }
         Self {
-            page_from_mesh: rows,
+            page_from_mesh: PrintFromMesh(rows),
         }
     }
 
     /// Returns the same map to the pixels of a crop of the page; `None` if the crop has no inverse.
-    pub fn print_from_mesh(&self, page_from_crop: &Affine2) -> Option<[[f64; 4]; 3]> {
+    pub fn print_from_mesh(&self, page_from_crop: &Affine2) -> Option<PrintFromMesh> {
         let crop_from_page = page_from_crop.inverse()?.0;
-        let mut rows = self.page_from_mesh;
+        let page = self.page_from_mesh.0;
+        let mut rows = page;
         for (row, [a, b, c]) in rows.iter_mut().zip(crop_from_page) {
             for axis in 0..4 {
-                row[axis] = a * self.page_from_mesh[0][axis] + b * self.page_from_mesh[1][axis];
+                row[axis] = a * page[0][axis] + b * page[1][axis];
             }
             row[3] += c;
         }
-        Some(rows)
+        Some(PrintFromMesh(rows))
     }
 }

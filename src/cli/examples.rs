@@ -6,7 +6,7 @@ use clap::Command;
 const EXAMPLES: [(&str, &str); 28] = [
     (
         "demo",
-        "mocban demo\nmocban demo trial --tier hard --pairs 100",
+        "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
     ),
     (
         "import",

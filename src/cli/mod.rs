@@ -15,6 +15,8 @@ mod context;
 mod copy;
 mod db;
 mod demo;
+mod demo_block;
+mod demo_folder;
 mod error_text;
 mod examples;
 mod exit;

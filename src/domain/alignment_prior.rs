@@ -1,0 +1,14 @@
+//! The alignment that the registration of a whole block expects of one of its characters.
+
+use serde::{Deserialize, Serialize};
+
+use super::transform::PrintFromMesh;
+
+/// The expected alignment of a pair that was cut from a block.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct AlignmentPrior {
+    /// Maps points of the mesh to pixels of the print.
+    pub print_from_mesh: PrintFromMesh,
+    /// How sure the position is, 0..=1.
+    pub confidence: f64,
+}
