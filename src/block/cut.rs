@@ -19,7 +19,7 @@ const ABOVE_MM: f64 = 2.0;
 /// Cells of the grid that finds the characters of a point, mm.
 const CELL_MM: f64 = 0.5;
 /// Triangles in memory before they are written to the spill file.
-const MAX_BUFFERED: usize = 1 << 20;
+const MAX_BUFFERED: usize = 1 << 19;
 /// Triangles that one task assigns.
 const TASK: usize = 8192;
 /// Bytes of a triangle in the spill file.
@@ -174,7 +174,8 @@ impl<F: Read + Write + Seek> Spill<'_, F> {
             self.file.write_all(&bytes)?;
             parts.push((self.end, triangles.len()));
             self.end += bytes.len() as u64;
-            triangles.clear();
+            // Scans are in spatial order: a character that is filled now gets few triangles later.
+            *triangles = Vec::new();
         }
         self.count = 0;
         Ok(())

@@ -15,6 +15,8 @@ mod orientation;
 mod page_ink;
 mod page_map;
 mod relief;
+#[cfg(test)]
+mod test_world;
 mod windows;
 
 pub use agreement::{Agreement, Support};

@@ -20,6 +20,9 @@ const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
+/// One of so many triangles shows how far the block extends along its axes, with a margin in mm.
+const EXTENT_SAMPLE: usize = 64;
+const EXTENT_MARGIN_MM: f64 = 3.0;
 
 /// The frame of a block: axes along the face, and the unit.
 ///
@@ -47,7 +50,6 @@ struct AreaSums {
     first: Vector3<f64>,
     second: Matrix3<f64>,
     normals: Matrix3<f64>,
-    bounds: [Vector3<f64>; 2],
 }
 
 impl AreaSums {
@@ -57,10 +59,6 @@ impl AreaSums {
             first: Vector3::new(0.0, 0.0, 0.0),
             second: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             normals: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            bounds: [
-                Vector3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-                Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-            ],
         }
     }
 
@@ -71,15 +69,15 @@ impl AreaSums {
             let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
             let normal = (b - a).cross(&(c - a));
             let area = normal.norm();
-            sums.bounds[0] = sums.bounds[0].inf(&a).inf(&b).inf(&c);
-            sums.bounds[1] = sums.bounds[1].sup(&a).sup(&b).sup(&c);
             if area <= 0.0 {
                 continue;
             }
             let middle = (a + b + c) / 3.0;
             sums.area += area;
             sums.first += middle * area;
-            sums.second += middle * middle.transpose() * area;
+            // Exact for a triangle of any size.
+            let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            sums.second += (corners + middle * middle.transpose() * 9.0) * (area / 12.0);
             sums.normals += normal * normal.transpose() / area;
         }
         sums
@@ -90,8 +88,6 @@ impl AreaSums {
         self.first += other.first;
         self.second += other.second;
         self.normals += other.normals;
-        self.bounds[0] = self.bounds[0].inf(&other.bounds[0]);
-        self.bounds[1] = self.bounds[1].sup(&other.bounds[1]);
     }
 }
 
@@ -108,6 +104,7 @@ impl Orientation {
         let mut sums = AreaSums::empty();
         let mut count = 0;
         let mut origin = None;
+        let mut sample: Vec<Vector3<f32>> = Vec::new();
         mesh.pass(&mut |triangles| {
             // Positions relative to the first corner keep their precision far from the origin.
             let origin = *origin.get_or_insert_with(|| Vector3::from(triangles[0][0]));
@@ -118,17 +115,20 @@ impl Orientation {
             for part in &parts {
                 sums.add(part);
             }
+            let corners = triangles.iter().step_by(EXTENT_SAMPLE).flatten();
+            sample.extend(corners.map(|corner| (Vector3::from(*corner) - origin).cast::<f32>()));
             count += triangles.len() as u64;
             Ok::<(), MeshReadError>(())
         })?;
         let Some(origin) = origin.filter(|_| sums.area > 0.0) else {
             return Err(BlockError::NoArea { triangles: count });
         };
-        Ok(Self::of_sums(&sums, origin, unit, count))
+        Ok(Self::of_sums(&sums, &sample, origin, unit, count))
     }
 
     fn of_sums(
         sums: &AreaSums,
+        sample: &[Vector3<f32>],
         origin: Vector3<f64>,
         unit: Option<LengthUnit>,
         triangles: u64,
@@ -149,13 +149,9 @@ impl Orientation {
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
         let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
         let half_extent_mm = axes.map(|axis| {
-            let corner = |k: usize| {
-                let bound = |axis: usize| sums.bounds[k >> axis & 1][axis];
-                Vector3::new(bound(0), bound(1), bound(2)) - mean
-            };
-            let farthest = (0..8)
-                .map(|k| axis.dot(&corner(k)).abs())
-                .fold(0.0, f64::max);
+            let distance = |point: &Vector3<f32>| axis.dot(&(point.cast::<f64>() - mean)).abs();
+            let farthest = sample.iter().map(distance).fold(0.0, f64::max);
+            let farthest = farthest + EXTENT_MARGIN_MM / mm;
             farthest.min(REACH * deviation(&axis).max(long_side / 20.0)) * mm
         });
         Self {
@@ -201,5 +197,78 @@ fn with_fixed_sign(axis: Vector3<f64>) -> Vector3<f64> {
         -axis
     } else {
         axis
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Rotation3, Vector3};
+
+    use super::Orientation;
+    use crate::block::BlockError;
+    use crate::domain::LengthUnit;
+    use crate::mesh::{Mesh, Vertices};
+
+    /// A plate of 320 x 200 x 20 mm in any pose, in a unit of `mm` millimetres.
+    fn plate(mm: f64) -> (Mesh, Rotation3<f64>) {
+        let rotation = Rotation3::from_euler_angles(0.7, -0.4, 1.9);
+        let corner = |k: usize| {
+            let half = [160.0, 100.0, 10.0];
+            let sign = |axis: usize| if k >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            Vector3::new(sign(0) * half[0], sign(1) * half[1], sign(2) * half[2])
+        };
+        let place = |k: usize| (rotation * corner(k) + Vector3::new(900.0, -50.0, 30.0)) / mm;
+        let vertices: Vertices = (0..8).map(|k| place(k).into()).collect();
+        let quads = [
+            [0, 1, 3, 2],
+            [4, 6, 7, 5],
+            [0, 4, 5, 1],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 5, 7, 3],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+            .collect();
+        (
+            Mesh {
+                vertices,
+                triangles,
+            },
+            rotation,
+        )
+    }
+
+    #[test]
+    fn axes_and_unit_of_a_plate_are_found() {
+        for unit in LengthUnit::ALL {
+            let (mesh, rotation) = plate(unit.mm());
+            let found = Orientation::find(&mut &mesh, None).unwrap();
+            assert_eq!(found.mm, unit.mm());
+            let normal = Vector3::from(found.axes[2]).dot(&(rotation * Vector3::z()));
+            let long = Vector3::from(found.axes[0]).dot(&(rotation * Vector3::x()));
+            assert!(normal.abs() > 0.9999 && long.abs() > 0.9999);
+            let [u, v, n] = found.axes.map(Vector3::from);
+            assert!((u.cross(&v) - n).norm() < 1e-9);
+            assert!((found.half_extent_mm[0] - 163.0).abs() < 1.0, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_given_unit_is_used() {
+        let (mesh, _) = plate(1.0);
+        let found = Orientation::find(&mut &mesh, Some(LengthUnit::Cm)).unwrap();
+        assert_eq!(found.mm, 10.0);
+    }
+
+    #[test]
+    fn a_mesh_without_area_is_refused() {
+        let mesh = Mesh {
+            vertices: [[0.0; 3]; 3].into_iter().collect(),
+            triangles: [[0, 1, 2]].into_iter().collect(),
+        };
+        let refused = Orientation::find(&mut &mesh, None);
+        assert!(matches!(refused, Err(BlockError::NoArea { triangles: 1 })));
     }
 }
