@@ -1,5 +1,7 @@
 //! Pairs that are cut from blocks: added, changed, retired and brought back.
 
+use serde_json::json;
+
 use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::catalog::{
@@ -204,4 +206,31 @@ async fn judge(world: &World, pair: &str) {
     };
     let stored = world.catalog.verdict_set(vec![verdict], 5).await;
     stored.expect("stored");
+}
+
+#[tokio::test]
+async fn a_prior_that_hardly_differs_leaves_its_pair_unchanged() {
+    let world = world().await;
+    let with_shift = |shift: f64| {
+        let mut one = character("a", "a");
+        let rows = [
+            [10.0, 0.0, 0.0, shift],
+            [0.0, -10.0, 0.0, 40.0],
+            [0.0, 0.0, 1.0, 0.0],
+        ];
+        let prior = json!({ "print_from_mesh": rows, "confidence": 0.9 }).to_string();
+        one.cut.as_mut().expect("cut").prior = Some(prior);
+        vec![one]
+    };
+    assert_eq!(
+        world.finish_block(with_shift(0.0)).await,
+        stored(1, 0, 0, 0)
+    );
+    for (shift, expected) in [(0.01, stored(0, 0, 1, 0)), (5.0, stored(0, 1, 0, 0))] {
+        let known = world.catalog.known_blocks().await.expect("a read");
+        let reset = vec![(known[0].block, BlockStage::Cut)];
+        world.catalog.reset_blocks(reset).await.expect("reset");
+        let cut = world.finish_block(with_shift(shift)).await;
+        assert_eq!(cut, expected, "{shift}");
+    }
 }
