@@ -15,7 +15,7 @@ use super::demo_folder::{DemoContent, STOPPED, check_directory, replace_data};
 use super::exit::ExitCode;
 use super::files;
 use super::import::{self, ImportArgs};
-use super::import_blocks;
+use super::import_blocks::{self, BlockSource};
 use super::report;
 use super::run::{self, drive};
 use super::screen::Palette;
@@ -104,7 +104,11 @@ async fn block_demo(
         return Ok(ExitCode::Stopped);
     };
     let import = demo_block::import_args(&files, !args.no_labels);
-    let outcome = import_blocks::import_blocks(&import, context).await?;
+    let source = BlockSource::One {
+        args: &import,
+        unit: None,
+    };
+    let outcome = import_blocks::import_blocks(&source, false, context).await?;
     import_blocks::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");

@@ -10,7 +10,7 @@ use super::busy::Busy;
 use super::context::{Context, now};
 use super::demo_folder::{DemoContent, check_directory, replace_data};
 use super::files;
-use super::import::ImportArgs;
+use super::import_blocks::BlockArgs;
 use super::table::count;
 use crate::catalog::{Catalog, ImportChunk, StoredCharacter};
 use crate::demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
@@ -21,13 +21,13 @@ use crate::runner::{Stop, StopLevel};
 const NAME: &str = "block";
 
 /// Returns the arguments that import a block, with the boxes of its characters if `has_labels` is set.
-pub(super) fn import_args(files: &BlockFiles, has_labels: bool) -> ImportArgs {
-    ImportArgs {
+pub(super) fn import_args(files: &BlockFiles, has_labels: bool) -> BlockArgs {
+    BlockArgs {
         block: Some(files.mesh.clone()),
         page: Some(files.page.clone()),
         labels: has_labels.then(|| files.labels.clone()),
         name: Some(NAME.to_owned()),
-        ..ImportArgs::default()
+        ..BlockArgs::default()
     }
 }
 

@@ -32,6 +32,7 @@ mod man;
 mod manifest_file;
 mod metrics;
 mod missing_files;
+mod new_project;
 mod output;
 mod panics;
 mod progress;

@@ -14,7 +14,7 @@ fn write_blocks(dir: &Path, names: &[&str]) {
     for name in names {
         fs::write(dir.join(format!("{name}.stl")), TRIANGLE).expect("written");
         fs::write(dir.join(format!("{name}.png")), "no image").expect("written");
-        list.push_str(&format!("{name},{name}.stl,{name}.png,,mm,front\n"));
+        list.extend([name, ",", name, ".stl,", name, ".png,,mm,front\n"]);
     }
     fs::write(dir.join("blocks.csv"), list).expect("written");
 }
@@ -163,6 +163,6 @@ fn a_backup_holds_blocks_and_finds_their_files_again() {
     let shown = shown.expect(0).json();
     let mesh = shown["mesh_path"].as_str().expect("a path");
     assert!(mesh.ends_with("moved/b1.stl"), "{mesh}");
-    assert_eq!(shown["failure"]["class"].is_string(), true);
+    assert!(shown["failure"]["class"].is_string());
     mocban(dir.path(), &["-C", "restored", "check"]).expect(0);
 }
