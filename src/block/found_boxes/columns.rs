@@ -1,0 +1,168 @@
+//! Columns of text: the cheapest division of the page between valleys, rules and an even pitch.
+
+use super::layout::{CELL_MM, Layout};
+
+/// Pitches that are tried, mm, and the ratio of two neighbours.
+const PITCHES_MM: [f64; 2] = [7.0, 28.0];
+const PITCH_RATIO: f64 = 1.025;
+/// Widths of columns that are tried, in pitches.
+const WIDTHS: [f64; 2] = [0.65, 1.45];
+/// Widths of the strip at the fold, in pitches.
+const STRIP_WIDTHS: [f64; 2] = [0.4, 0.97];
+/// Cost of a column whose width differs by a whole pitch from the pitch.
+const WIDTH_COST: f64 = 6.0;
+/// Cost of a strip.
+const STRIP_COST: f64 = 0.5;
+/// Largest cost of ink on a boundary, in relation to the ink around it.
+const MAX_INK_COST: f64 = 1.5;
+/// What a boundary gains.
+const BOUNDARY_GAIN: f64 = 0.45;
+/// What a boundary on a rule gains, and a column over a rule costs.
+const RULE_GAIN: f64 = 1.0;
+const CROSSED_RULE_COST: f64 = 1.5;
+/// Distance of a boundary from its rule, mm.
+const RULE_REACH_MM: f64 = 0.7;
+
+/// A column of text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Column {
+    /// First position across and the one after the last, cells of the layout.
+    pub(super) across: [usize; 2],
+    /// Whether it is the narrow strip at the fold.
+    pub(super) is_strip: bool,
+}
+
+/// Columns and their pitch.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Columns {
+    /// From left to right.
+    pub(super) columns: Vec<Column>,
+    /// Distance of two columns, cells of the layout.
+    pub(super) pitch: f64,
+    /// Mean cost of a column.
+    pub(super) cost: f64,
+}
+
+/// Finds the columns within the frame; `None` if there is no room for one.
+pub(super) fn find_columns(layout: &Layout) -> Option<Columns> {
+    let profile = layout.profile_across();
+    let is_rule = rules_near(layout, profile.len());
+    let count = (PITCHES_MM[1] / PITCHES_MM[0]).ln() / PITCH_RATIO.ln();
+    (0..=count as i32)
+        .map(|k| PITCHES_MM[0] / CELL_MM * PITCH_RATIO.powi(k))
+        .filter_map(|pitch| divide(&profile, &is_rule, pitch))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .map(|mut found| {
+            let left = layout.inside[0];
+            for column in &mut found.columns {
+                column.across = column.across.map(|at| at + left);
+            }
+            found
+        })
+}
+
+/// Returns for each position the number of the rule near it, from 1; 0 where there is none.
+fn rules_near(layout: &Layout, count: usize) -> Vec<usize> {
+    let mut near = vec![0; count + 1];
+    let reach = RULE_REACH_MM / CELL_MM;
+    for (number, rule) in layout.inner_rules.iter().enumerate() {
+        let at = rule - layout.inside[0] as f64;
+        for (k, near) in near.iter_mut().enumerate() {
+            if (k as f64 - at).abs() <= reach {
+                *near = number + 1;
+            }
+        }
+    }
+    near
+}
+
+/// Returns the means of the values within `reach` of each position.
+fn means(values: &[f64], reach: usize) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    for value in values {
+        sums.push(sums[sums.len() - 1] + value);
+    }
+    (0..values.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(values.len()));
+            (sums[to] - sums[from]) / (to - from) as f64
+        })
+        .collect()
+}
+
+/// Divides a profile into columns of about one pitch.
+fn divide(profile: &[f64], is_rule: &[usize], pitch: f64) -> Option<Columns> {
+    let count = profile.len();
+    let all = profile.iter().sum::<f64>() / count as f64;
+    let around = means(profile, (pitch / 2.0) as usize);
+    let cut = |k: usize| {
+        if k == 0 || k == count {
+            return 0.0;
+        }
+        let ink = (profile[k - 1] + profile[k]) / 2.0;
+        let ink = (ink / around[k].max(0.3 * all).max(1e-9)).min(MAX_INK_COST);
+        let rule = if is_rule[k] > 0 { RULE_GAIN } else { 0.0 };
+        ink - BOUNDARY_GAIN - rule
+    };
+    let cuts: Vec<f64> = (0..=count).map(cut).collect();
+    let mut rules_before = vec![0_usize; count + 1];
+    for k in 1..=count {
+        let is_new = is_rule[k] > 0 && is_rule[k] != is_rule[k - 1];
+        rules_before[k] = rules_before[k - 1] + usize::from(is_new);
+    }
+    let last_rule = rules_before[count];
+    let crossed = |from: usize, to: usize| {
+        // Rules at either end belong to the boundary.
+        let first = rules_before[from];
+        let mut last = rules_before[to];
+        if is_rule[to] > 0 {
+            last -= 1;
+        }
+        last.min(last_rule).saturating_sub(first) as f64 * CROSSED_RULE_COST
+    };
+    let is_end = |k: usize| k == 0 || k == count || is_rule[k] > 0;
+    let mut best = vec![(f64::INFINITY, 0_usize, false); count + 1];
+    best[0] = (0.0, 0, false);
+    for to in 1..=count {
+        let shortest = (STRIP_WIDTHS[0] * pitch) as usize;
+        let longest = (WIDTHS[1] * pitch) as usize;
+        for from in to.saturating_sub(longest)..=to.saturating_sub(shortest.max(1)) {
+            if best[from].0.is_infinite() {
+                continue;
+            }
+            let width = (to - from) as f64 / pitch;
+            let even = WIDTH_COST * (width - 1.0) * (width - 1.0);
+            let is_strip = (STRIP_WIDTHS[0]..STRIP_WIDTHS[1]).contains(&width)
+                && is_end(from)
+                && is_end(to)
+                && STRIP_COST < even;
+            if !is_strip && width < WIDTHS[0] {
+                continue;
+            }
+            let cost = if is_strip { STRIP_COST } else { even };
+            let cost = best[from].0 + cost + cuts[to] + crossed(from, to);
+            if cost < best[to].0 {
+                best[to] = (cost, from, is_strip);
+            }
+        }
+    }
+    if best[count].0.is_infinite() {
+        return None;
+    }
+    let mut columns = Vec::new();
+    let mut to = count;
+    while to > 0 {
+        let (_, from, is_strip) = best[to];
+        columns.push(Column {
+            across: [from, to],
+            is_strip,
+        });
+        to = from;
+    }
+    columns.reverse();
+    Some(Columns {
+        columns,
+        pitch,
+        cost: best[count].0,
+    })
+}

@@ -1,0 +1,136 @@
+//! Finds the characters of a page without labels, on relief and ink together.
+
+mod columns;
+mod direction;
+mod layout;
+mod places;
+mod rows;
+mod rules;
+mod skew;
+mod text_image;
+
+use serde::{Deserialize, Serialize};
+
+use self::columns::find_columns;
+use self::direction::{is_upside_down, upright_image};
+use self::layout::CELL_MM;
+use self::places::{Half, Place, Strokes, measure, places};
+use self::rows::{RowPitches, find_rows};
+use super::align::BlockSide;
+use super::page_ink::PageInk;
+use super::page_map::PageMap;
+
+/// Least area of a character, mm^2, and least length of its longer side, in pitches.
+const MIN_AREA_MM2: f64 = 0.8;
+const MIN_SIDE: f64 = 0.25;
+/// Least mean relief below the ink of a character.
+const MIN_SUPPORT: f64 = 0.25;
+/// Least share of a character's strokes where page and block agree.
+const MIN_AGREED: f64 = 0.5;
+
+/// Half of a row of notes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoteHalf {
+    /// The right half, which is read first: `a`.
+    Right,
+    /// The left half: `b`.
+    Left,
+}
+
+/// A character that was found on a page.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FoundBox {
+    /// Left, top, right and bottom edge of its ink on the page, pixels; (0, 0) is the centre of the first pixel.
+    pub page_box: [f64; 4],
+    /// Number of the column from the right, from 1. The strip at the fold is a column.
+    pub column: u32,
+    /// Number of the row in its column from the top, from 1. Blanks do not count; two notes side by side are a row.
+    pub row: u32,
+    /// Half of a row of notes.
+    pub half: Option<NoteHalf>,
+    /// How sure it is that the box holds one whole character, 0..=1.
+    pub confidence: f64,
+}
+
+impl FoundBox {
+    /// Returns the name by column and row, such as `c03-r12` or `c03-r12a`.
+    pub fn name(&self) -> String {
+        let half = match self.half {
+            None => "",
+            Some(NoteHalf::Right) => "a",
+            Some(NoteHalf::Left) => "b",
+        };
+        format!("c{:02}-r{:02}{half}", self.column, self.row)
+    }
+}
+
+/// Finds the characters of a page in reading order: columns from right to left, each from the top.
+pub fn find_boxes(side: &BlockSide, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
+    let (image, layout) = upright_image(side, page, map);
+    let Some(columns) = find_columns(&layout) else {
+        return Vec::new();
+    };
+    let (rows, pitches) = find_rows(&layout, &columns);
+    let places = places(&columns, &rows);
+    let strokes = measure(&image, &layout, map, &places);
+    let is_upside_down = is_upside_down(&layout, &places, &strokes, &image, map);
+    numbered(&places, &strokes, &pitches, columns.columns.len(), is_upside_down)
+}
+
+/// Returns whether a place holds a character.
+fn is_character(place: &Place, strokes: &Strokes, pitches: &RowPitches) -> bool {
+    let pitch = if place.half.is_some() { pitches.note } else { pitches.row };
+    let [width, height] = strokes.size_mm();
+    strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
+}
+
+/// Numbers the characters in reading order and leaves out those that the block or the page does not show.
+fn numbered(
+    places: &[Place],
+    strokes: &[Strokes],
+    pitches: &RowPitches,
+    columns: usize,
+    is_upside_down: bool,
+) -> Vec<FoundBox> {
+    let mut characters: Vec<(u32, i64, Option<NoteHalf>, &Strokes)> = places
+        .iter()
+        .zip(strokes)
+        .filter(|(place, strokes)| is_character(place, strokes, pitches))
+        .map(|(place, strokes)| {
+            let half = place.half.map(|half| match (half, is_upside_down) {
+                (Half::Right, false) | (Half::Left, true) => NoteHalf::Right,
+                (Half::Left, false) | (Half::Right, true) => NoteHalf::Left,
+            });
+            if is_upside_down {
+                (place.column as u32 + 1, -(place.row as i64), half, strokes)
+            } else {
+                ((columns - place.column) as u32, place.row as i64, half, strokes)
+            }
+        })
+        .collect();
+    characters.sort_by_key(|(column, row, half, _)| (*column, *row, *half));
+    let mut boxes = Vec::new();
+    let (mut number, mut before) = (0, None);
+    for (column, row, half, strokes) in characters {
+        if before.is_none_or(|(last, _)| last != column) {
+            number = 0;
+        }
+        if before != Some((column, row)) {
+            number += 1;
+        }
+        before = Some((column, row));
+        let share = |count: usize| count as f64 / strokes.area as f64;
+        if strokes.support() < MIN_SUPPORT || share(strokes.agreed) < MIN_AGREED {
+            continue;
+        }
+        boxes.push(FoundBox {
+            page_box: strokes.page_bounds,
+            column,
+            row: number,
+            half,
+            confidence: strokes.support(),
+        });
+    }
+    boxes
+}
