@@ -1,8 +1,9 @@
 //! Named points at which a test can make the process die, stop, wait or panic.
 //!
 //! The environment variables below each name a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or
-//! `fit:claimed@0003`. The variable takes effect the N-th time that the pair reaches the point; without `@PAIR`, any
-//! pair counts. N is 1 by default; 0 means every time.
+//! `fit:claimed@0003`. The stages of blocks have the same points, with the name of a block after the `@`. The variable
+//! takes effect the N-th time that the pair reaches the point; without `@PAIR`, any pair counts. N is 1 by default; 0
+//! means every time.
 //!
 //! - `MOCBAN_BREAK_AT` aborts the process.
 //! - `MOCBAN_STOP_AT` stops the process until it receives SIGCONT.
@@ -12,7 +13,7 @@
 //!
 //! Only builds with debug assertions read these variables.
 
-use crate::domain::{PairName, Stage};
+use std::fmt::Display;
 
 /// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,10 +36,10 @@ pub(crate) enum Point {
 
 /// Dies, stops, waits or panics here if a test requests it.
 #[cfg(debug_assertions)]
-pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
+pub(crate) fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>) {
     let is_at = |failpoint: &Option<test_build::Failpoint>| {
         let failpoint = failpoint.as_ref();
-        failpoint.is_some_and(|failpoint| failpoint.fires(stage, point, pair))
+        failpoint.is_some_and(|failpoint| failpoint.fires(&stage, point, name))
     };
     if is_at(&test_build::BREAK_AT) {
         std::process::abort();
@@ -55,7 +56,7 @@ pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
 
 /// Does nothing in a release build.
 #[cfg(not(debug_assertions))]
-pub(crate) const fn hit(_stage: Stage, _point: Point, _pair: Option<&PairName>) {}
+pub(crate) fn hit(_stage: impl Display, _point: Point, _name: Option<&dyn Display>) {}
 
 /// The failpoints that the environment configures.
 #[cfg(debug_assertions)]
@@ -63,8 +64,7 @@ mod test_build {
     use std::sync::LazyLock;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    use super::Point;
-    use crate::domain::{PairName, Stage};
+    use super::{Display, Point};
 
     type Configured = LazyLock<Option<Failpoint>>;
 
@@ -123,8 +123,13 @@ mod test_build {
         }
 
         /// Counts a hit; returns whether it is the one to act on.
-        pub(super) fn fires(&self, stage: Stage, point: Point, pair: Option<&PairName>) -> bool {
-            let is_pair = |wanted: &String| pair.is_some_and(|pair| pair.as_str() == wanted);
+        pub(super) fn fires(
+            &self,
+            stage: &dyn Display,
+            point: Point,
+            name: Option<&dyn Display>,
+        ) -> bool {
+            let is_pair = |wanted: &String| name.is_some_and(|name| name.to_string() == *wanted);
             self.place == format!("{stage}:{point:?}").to_lowercase()
                 && self.pair.as_ref().is_none_or(is_pair)
                 && (self.hits.fetch_add(1, Ordering::SeqCst) + 1 == self.nth || self.nth == 0)

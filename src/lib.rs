@@ -180,14 +180,15 @@
 //! | `platform` | operations that differ between operating systems: identity of files, syncing, signals | |
 //! | `page_vec` | vectors on huge pages with a cache of freed pages | |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
-//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
+//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories; lists of blocks | `domain` |
+//! | `labels` | boxes of characters on a page: readers of eight formats, writers of VIA and COCO, names in reading order | `domain` |
 //! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
 //! | `block` | a whole block and the image of its page: height maps, registration, characters, cut | `domain`, `simd`, `mesh`, `raster` |
 //! | `local_server` | a web server for the browser of one user: guard, session, connection limits, frame of pages | `domain`, `platform` |
 //! | `failpoint` | named points at which a test can kill the process | `domain` |
 //! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster`, `platform` |
 //! | `catalog` | SQLite or PostgreSQL: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint`, `platform` |
-//! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
+//! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `block`, `labels`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
@@ -211,6 +212,7 @@ pub mod demo;
 pub mod domain;
 pub mod export;
 mod failpoint;
+pub mod labels;
 pub mod local_server;
 pub mod manifest;
 pub mod mesh;

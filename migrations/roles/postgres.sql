@@ -52,8 +52,9 @@ GRANT SELECT ON ALL TABLES IN SCHEMA {schema} TO mocban_viewer;
 GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA {schema} TO mocban_viewer;
 
 -- Workers: what `import`, `plan`, `run`, `worker` and `retry` write.
-GRANT INSERT, UPDATE ON worker, run_settings, fingerprint, pair, job, truth TO mocban_worker;
-GRANT INSERT, UPDATE, DELETE ON failure, attempt, stage_result, metric_result, counter_part TO mocban_worker;
+GRANT INSERT, UPDATE ON worker, run_settings, fingerprint, pair, truth, block, block_job TO mocban_worker;
+GRANT INSERT, UPDATE, DELETE ON job, retired_pair, failure, attempt, stage_result, metric_result, counter_part, block_result,
+    block_attempt, block_character TO mocban_worker;
 GRANT INSERT, UPDATE (value) ON checksum TO mocban_worker;
 
 -- Workers append verdicts with `verdict import`. Reviewers append all that the review page stores. Nobody else may, and
@@ -103,10 +104,10 @@ CREATE POLICY reviewer_adds_own ON manual_alignment_undo FOR INSERT TO mocban_re
     (SELECT a.reviewer = CAST(session_user AS text) FROM manual_alignment AS a WHERE a.id = manual_alignment_undo.alignment));
 
 -- Checksums, by the number of their table (`ChecksummedTable` in `src/catalog/records/checksums.rs`): workers store those
--- of pairs (0), true alignments (1) and verdicts (2), and change those of pairs and true alignments. Reviewers add those
+-- of pairs (0), true alignments (1), verdicts (2) and blocks (8), and change those of all but verdicts. Reviewers add those
 -- of the rows that they stored.
-CREATE POLICY worker_adds ON checksum FOR INSERT TO mocban_worker WITH CHECK (record IN (0, 1, 2));
-CREATE POLICY worker_changes ON checksum FOR UPDATE TO mocban_worker USING (record IN (0, 1)) WITH CHECK (record IN (0, 1));
+CREATE POLICY worker_adds ON checksum FOR INSERT TO mocban_worker WITH CHECK (record IN (0, 1, 2, 8));
+CREATE POLICY worker_changes ON checksum FOR UPDATE TO mocban_worker USING (record IN (0, 1, 8)) WITH CHECK (record IN (0, 1, 8));
 CREATE POLICY reviewer_adds_own ON checksum FOR INSERT TO mocban_reviewer WITH CHECK (CASE record
     WHEN 2 THEN EXISTS (SELECT 1 FROM verdict AS v WHERE v.id = checksum.row AND v.reviewer = CAST(session_user AS text))
     WHEN 3 THEN EXISTS (SELECT 1 FROM verdict_undo AS u JOIN verdict AS v ON v.act = u.act

@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 9;
+PRAGMA user_version = 10;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -30,6 +30,7 @@ CREATE TABLE fingerprint (
 ) STRICT;
 
 -- A pair as imported, and its input files as last read. `attributes` are the manifest columns that results depend on.
+-- `prior` is the alignment that is expected of a pair cut from a block.
 CREATE TABLE pair (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL UNIQUE,
@@ -40,6 +41,7 @@ CREATE TABLE pair (
     character TEXT,
     block TEXT,
     meta TEXT NOT NULL CHECK (json_valid(meta)),
+    prior TEXT CHECK (json_valid(prior)),
     attributes TEXT NOT NULL CHECK (json_valid(attributes)),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     mesh_stat TEXT,
@@ -260,6 +262,110 @@ CREATE TRIGGER manual_alignment_no_update BEFORE UPDATE ON manual_alignment BEGI
 CREATE TRIGGER manual_alignment_no_delete BEFORE DELETE ON manual_alignment BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_update BEFORE UPDATE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
 CREATE TRIGGER manual_alignment_undo_no_delete BEFORE DELETE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+
+-- The job of a pair whose box is gone from the labels of its block. It has no row in `job`, so runs and reports leave it
+-- out; its results and verdicts stay. `token` is the fencing token of the job.
+CREATE TABLE retired_pair (
+    pair INTEGER PRIMARY KEY REFERENCES pair (id),
+    stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
+    is_quarantined INTEGER NOT NULL CHECK (is_quarantined IN (0, 1)),
+    token INTEGER NOT NULL CHECK (token >= 0),
+    fingerprint INTEGER REFERENCES fingerprint (id),
+    low_confidence INTEGER NOT NULL CHECK (low_confidence IN (0, 1)),
+    at INTEGER NOT NULL
+) STRICT;
+
+-- A whole block as imported: the scan of a face, the image of its page, and perhaps labels; and these files as last read.
+-- `attributes` are the columns that results depend on.
+CREATE TABLE block (
+    id INTEGER PRIMARY KEY,
+    name TEXT NOT NULL UNIQUE,
+    mesh_path TEXT NOT NULL,
+    page_path TEXT NOT NULL,
+    labels_path TEXT,
+    unit TEXT CHECK (unit IN ('mm', 'cm', 'm', 'in')),
+    side TEXT CHECK (side IN ('front', 'back')),
+    attributes TEXT NOT NULL CHECK (json_valid(attributes)),
+    mesh_hash BLOB CHECK (length(mesh_hash) = 32),
+    mesh_stat TEXT,
+    page_hash BLOB CHECK (length(page_hash) = 32),
+    page_stat TEXT,
+    labels_hash BLOB CHECK (length(labels_hash) = 32),
+    labels_stat TEXT,
+    imported INTEGER NOT NULL
+) STRICT;
+
+-- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`. The failure is stored
+-- beside it: `failed_with` are the settings and inputs of the failed attempt.
+CREATE TABLE block_job (
+    block INTEGER PRIMARY KEY REFERENCES block (id),
+    stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
+    status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 4),
+    run_at INTEGER,
+    attempt INTEGER NOT NULL DEFAULT 0 CHECK (attempt >= 0),
+    crashes INTEGER NOT NULL DEFAULT 0 CHECK (crashes >= 0),
+    token INTEGER NOT NULL DEFAULT 0 CHECK (token >= 0),
+    worker INTEGER REFERENCES worker (id),
+    deadline INTEGER,
+    class TEXT CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
+    message TEXT,
+    failed_stage INTEGER CHECK (failed_stage BETWEEN 0 AND 3),
+    failed_at INTEGER,
+    failed_with TEXT CHECK (json_valid(failed_with)),
+    CHECK ((status = 3) = (stage = 4)),
+    CHECK ((status = 1) = (worker IS NOT NULL)),
+    CHECK ((status = 1) = (deadline IS NOT NULL)),
+    CHECK ((status = 2) = (run_at IS NOT NULL)),
+    CHECK (status <> 4 OR message IS NOT NULL),
+    CHECK ((class IS NULL) = (message IS NULL) AND (class IS NULL) = (failed_stage IS NULL)
+        AND (class IS NULL) = (failed_at IS NULL) AND (class IS NULL) = (failed_with IS NULL))
+) STRICT;
+CREATE INDEX block_job_leased ON block_job (worker) WHERE status = 1;
+
+-- The current result of each stage of a block. `made_with` are the settings, inputs and attributes that it was computed
+-- from, as JSON.
+CREATE TABLE block_result (
+    block INTEGER NOT NULL REFERENCES block (id),
+    stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
+    made_with TEXT NOT NULL CHECK (json_valid(made_with)),
+    outcome TEXT NOT NULL CHECK (json_valid(outcome)),
+    files TEXT NOT NULL CHECK (json_valid(files)),
+    result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
+    ms INTEGER NOT NULL,
+    worker INTEGER NOT NULL REFERENCES worker (id),
+    at INTEGER NOT NULL,
+    PRIMARY KEY (block, stage)
+) STRICT;
+
+-- Every attempt of every stage of a block; old ones are pruned.
+CREATE TABLE block_attempt (
+    id INTEGER PRIMARY KEY,
+    block INTEGER NOT NULL REFERENCES block (id),
+    stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
+    worker INTEGER,
+    class TEXT CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
+    message TEXT,
+    ms INTEGER,
+    at INTEGER NOT NULL,
+    CHECK ((class IS NULL) = (message IS NULL))
+) STRICT;
+CREATE INDEX block_attempt_block ON block_attempt (block, id);
+
+-- The characters of a block by label. `place` is the reading order, `box` the edges on the page in pixels (left, top,
+-- right, bottom), `maps` the maps between crop, mesh and page as JSON.
+CREATE TABLE block_character (
+    block INTEGER NOT NULL REFERENCES block (id),
+    label TEXT NOT NULL,
+    place INTEGER NOT NULL,
+    character TEXT,
+    box TEXT NOT NULL CHECK (json_valid(box)),
+    confidence REAL CHECK (confidence BETWEEN 0 AND 1),
+    state TEXT NOT NULL CHECK (state IN ('cut', 'left', 'retired')),
+    reason TEXT,
+    maps TEXT CHECK (json_valid(maps)),
+    pair INTEGER UNIQUE REFERENCES pair (id),
+    PRIMARY KEY (block, label)
+) STRICT;
 
 -- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`.
 CREATE TABLE checksum (

@@ -1,19 +1,23 @@
 //! Finds the side of a block and the map of its face to a page, or refuses.
 
-use serde::{Deserialize, Serialize};
-
+use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
 use super::coarse::{self, CoarsePosition, CoarseRange};
 use super::error::BlockError;
 use super::field::ShiftField;
-use super::height_map::HeightMap;
+use super::height_map::{HEIGHT_STEP_MM, HeightMap, StoredHeights};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
-use super::windows::{ShrunkRelief, WindowMatch, WindowSizes, match_windows};
+use super::windows::{ShrunkRelief, WindowSizes, match_windows};
 use crate::raster::Grid;
 
-/// Rotations apart from quarter turns that are searched, degrees.
-const ANGLES_DEG: [f64; 9] = [-6.0, -4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5, 6.0];
+/// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,
+/// degrees.
+const MAX_ANGLE_DEG: f64 = 6.0;
+/// Rotations of the search in which the outline of the face says nothing: all.
+const ALL_ANGLES_DEG: f64 = 45.0;
+/// Step of rotations, degrees.
+const ANGLE_STEP_DEG: f64 = 1.5;
 /// Scales that are searched, in relation to the one at which ink and strokes have the same extent.
 const SCALE_RATIOS: [f64; 9] = [0.88, 0.91, 0.94, 0.97, 1.0, 1.03, 1.06, 1.09, 1.12];
 /// Scales of the second search, page pixels per mm, and the ratio of two neighbours.
@@ -34,12 +38,6 @@ const ROUNDS: [(WindowSizes, f64, Option<f64>); 5] = [
     (sizes(2, 18.0, 7.0, 1.2), 45.0, Some(14.0)),
     (sizes(2, 14.0, 6.0, 0.9), 45.0, Some(12.0)),
 ];
-/// Windows within this distance of the field agree, mm.
-const AGREEMENT_MM: f64 = 0.5;
-/// Agreement of the right block: at least .83, with a median correlation of .78. Of a wrong one: at most .54 and .49.
-const MIN_AGREEMENT: f64 = 0.68;
-const MIN_MEDIAN_NCC: f64 = 0.6;
-
 const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> WindowSizes {
     WindowSizes {
         shrink,
@@ -49,24 +47,22 @@ const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> Wind
     }
 }
 
-/// One side of a block.
+/// The face on one side of a block.
 #[derive(Debug, Clone)]
-pub struct BlockSide {
+pub struct Face {
     /// Heights.
     pub map: HeightMap,
     /// Strokes.
     pub relief: Relief,
 }
 
-/// How well the places of a face agree with a page.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Agreement {
-    /// Number of windows with relief on the face and on the page.
-    pub windows: usize,
-    /// Share of the windows that lie within 0.5 mm of the field.
-    pub share: f64,
-    /// Median of the windows' correlations.
-    pub median_ncc: f64,
+impl Face {
+    /// Computes the relief of stored heights; `None` if no surface fits them.
+    pub fn of(stored: &StoredHeights) -> Option<Self> {
+        let map = HeightMap::from(stored);
+        let relief = Relief::of(&map)?;
+        Some(Self { map, relief })
+    }
 }
 
 /// A page on one side of a block.
@@ -78,8 +74,53 @@ pub struct Alignment {
     pub map: PageMap,
     /// Evidence.
     pub agreement: Agreement,
-    /// Windows of the last round.
-    pub windows: Vec<WindowMatch>,
+    /// Where on the face the page agrees.
+    pub support: Support,
+}
+
+/// What is searched for coarse positions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SearchRange {
+    /// The whole page, nearly parallel to the outline of the face.
+    Narrow,
+    /// A page that shows only a part of the face, or more than the face: any resolution.
+    AllScales,
+    /// A face with an outline that is no rectangle: any rotation.
+    AllAngles,
+}
+
+impl SearchRange {
+    /// Returns the rotations and scales for one side.
+    fn range(self, side: &Face, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
+        let max_angle_deg = match self {
+            Self::Narrow | Self::AllScales => MAX_ANGLE_DEG,
+            Self::AllAngles => ALL_ANGLES_DEG,
+        };
+        let steps = (max_angle_deg / ANGLE_STEP_DEG) as i32;
+        let angle =
+            |step: i32| f64::from(step) * ANGLE_STEP_DEG.to_radians() - side.relief.angle_rad;
+        let scales = if self == Self::AllScales {
+            let count = (WIDE_SCALES[1] / WIDE_SCALES[0]).ln() / WIDE_RATIO.ln();
+            (0..=count as i32)
+                .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
+                .collect()
+        } else {
+            let expected = expected_scale(relief, page);
+            expected
+                .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
+                .unwrap_or_default()
+        };
+        CoarseRange {
+            angles: (-steps..=steps).map(angle).collect(),
+            scales,
+            min_overlap: if self == Self::AllScales { 0.3 } else { 0.6 },
+            count: if self == Self::AllScales {
+                2 * CANDIDATES
+            } else {
+                CANDIDATES
+            },
+        }
+    }
 }
 
 /// A position while it is refined.
@@ -93,81 +134,47 @@ struct Candidate {
 ///
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
-pub fn align(sides: &[BlockSide], page: &PageInk) -> Result<Alignment, BlockError> {
-    let narrow = |relief: &ShrunkRelief| CoarseRange {
-        angles: ANGLES_DEG.map(f64::to_radians).to_vec(),
-        scales: expected_scale(relief, page)
-            .map(|scale| SCALE_RATIOS.map(|ratio| ratio * scale).to_vec())
-            .unwrap_or_default(),
-        min_overlap: 0.6,
-        count: CANDIDATES,
-    };
-    let first = refined(sides, page, &narrow);
-    if let Some(alignment) = first.as_ref().filter(|found| found.agreement.is_sure()) {
-        return Ok(alignment.clone());
+pub fn align(sides: &[&Face], page: &PageInk) -> Result<Alignment, BlockError> {
+    if sides.is_empty() {
+        let found = "no side has a large flat part".to_owned();
+        return Err(BlockError::NoFace { found });
     }
-    let wide = |_: &ShrunkRelief| CoarseRange {
-        angles: [-4.0, -2.0, 0.0, 2.0, 4.0].map(f64::to_radians).to_vec(),
-        scales: {
-            let count = (WIDE_SCALES[1] / WIDE_SCALES[0]).ln() / WIDE_RATIO.ln();
-            (0..=count as i32)
-                .map(|k| WIDE_SCALES[0] * WIDE_RATIO.powi(k))
-                .collect()
-        },
-        min_overlap: 0.3,
-        count: 2 * CANDIDATES,
-    };
-    let second = refined(sides, page, &wide);
-    let best = [first, second]
-        .into_iter()
-        .flatten()
-        .max_by(|a, b| a.agreement.quality().total_cmp(&b.agreement.quality()));
+    let mut best: Option<Alignment> = None;
+    for search in [
+        SearchRange::Narrow,
+        SearchRange::AllScales,
+        SearchRange::AllAngles,
+    ] {
+        let found = refined(sides, page, search);
+        let quality = |found: &Option<Alignment>| {
+            found
+                .as_ref()
+                .map_or(-1.0, |found| found.agreement.quality())
+        };
+        if quality(&found) > quality(&best) {
+            best = found;
+        }
+        if best.as_ref().is_some_and(|best| best.agreement.is_sure()) {
+            break;
+        }
+    }
     match best {
         Some(alignment) if alignment.agreement.is_sure() => Ok(alignment),
         best => Err(BlockError::Refused {
+            width_mm: sides[0].map.heights.width() as f64 * HEIGHT_STEP_MM,
+            height_mm: sides[0].map.heights.height() as f64 * HEIGHT_STEP_MM,
             share: 100.0 * best.map_or(0.0, |best| best.agreement.share),
             needed: 100.0 * MIN_AGREEMENT,
         }),
     }
 }
 
-impl Agreement {
-    fn is_sure(&self) -> bool {
-        self.share >= MIN_AGREEMENT && self.median_ncc >= MIN_MEDIAN_NCC
-    }
-
-    fn quality(&self) -> f64 {
-        self.share * self.median_ncc
-    }
-
-    fn of(windows: &[WindowMatch], field: &ShiftField) -> Self {
-        let positions: Vec<[f64; 2]> = windows.iter().map(|w| w.at).collect();
-        let fitted = field.at_all(&positions);
-        let agrees = |(window, fitted): &(&WindowMatch, &[f64; 2])| {
-            let [dx, dy] = [0, 1].map(|k: usize| window.shift[k] - fitted[k]);
-            dx.hypot(dy) <= AGREEMENT_MM
-        };
-        let count = windows.iter().zip(&fitted).filter(agrees).count();
-        let mut values: Vec<f64> = windows.iter().map(|w| w.ncc).collect();
-        values.sort_by(f64::total_cmp);
-        Self {
-            windows: windows.len(),
-            share: count as f64 / windows.len().max(1) as f64,
-            median_ncc: values.get(values.len() / 2).copied().unwrap_or(0.0),
-        }
-    }
-}
-
 /// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(
-    sides: &[BlockSide],
-    page: &PageInk,
-    range: &dyn Fn(&ShrunkRelief) -> CoarseRange,
-) -> Option<Alignment> {
+fn refined(sides: &[&Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
     let mut best: Option<Candidate> = None;
     for (side, block) in sides.iter().enumerate() {
         let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
-        for position in coarse::search(&relief, page, &range(&relief)) {
+        for position in coarse::search(&relief, page, &search.range(block, &relief, page)) {
             let Some(candidate) = first_round(side, &relief, page, &position) else {
                 continue;
             };
@@ -180,7 +187,7 @@ fn refined(
         }
     }
     let best = best?;
-    let block = &sides[best.side];
+    let block = sides[best.side];
     let (mut map, mut last) = (best.map, None);
     let mut shrunk = ROUNDS[0].0.shrink;
     let mut relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);
@@ -191,16 +198,16 @@ fn refined(
         }
         let windows = match_windows(&relief, page, &map, &sizes);
         let field = ShiftField::fit(&windows, sigma, fine)?;
-        let agreement = Agreement::of(&windows, &field);
         map = map.shifted(&field.at_all(&map.node_positions()));
-        last = Some((agreement, windows));
+        last = Some((windows, field));
     }
-    let (agreement, windows) = last?;
+    let (windows, field) = last?;
+    let (agreement, support) = Agreement::of(&windows, &field);
     Some(Alignment {
         side: best.side,
         map,
         agreement,
-        windows,
+        support,
     })
 }
 
@@ -219,28 +226,9 @@ fn first_round(
     let mut map = PageMap::affine(&position.page_from_face, place(low), place(high));
     let windows = match_windows(relief, page, &map, &COMPARED);
     let field = ShiftField::fit(&windows, COMPARED_SIGMA_MM, None)?;
-    let quality = Agreement::near(&windows, &field, COMPARED_MM);
+    let quality = agreement::mean_near(&windows, &field, COMPARED_MM);
     map = map.shifted(&field.at_all(&map.node_positions()));
     Some(Candidate { side, map, quality })
-}
-
-impl Agreement {
-    /// Returns the mean correlation of the windows, counting those far from the field as 0.
-    fn near(windows: &[WindowMatch], field: &ShiftField, reach_mm: f64) -> f64 {
-        let sum: f64 = windows
-            .iter()
-            .map(|window| {
-                let fitted = field.at(window.at);
-                let [dx, dy] = [0, 1].map(|k: usize| window.shift[k] - fitted[k]);
-                if dx.hypot(dy) <= reach_mm {
-                    window.ncc
-                } else {
-                    0.0
-                }
-            })
-            .sum();
-        sum / windows.len().max(1) as f64
-    }
 }
 
 /// Returns the scale at which the ink has the extent of the strokes, page pixels per mm.

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::align::BlockSide;
+use super::agreement::Support;
+use super::align::Face;
 use super::field::ShiftField;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
@@ -18,6 +19,10 @@ const SURE_NCC: f64 = 0.6;
 /// Distances over which the shifts of characters are smoothed, mm.
 const SIGMA_MM: f64 = 30.0;
 const FINE_SIGMA_MM: f64 = 9.0;
+/// Values at which the confidence is 0 and 1.
+const NCC_RAMP: [f64; 2] = [0.35, 0.75];
+const SHIFT_RAMP_MM: [f64; 2] = [0.8, 0.3];
+const SUPPORT_RAMP: [f64; 2] = [0.4, 0.8];
 /// Boxes with a smaller side are not compared, mm.
 const MIN_SIDE_MM: f64 = 1.0;
 
@@ -46,6 +51,10 @@ pub struct PlacedCharacter {
     pub ncc: f64,
     /// Shift of the character's own ink against the map, mm.
     pub shift_mm: [f64; 2],
+    /// Share of the places around the character that agree, 0..=1.
+    pub support: f64,
+    /// How sure the position is, 0..=1: by its own correlation and by the places around it.
+    pub confidence: f64,
 }
 
 /// Characters and the map that was refined by them.
@@ -59,11 +68,12 @@ pub struct PlacedCharacters {
 
 /// Places characters on the face: refines the map by them, and compares relief and ink of each.
 pub fn place_characters(
-    side: &BlockSide,
+    side: &Face,
     page: &PageInk,
-    map: &PageMap,
+    alignment: (&PageMap, &Support),
     boxes: &[CharacterBox],
 ) -> PlacedCharacters {
+    let (map, support) = alignment;
     let relief = ShrunkRelief::of(&side.map, &side.relief, 1);
     let first = matches(&relief, page, map, boxes);
     let sure: Vec<WindowMatch> = (first.iter().flatten().copied())
@@ -80,16 +90,31 @@ pub fn place_characters(
         .map(|(label, window)| {
             let face_box = face_box(&map, label.page_box);
             let middle = [0, 1].map(|k: usize| f64::midpoint(face_box[k], face_box[k + 2]));
+            let ncc = window.map_or(0.0, |window| window.ncc.max(0.0));
+            let shift_mm = window.map_or([0.0; 2], |window| window.shift);
+            let support = support.at(middle);
             PlacedCharacter {
                 label: label.clone(),
                 face_box,
                 is_on_face: relief.is_face(middle),
-                ncc: window.map_or(0.0, |window| window.ncc.max(0.0)),
-                shift_mm: window.map_or([0.0; 2], |window| window.shift),
+                ncc,
+                shift_mm,
+                support,
+                confidence: confidence(ncc, shift_mm, support),
             }
         })
         .collect();
     PlacedCharacters { map, characters }
+}
+
+/// Returns the product of three ramps: the character's own correlation, the distance of its ink from the map, and the
+/// agreement of the places around it.
+fn confidence(ncc: f64, shift_mm: [f64; 2], support: f64) -> f64 {
+    let ramp =
+        |value: f64, [none, full]: [f64; 2]| ((value - none) / (full - none)).clamp(0.0, 1.0);
+    ramp(ncc, NCC_RAMP)
+        * ramp(shift_mm[0].hypot(shift_mm[1]), SHIFT_RAMP_MM)
+        * ramp(support, SUPPORT_RAMP)
 }
 
 /// Compares relief and ink of each character.

@@ -4,7 +4,8 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use rayon::prelude::*;
 
-use super::align::BlockSide;
+use super::align::Face;
+use super::characters::PlacedCharacter;
 use super::relief::surface_height;
 use crate::domain::Affine2;
 use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
@@ -41,7 +42,7 @@ pub enum CutError {
 /// Which characters a point of the face belongs to.
 #[derive(Debug, Clone)]
 pub struct CutPlan<'a> {
-    side: &'a BlockSide,
+    side: &'a Face,
     boxes: Vec<[f64; 4]>,
     origin_mm: [f64; 2],
     columns: usize,
@@ -51,8 +52,8 @@ pub struct CutPlan<'a> {
 }
 
 impl<'a> CutPlan<'a> {
-    /// Plans the cut of boxes on the face, `[u0, v0, u1, v1]` in mm.
-    pub fn new(side: &'a BlockSide, face_boxes: &[[f64; 4]]) -> Self {
+    /// Plans the cut of characters.
+    pub fn of(side: &'a Face, characters: &[PlacedCharacter]) -> Self {
         let grown = |[u0, v0, u1, v1]: [f64; 4]| {
             [
                 u0 - MARGIN_MM,
@@ -61,7 +62,7 @@ impl<'a> CutPlan<'a> {
                 v1 + MARGIN_MM,
             ]
         };
-        let boxes: Vec<[f64; 4]> = face_boxes.iter().map(|b| grown(*b)).collect();
+        let boxes: Vec<[f64; 4]> = characters.iter().map(|c| grown(c.face_box)).collect();
         let bound = |k: usize, combine: fn(f64, f64) -> f64| {
             boxes.iter().map(|b| b[k]).reduce(combine).unwrap_or(0.0)
         };

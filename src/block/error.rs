@@ -29,12 +29,25 @@ pub enum BlockError {
         /// What was seen instead.
         found: String,
     },
+    /// The scan is a point set.
+    #[error(
+        "the scan is a point set ({points} points without faces): a block needs a triangle mesh; export it with faces"
+    )]
+    NoFaces {
+        /// Points in the file.
+        points: usize,
+    },
     /// Page and block do not agree.
     #[error(
-        "the page does not belong to this block: at the best position found, {share:.0} % of the places agree \
-         (at least {needed:.0} % are needed); check the file names"
+        "the page does not belong to this block: at the best position found, {share:.0} % of the places agree, and \
+         at least {needed:.0} % must; the scan was taken to be {width_mm:.0} x {height_mm:.0} mm; check the file names \
+         and the unit"
     )]
     Refused {
+        /// Sides of the face, mm.
+        width_mm: f64,
+        /// Sides of the face, mm.
+        height_mm: f64,
         /// Percentage of places that agree.
         share: f64,
         /// Percentage that is needed.

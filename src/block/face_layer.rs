@@ -1,14 +1,16 @@
 //! The part of a height map that shows the carved face, without holder, turntable and walls.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
 
-/// Cells of the mask per side in pixels of the height map: 0.6 mm.
-const CELL: usize = 4;
+/// Pixels of the height map per side of a cell of the mask: 0.6 mm.
+pub(super) const FACE_CELL: usize = 4;
 /// Height of the layers in which heights are counted, mm.
 const LAYER_MM: f64 = 1.0;
-/// The face contains the highest layer with more than this share of the heights.
+/// Layers with more than this share of the heights may be the face.
 const MIN_LAYER_SHARE: f64 = 0.04;
 /// Heights that belong to the face, relative to the middle of its layer, mm: carved ground, bow and twist.
 const BELOW_MM: f32 = 9.0;
@@ -16,31 +18,44 @@ const ABOVE_MM: f32 = 3.0;
 /// Parts narrower than this are removed, mm: clamps, rims of a turntable.
 const MIN_WIDTH_MM: f64 = 3.6;
 
+/// The face is the highest part with at least this share of the area of the largest one. Clamps of a holder may be higher
+/// than the face, and a turntable below it may be larger.
+const MIN_PART_SHARE: f64 = 0.25;
+
 /// Finds the face: cells of 4 x 4 pixels of the height map that belong to it. Returns `None` if there is no layer or no
 /// part of it is wide enough.
 pub(super) fn find_face(map: &HeightMap) -> Option<Mask> {
-    let layer = highest_layer(map)?;
+    let mut parts: Vec<(usize, Mask)> = Vec::new();
+    for layer in layers(map) {
+        let part = widest_part(map, layer);
+        parts.extend(part.map(|part| (part.count(), part)));
+    }
+    let largest = parts.iter().map(|(area, _)| *area).max()?;
+    let is_large = |area: usize| area as f64 >= MIN_PART_SHARE * largest as f64;
+    let (_, face) = parts.into_iter().find(|(area, _)| is_large(*area))?;
+    Some(face)
+}
+
+/// Returns the largest part of the heights around a layer, without narrow parts.
+fn widest_part(map: &HeightMap, layer: f32) -> Option<Mask> {
     let (low, high) = (layer - BELOW_MM, layer + ABOVE_MM);
     let heights = &map.heights;
-    let (columns, rows) = (heights.width() / CELL, heights.height() / CELL);
+    let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
     let in_layer = |x: usize, y: usize| {
         let inside = |at: &&f32| **at > low && **at < high;
         let count = |dy: usize| {
-            let row = &heights.row(y * CELL + dy)[x * CELL..][..CELL];
+            let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
             row.iter().filter(inside).count()
         };
-        2 * (0..CELL).map(count).sum::<usize>() >= CELL * CELL
+        2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
     };
     let cells = Grid::from_fn(columns, rows, in_layer);
-    let reach = (MIN_WIDTH_MM / (CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
-    let opened = opened(&cells, reach);
-    let mask = Mask::from_fn(columns, rows, |x, y| opened.at(x, y));
-    let parts = ConnectedComponents::label(&mask);
-    parts.largest()
+    let reach = (MIN_WIDTH_MM / (FACE_CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
+    ConnectedComponents::label(&opened(&cells, reach)).largest()
 }
 
-/// Returns the middle of the highest layer with enough heights.
-fn highest_layer(map: &HeightMap) -> Option<f32> {
+/// Returns the middles of layers with enough heights, from above, at least [`BELOW_MM`] apart.
+fn layers(map: &HeightMap) -> Vec<f32> {
     let heights = || map.heights.data().iter().filter(|h| **h != NO_HEIGHT);
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
     for height in heights() {
@@ -48,7 +63,7 @@ fn highest_layer(map: &HeightMap) -> Option<f32> {
         high = high.max(*height);
     }
     if low > high {
-        return None;
+        return Vec::new();
     }
     let layer = |height: f32| (f64::from(height - low) / LAYER_MM) as usize;
     let mut counts = vec![0_usize; layer(high) + 1];
@@ -56,9 +71,28 @@ fn highest_layer(map: &HeightMap) -> Option<f32> {
         counts[layer(*height)] += 1;
     }
     let all: usize = counts.iter().sum();
-    let enough = |count: &usize| *count as f64 > MIN_LAYER_SHARE * all as f64;
-    let best = counts.iter().rposition(enough)?;
-    Some(low + ((best as f64 + 0.5) * LAYER_MM) as f32)
+    let mut found: Vec<f32> = Vec::new();
+    for (at, count) in counts.iter().enumerate().rev() {
+        let middle = low + ((at as f64 + 0.5) * LAYER_MM) as f32;
+        let is_apart = found.last().is_none_or(|last| last - middle >= BELOW_MM);
+        if *count as f64 > MIN_LAYER_SHARE * all as f64 && is_apart {
+            found.push(middle);
+        }
+    }
+    found
+}
+
+/// Returns the cells of a map that contains only a face, in which at least half of the pixels have a height.
+pub(super) fn cells_of_face(map: &HeightMap) -> Mask {
+    let heights = &map.heights;
+    let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
+    Grid::from_fn(columns, rows, |x, y| {
+        let count = |dy: usize| {
+            let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
+            row.iter().filter(|height| **height != NO_HEIGHT).count()
+        };
+        2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
+    })
 }
 
 /// Erodes and dilates cells by `reach` in all directions.
@@ -91,4 +125,35 @@ fn spread(cells: &Grid<bool>, reach: usize, outside: bool) -> Grid<bool> {
         result
     };
     along_rows(&along_rows(cells).transposed()).transposed()
+}
+
+/// Steps of the search for the smallest rectangle, in a quarter turn.
+const ANGLE_STEPS: usize = 360;
+
+/// Returns the angle by which the smallest rectangle around the face is rotated, from u to v, in radians; within an eighth
+/// of a turn. Blocks are rectangular, but a scan shows them in any rotation.
+pub(super) fn face_angle(face: &Mask) -> f64 {
+    let mut ends = Vec::with_capacity(2 * face.height());
+    for y in 0..face.height() {
+        let row = face.row(y);
+        let first = row.iter().position(|set| *set);
+        let last = row.iter().rposition(|set| *set);
+        ends.extend(first.into_iter().chain(last).map(|x| [x as f64, y as f64]));
+    }
+    let area = |angle: f64| {
+        let (sin, cos) = angle.sin_cos();
+        let extent = |along: [f64; 2]| {
+            let values = ends.iter().map(|[x, y]| x * along[0] + y * along[1]);
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+            high - low + 1.0
+        };
+        extent([cos, sin]) * extent([-sin, cos])
+    };
+    let angle = |step: usize| (step as f64 / ANGLE_STEPS as f64 - 0.5) * FRAC_PI_2;
+    (0..ANGLE_STEPS)
+        .map(|step| (angle(step), area(angle(step))))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(0.0, |(angle, _)| angle)
 }

@@ -1,6 +1,8 @@
 //! Registration of a whole carved block with the image of its page, as pure functions.
 
+mod agreement;
 mod align;
+mod character_map;
 mod characters;
 mod coarse;
 mod cut;
@@ -9,18 +11,22 @@ mod face_layer;
 mod field;
 mod found_boxes;
 mod height_map;
+mod label_fit;
 mod orientation;
 mod page_ink;
 mod page_map;
 mod relief;
 mod windows;
 
-pub use align::{Agreement, Alignment, BlockSide, align};
+pub use agreement::{Agreement, Support};
+pub use align::{Alignment, Face, align};
+pub use character_map::CharacterMap;
 pub use characters::{CharacterBox, PlacedCharacter, PlacedCharacters, place_characters};
 pub use cut::{CutError, CutPlan, PrintCrop, cut_meshes, cut_print};
 pub use error::BlockError;
 pub use found_boxes::{FoundBox, NoteHalf, find_boxes};
-pub use height_map::{HEIGHT_STEP_MM, HeightMap, draw_height_maps};
+pub use height_map::{HEIGHT_STEP_MM, HeightHeader, HeightMap, StoredHeights, draw_height_maps};
+pub use label_fit::{LabelFit, check_label_fit};
 pub use orientation::Orientation;
 pub use page_ink::{InkSampler, PageInk};
 pub use page_map::{PageMap, StoredPageMap};

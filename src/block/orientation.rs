@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
 use crate::domain::LengthUnit;
@@ -24,14 +25,14 @@ const REACH: f64 = 3.0;
 ///
 /// `u` and `v` span the face and `n` is its normal, with u x v = n. Seen from outside with v up, the carving is in mirror
 /// writing; drawn with v down it reads as printed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Orientation {
     /// Millimetres per unit of the mesh.
     pub mm: f64,
     /// Centroid of the area, in mesh units.
-    pub centre: Vector3<f64>,
+    pub centre: [f64; 3],
     /// Unit axes u, v and n in the frame of the mesh.
-    pub axes: [Vector3<f64>; 3],
+    pub axes: [[f64; 3]; 3],
     /// Half extents along u, v and n that contain the block, mm.
     pub half_extent_mm: [f64; 3],
     /// Number of triangles.
@@ -159,8 +160,8 @@ impl Orientation {
         });
         Self {
             mm,
-            centre: origin + mean,
-            axes,
+            centre: (origin + mean).into(),
+            axes: axes.map(Into::into),
             half_extent_mm,
             triangles,
         }
@@ -169,8 +170,9 @@ impl Orientation {
     /// Returns the coordinates u, v and n of a point of the mesh, mm.
     #[inline]
     pub fn face_from_mesh(&self, point: [f64; 3]) -> [f64; 3] {
-        let offset = (Vector3::from(point) - self.centre) * self.mm;
-        self.axes.map(|axis| axis.dot(&offset))
+        let [x, y, z] = [0, 1, 2].map(|k: usize| (point[k] - self.centre[k]) * self.mm);
+        self.axes
+            .map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
     }
 
     /// Returns the frame of the other side: v and n are reversed.
@@ -178,7 +180,7 @@ impl Orientation {
     pub fn other_side(&self) -> Self {
         let [u, v, n] = self.axes;
         Self {
-            axes: [u, -v, -n],
+            axes: [u, v.map(|c| -c), n.map(|c| -c)],
             ..*self
         }
     }

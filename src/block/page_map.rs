@@ -154,11 +154,7 @@ impl PageMap {
 
     /// Returns the point of the face at a pixel of the page.
     pub fn face_from_page(&self, page: [f64; 2]) -> [f64; 2] {
-        let middle = |k: usize| {
-            let count = [self.nodes.width(), self.nodes.height()][k];
-            self.origin_mm[k] + (count as f64 - 1.0) / 2.0 * NODE_STEP_MM
-        };
-        let mut face = [middle(0), middle(1)];
+        let mut face = self.middle();
         for _ in 0..INVERSE_STEPS {
             let at = self.page_from_face(face);
             let error = [page[0] - at[0], page[1] - at[1]];
@@ -181,12 +177,7 @@ impl PageMap {
 
     /// Returns the mean scale at the middle of the map, page pixels per mm.
     pub fn scale(&self) -> f64 {
-        let (width, height) = (self.nodes.width(), self.nodes.height());
-        let middle = [
-            self.origin_mm[0] + (width - 1) as f64 / 2.0 * NODE_STEP_MM,
-            self.origin_mm[1] + (height - 1) as f64 / 2.0 * NODE_STEP_MM,
-        ];
-        let [[a, b], [c, d]] = self.derivative(middle);
+        let [[a, b], [c, d]] = self.derivative(self.middle());
         (a * d - b * c).abs().sqrt()
     }
 
@@ -216,5 +207,23 @@ impl PageMap {
             origin_mm: self.origin_mm,
             nodes: Grid::from_vec(width, height, nodes).expect("one shift for each node"),
         }
+    }
+
+    /// Returns the rotation from the face to the page at the middle of the map, from x to y, radians.
+    pub fn angle_rad(&self) -> f64 {
+        let [[a, b], [c, d]] = self.derivative(self.middle());
+        (c - b).atan2(a + d)
+    }
+
+    /// Returns the number of quarter turns, from x to y, nearest to the rotation from the face to the page.
+    pub fn quarter_turns(&self) -> u8 {
+        let turns = (self.angle_rad() / std::f64::consts::FRAC_PI_2).round() as i64;
+        turns.rem_euclid(4) as u8
+    }
+
+    /// Returns the middle of the map, mm.
+    fn middle(&self) -> [f64; 2] {
+        let sides = [self.nodes.width(), self.nodes.height()];
+        [0, 1].map(|k: usize| self.origin_mm[k] + (sides[k] as f64 - 1.0) / 2.0 * NODE_STEP_MM)
     }
 }

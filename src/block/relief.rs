@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::face_layer::find_face;
+use super::face_layer::{FACE_CELL, cells_of_face, face_angle};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use crate::raster::{Grid, Mask};
 
@@ -34,19 +34,19 @@ pub struct Relief {
     pub face: Mask,
     /// Height of the surface under the tops, mm, at cells of 27 x 27 pixels.
     pub surface: Grid<f32>,
+    /// Rotation of the face's outline in the frame of the height map, from u to v, radians.
+    pub angle_rad: f64,
 }
 
-/// Side of a cell of [`Relief::face`], in pixels of the height map.
-pub(super) const FACE_CELL: usize = 4;
-
 impl Relief {
-    /// Computes the soft relief of one side; `None` if it shows no face.
+    /// Computes the soft relief of a map that contains only a face; `None` if no surface fits it.
     pub fn of(map: &HeightMap) -> Option<Self> {
-        let face = find_face(map)?;
+        let face = cells_of_face(map);
         let surface = top_surface(map, &face)?;
         let soft = soften(map, &face, &surface);
         Some(Self {
             soft,
+            angle_rad: face_angle(&face),
             face,
             surface,
         })

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
+use super::face_layer::FACE_CELL;
 use super::height_map::{HEIGHT_STEP_MM, HeightMap};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
-use super::relief::{FACE_CELL, Relief};
+use super::relief::Relief;
 use crate::raster::Grid;
 use crate::simd::dispatch;
 

@@ -1,12 +1,13 @@
 //! The catalog: a database of SQLite or PostgreSQL with the data of every pair and the job queue. No other module
 //! contains SQL.
 //!
-//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs, `audit`
-//! the checks and repairs, and `transfer` copies to another catalog. One writer task owns the only write connection of
+//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs, `blocks`
+//! the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another catalog. One writer task owns the only write connection of
 //! this process and commits requests in groups. Reads use separate connections, also during a run. Callers pass the
 //! current time as an argument.
 
 mod audit;
+mod blocks;
 mod db;
 mod handle;
 mod new_catalog;
@@ -32,6 +33,19 @@ mod tests_on_postgres;
 pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
+pub use blocks::claim::OutstandingBlocks;
+pub use blocks::cut::{CutOutcome, CutSummary};
+pub use blocks::fail::BlockRetry;
+pub use blocks::import::BlockImportSummary;
+pub use blocks::model::{
+    BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
+    BlockLease, BlockSettings, BlockWork, CutPair, MadeWith, NewCharacter, StoredCharacter,
+};
+pub use blocks::records::{
+    AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
+    StoredBlockFailure,
+};
+pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;

@@ -92,7 +92,11 @@ async fn recovery_and_holders_use_the_index_of_leases() {
             plan.iter().any(|line| line.contains("INDEX job_leased")),
             "{plan:?}"
         );
-        let small = ["VIRTUAL TABLE", "INDEX job_leased"];
+        let small = [
+            "VIRTUAL TABLE",
+            "INDEX job_leased",
+            "INDEX block_job_leased",
+        ];
         assert_only(&plan, &small);
     }
 }

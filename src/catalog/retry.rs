@@ -1,6 +1,6 @@
 //! Retries operations while the database server is unavailable.
 
-use crate::catalog::{Catalog, Result};
+use crate::catalog::{Catalog, CatalogError, Result};
 
 impl Catalog {
     /// Calls `operation` again while the database server is unavailable. The operation must be idempotent, because an
@@ -24,6 +24,12 @@ impl Catalog {
                 outcome => return outcome,
             }
         }
+    }
+
+    /// Returns whether an idempotent operation is to be called again after this error: waits while the database server is
+    /// unavailable. For tasks that cannot use [`Catalog::retry_while_unavailable`], because their futures must be `Send`.
+    pub async fn may_retry(&self, attempt: u32, error: &CatalogError) -> bool {
+        error.is_unavailable() && self.retry_wait.wait(attempt, error).await
     }
 
     /// Ends all waits for an unavailable database server. Operations then fail while it is unavailable.

@@ -93,6 +93,7 @@ impl Finding {
     pub(super) fn row(faulty: &FaultyRow) -> Self {
         let remedy = match faulty.table {
             ChecksummedTable::Pair => IMPORT,
+            ChecksummedTable::Block => "import the block again",
             ChecksummedTable::Truth => "import the true alignments again, or restore a backup",
             ChecksummedTable::Verdict
             | ChecksummedTable::VerdictUndo

@@ -3,6 +3,7 @@
 //! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair makes the next run
 //! compute damaged results again. It never changes verdicts, answers, manual alignments or the log of attempts.
 
+mod blocks;
 mod finding;
 mod pairs;
 mod summary;
@@ -164,6 +165,7 @@ async fn rows_and_files(
             summary.count(check, options.repair);
         }
     }
+    check_blocks(project, catalog, options, &mut named, summary).await?;
     if options.repair {
         catalog.remove_stale_files();
     }
@@ -175,6 +177,40 @@ async fn rows_and_files(
         collect(project, named, age, summary).await?;
     } else if !options.in_use {
         unreferenced_files(project, named, options.repair, summary).await?;
+    }
+    Ok(())
+}
+
+/// Checks all blocks, and adds their artifacts to `named`. With `repair`, sends damaged blocks back to the damaged stage,
+/// so that the next run writes the files again.
+async fn check_blocks(
+    project: &Project,
+    catalog: &Catalog,
+    options: CheckOptions,
+    named: &mut ReferencedArtifacts,
+    summary: &mut CheckSummary,
+) -> Result<(), CheckError> {
+    let blocks = catalog.audited_blocks().await?;
+    let results = blocks.iter().flat_map(|block| &block.results);
+    let files = results.flat_map(|result| result.files.values());
+    files.for_each(|artifact| named.add(artifact));
+    let (project, quick) = (project.clone(), options.quick);
+    let work = move || {
+        let checked = blocks.into_par_iter();
+        let checked = checked.map(|block| blocks::check_block(&project, &block, quick));
+        checked.collect::<Vec<_>>()
+    };
+    let mut back = Vec::new();
+    for check in tokio::task::spawn_blocking(work).await? {
+        summary.files += check.files;
+        for finding in check.damage {
+            summary.add_repairable(finding, options.repair);
+        }
+        back.extend(check.from.map(|stage| (check.block, stage)));
+    }
+    if options.repair && !back.is_empty() {
+        summary.repaired.requeued += back.len() as u64;
+        catalog.reset_blocks(back).await?;
     }
     Ok(())
 }

@@ -57,6 +57,12 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         inputs_missing: Vec::new(),
         inputs_changed: Vec::new(),
     };
+    // The files of a pair that was cut from a block are artifacts of the block.
+    let cut = [&pair.inputs.mesh_path, &pair.inputs.print_path];
+    let cut = cut
+        .into_iter()
+        .filter_map(|path| ArtifactRef::at_path(path));
+    check.named.extend(cut);
     for (stage, result) in &pair.results {
         let files: Option<ArtifactSet> = serde_json::from_str(&result.files).ok();
         let files = files.unwrap_or_default();
@@ -67,21 +73,25 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         check.files += files.len() as u64;
         for artifact in files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                let kind = match error {
-                    ArtifactError::Missing(_) => Kind::FileMissing,
-                    ArtifactError::Changed(_) => Kind::FileChanged,
-                    ArtifactError::Io { .. }
-                    | ArtifactError::Moved(_)
-                    | ArtifactError::NoStore(_)
-                    | ArtifactError::Bucket(_) => Kind::FileUnreadable,
-                };
-                let finding = damage(pair, kind, *stage, error.to_string());
+                let finding = damage(pair, kind_of(&error), *stage, error.to_string());
                 check.damage.push(finding);
             }
         }
     }
     inputs(project, pair, &mut check);
     check
+}
+
+/// Returns the kind of damage of an artifact.
+pub(super) const fn kind_of(error: &ArtifactError) -> Kind {
+    match error {
+        ArtifactError::Missing(_) => Kind::FileMissing,
+        ArtifactError::Changed(_) => Kind::FileChanged,
+        ArtifactError::Io { .. }
+        | ArtifactError::Moved(_)
+        | ArtifactError::NoStore(_)
+        | ArtifactError::Bucket(_) => Kind::FileUnreadable,
+    }
 }
 
 fn is_before_cursor(pair: &AuditedPair, stage: Stage) -> bool {
@@ -102,6 +112,9 @@ fn damage(pair: &AuditedPair, kind: Kind, stage: Stage, what: impl Into<String>)
 /// Checks that the rows of the pair agree with the state of its job.
 fn state(pair: &AuditedPair) -> Vec<Finding> {
     let Some((status, cursor)) = pair.job else {
+        if pair.is_retired {
+            return Vec::new();
+        }
         return vec![damage(pair, Kind::JobMissing, Stage::Fit, "it has no job")];
     };
     let mut found = Vec::new();
@@ -223,6 +236,8 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
         let input = project.input(stored);
         let note = || format!("{} of {}", input.path().display(), pair.name);
         match stat_input(&input) {
+            // A run of its block writes the file again: the check of the block reports it.
+            Err(InputError::NotThere(_)) if ArtifactRef::at_path(stored).is_some() => {}
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(_) => check.inputs_changed.push(note()),
             Ok(stat) => {
@@ -265,6 +280,7 @@ mod tests {
             },
             job: Some((status, cursor)),
             has_failure: false,
+            is_retired: false,
             results: Stage::ALL.map(|stage| (stage, result.clone())).into(),
             metrics: BTreeMap::new(),
         }

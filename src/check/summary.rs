@@ -70,7 +70,7 @@ pub struct Unreferenced {
 /// Repairs made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Repaired {
-    /// Number of pairs sent back to an earlier stage.
+    /// Number of pairs and blocks sent back to an earlier stage.
     pub requeued: u64,
     /// Number of damaged pairs that were not sent back, because an input is missing.
     pub not_requeued: u64,
@@ -123,6 +123,15 @@ impl CheckSummary {
         }
     }
 
+    /// Adds damage that `repair` repairs.
+    pub(super) fn add_repairable(&mut self, finding: Finding, repair: bool) {
+        let kind = finding.kind;
+        self.add(finding);
+        if let (true, Some(found)) = (repair, self.damage.get_mut(&kind)) {
+            found.left -= 1;
+        }
+    }
+
     /// Adds the check of a pair. With `repair`, its damage counts as repaired if the pair can be queued again.
     pub(super) fn count(&mut self, check: PairCheck, repair: bool) {
         let requeued = repair && check.back_to().is_some();
@@ -130,11 +139,7 @@ impl CheckSummary {
         self.pairs += 1;
         self.files += check.files;
         for finding in check.damage {
-            let kind = finding.kind;
-            self.add(finding);
-            if let (true, Some(found)) = (requeued, self.damage.get_mut(&kind)) {
-                found.left -= 1;
-            }
+            self.add_repairable(finding, requeued);
         }
         self.inputs_missing.add(check.inputs_missing);
         self.inputs_changed.add(check.inputs_changed);

@@ -1,7 +1,8 @@
-//! Lists failed pairs by class, with the first few names of each class. Used by `run` and `status`.
+//! Lists failed pairs by class, with the first few names of each class, and failed blocks. Used by `run` and `status`.
 
 use serde_json::{Value, json};
 
+use super::block_status::BlockStatus;
 use super::table::columns;
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
 use crate::domain::FailureClass;
@@ -18,6 +19,8 @@ pub(super) struct Failures {
     counts: Vec<(FailureClass, u64)>,
     pairs: Vec<FailedPair>,
     names_per_class: usize,
+    /// The blocks of the project.
+    pub(super) blocks: BlockStatus,
 }
 
 impl Failures {
@@ -38,6 +41,7 @@ impl Failures {
             counts,
             pairs,
             names_per_class,
+            blocks: BlockStatus::read(catalog, all).await?,
         })
     }
 
@@ -106,6 +110,7 @@ mod tests {
     fn most_frequent_class_comes_first_and_unnamed_pairs_are_counted() {
         let failures = Failures {
             names_per_class: super::NAME_LIMIT,
+            blocks: super::BlockStatus::default(),
             counts: vec![(FailureClass::Io, 9), (FailureClass::BadInput, 1)],
             pairs: vec![
                 failed("a", FailureClass::BadInput),

@@ -1,4 +1,4 @@
-//! `import`: adds pairs of meshes and prints to the project, and creates the project if there is none.
+//! `import`: adds pairs of meshes and prints, or whole blocks, to the project, and creates the project if there is none.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,12 +12,13 @@ use super::busy::Busy;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::files;
+use super::import_blocks;
 use super::manifest_file::Listing;
 use super::missing_files::MissingFiles;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary, NewCatalog};
-use crate::domain::{LengthUnit, PairName};
+use crate::domain::{BlockSide, LengthUnit, PairName};
 use crate::manifest::{ManifestRow, RowIds};
 use crate::store::Project;
 
@@ -34,8 +35,9 @@ const NOT_IMPORTED: &str = "nothing was imported";
 #[derive(Debug, Default, Args)]
 pub(super) struct ImportArgs {
     /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
-    /// `scanned_face_down`; paths are relative to the file
-    #[arg(required_unless_present = "meshes", conflicts_with = "meshes")]
+    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels, unit,
+    /// side; paths are relative to the file
+    #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(super) file: Option<PathBuf>,
     /// A directory of meshes, paired with --prints by file stem
     #[arg(long, value_name = "DIR", requires = "prints")]
@@ -43,8 +45,29 @@ pub(super) struct ImportArgs {
     /// A directory of prints
     #[arg(long, value_name = "DIR", requires = "meshes")]
     pub(super) prints: Option<PathBuf>,
-    /// Unit of the meshes in --meshes: mm, cm, m or in
-    #[arg(long, requires = "meshes")]
+    /// The scan of a whole block, from which `run` cuts the characters as pairs
+    #[arg(
+        long,
+        value_name = "MESH",
+        requires = "page",
+        conflicts_with = "meshes"
+    )]
+    pub(super) block: Option<PathBuf>,
+    /// The image of the printed page of --block
+    #[arg(long, value_name = "IMAGE", requires = "block")]
+    pub(super) page: Option<PathBuf>,
+    /// Boxes of the characters on --page, such as a project of the VGG Image Annotator [default: found by `run`]
+    #[arg(long, value_name = "FILE", requires = "block")]
+    pub(super) labels: Option<PathBuf>,
+    /// The side of --block that the page shows: front (towards the positive direction of the nearest axis of the mesh)
+    /// or back [default: found by `run`]
+    #[arg(long, requires = "block")]
+    pub(super) side: Option<BlockSide>,
+    /// Id of --block [default: the file name of the mesh without extension]
+    #[arg(long, requires = "block")]
+    pub(super) name: Option<String>,
+    /// Unit of the meshes in --meshes or of --block: mm, cm, m or in
+    #[arg(long, conflicts_with = "file")]
     pub(super) unit: Option<LengthUnit>,
     /// True alignments, one JSON object per line; the report then gives the errors against them
     #[arg(long, value_name = "FILE")]
@@ -55,6 +78,16 @@ pub(super) struct ImportArgs {
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    if import_blocks::are_blocks(&args)? {
+        let busy = Busy::start(context, "importing");
+        let outcome = import_blocks::import_blocks(&args, context).await;
+        drop(busy);
+        let outcome = outcome?;
+        context.print_json(&import_blocks::as_json(&outcome))?;
+        import_blocks::print_outcome(&outcome, context);
+        context.next("run");
+        return Ok(ExitCode::Done);
+    }
     let busy = Busy::start(context, "importing");
     let outcome = import_pairs(&args, context).await;
     drop(busy);
@@ -84,26 +117,20 @@ pub(super) async fn import_pairs(
 ) -> anyhow::Result<ImportOutcome> {
     let mut listing = listing(args)?;
     let warnings = std::mem::take(&mut listing.warnings);
-    let dir = context.dir();
     let truths = match &args.truth {
         Some(file) => read_truths(file, &listing.ids, context).await?,
         None => Vec::new(),
     };
     let (storage, url) = context.data_locations()?;
-    let project = Project::at(&dir).with_storage(storage);
+    let project = Project::at(&context.dir()).with_storage(storage);
     let truths = stored_truths(truths, &project)?;
     let list = Arc::new(ImportList {
         listing,
         truths,
         allow_missing: args.allow_missing,
     });
-    let missing_dirs = missing_dirs(&dir);
-    let stored = store(&project, url.as_deref(), &list).await;
-    if stored.is_err() {
-        // Fails, as it should, if another process put something there.
-        let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
-    }
-    let (summary, truths, missing) = stored?;
+    let import = async |catalog: &Catalog| store_in(catalog, &project, &list).await;
+    let (summary, truths, missing) = import_with(&project, url.as_deref(), import).await?;
     Ok(ImportOutcome {
         summary,
         truths,
@@ -132,21 +159,38 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Stores the list in the project. A new project appears only when its catalog holds the list.
-async fn store(
+/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded.
+///
+/// # Errors
+/// Returns the error of `import`, or an error if the catalog or the disk fails.
+pub(super) async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
-    list: &Arc<ImportList>,
-) -> anyhow::Result<StoredList> {
+    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let missing_dirs = missing_dirs(project.dir());
+    let stored = store(project, url, import).await;
+    if stored.is_err() {
+        // Fails, as it should, if another process put something there.
+        let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
+    }
+    stored
+}
+
+async fn store<T>(
+    project: &Project,
+    url: Option<&str>,
+    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
         let catalog = Catalog::connect(url, true).await?;
-        let stored = store_in(&catalog, project, list).await;
+        let stored = import(&catalog).await;
         catalog.close().await;
         return stored;
     }
     while let Some(new) = begin(project).await? {
-        let stored = store_in(new.catalog(), project, list).await;
+        let stored = import(new.catalog()).await;
         if stored.is_err() {
             new.discard().await;
             return stored;
@@ -157,7 +201,7 @@ async fn store(
         // Another process created the project meanwhile, so the list is imported into that project.
     }
     let catalog = Catalog::create(&project.catalog_path()).await?;
-    let stored = store_in(&catalog, project, list).await;
+    let stored = import(&catalog).await;
     catalog.close().await;
     stored
 }
@@ -303,6 +347,7 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
         character: row.character.clone(),
         block: row.block.clone(),
         meta: row.meta.clone().into_iter().collect(),
+        prior: None,
     })
 }
 

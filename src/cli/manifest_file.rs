@@ -39,7 +39,7 @@ enum ListingSource {
 type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
 
 /// Refuses a manifest as a whole.
-fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
+pub(super) fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
     let problems = problems.to_string().replace('\n', "\n  ");
     let from = from.display();
     Refusal::Usage(format!(
@@ -187,21 +187,30 @@ const MAX_PATH_CHARS: usize = 300;
 
 fn missing_files(label: &str, row: &ManifestRow, project: &Project) -> Vec<String> {
     let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
-    let line = |(kind, path): (&str, &PathBuf)| {
-        let exists = match path.to_str() {
-            Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
-            _ => path.try_exists(),
-        };
-        let problem = match exists {
-            Ok(true) => return None,
-            Ok(false) => "does not exist".to_owned(),
-            Err(error) => format!("cannot be read: {error}"),
-        };
-        let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
-        let (line, name) = (row.line, &row.name);
-        Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
+    files
+        .filter_map(|(kind, path)| missing_file(label, row.line, (kind, path), &row.name, project))
+        .collect()
+}
+
+/// Describes a file of a row that does not exist or cannot be read. Returns `None` if it exists.
+pub(super) fn missing_file(
+    label: &str,
+    line: usize,
+    (kind, path): (&str, &Path),
+    name: &dyn std::fmt::Display,
+    project: &Project,
+) -> Option<String> {
+    let exists = match path.to_str() {
+        Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
+        _ => path.try_exists(),
     };
-    files.filter_map(line).collect()
+    let problem = match exists {
+        Ok(true) => return None,
+        Ok(false) => "does not exist".to_owned(),
+        Err(error) => format!("cannot be read: {error}"),
+    };
+    let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
+    Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
 }
 
 /// Lists the files of a directory, without its subdirectories.

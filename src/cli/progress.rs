@@ -160,7 +160,42 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
         RunEvent::Stopping { level, reason } => {
             Some(palette.paint(Tone::Warn, stopping_line(*level, reason)))
         }
+        RunEvent::BlockDone {
+            block,
+            added,
+            changed,
+            retired,
+            ..
+        } => Some(format!(
+            "block {block}: {} added, {changed} changed, {retired} retired",
+            count(*added, "pair")
+        )),
+        RunEvent::BlockFailed {
+            block,
+            stage,
+            failure,
+        } => Some(format!(
+            "{} block {} at {stage}: {} ({})",
+            palette.paint(Tone::Bad, "failed"),
+            palette.paint(Tone::Strong, block),
+            one_line(&failure.message),
+            failure.class
+        )),
+        RunEvent::BlockBackingOff {
+            block,
+            stage,
+            failure,
+            wait_ms,
+        } => Some(format!(
+            "{} block {block} at {stage}: {} ({}), retrying in {}",
+            palette.paint(Tone::Warn, "waiting"),
+            one_line(&failure.message),
+            failure.class,
+            duration(*wait_ms)
+        )),
         RunEvent::Started { .. }
+        | RunEvent::BlockStageStarted { .. }
+        | RunEvent::BlockStageFinished { .. }
         | RunEvent::StageStarted { .. }
         | RunEvent::StageFinished { .. }
         | RunEvent::PairDone { .. } => None,

@@ -1,4 +1,4 @@
-//! `retry`: lets failed pairs run again.
+//! `retry`: lets failed pairs and blocks run again.
 
 use clap::Args;
 use serde_json::json;
@@ -7,40 +7,62 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
-use crate::catalog::{Catalog, RetrySelection};
+use crate::catalog::{BlockRetry, Catalog, RetrySelection};
 use crate::domain::FailureClass;
 
 /// Arguments of `retry`.
 #[derive(Debug, Args)]
 pub(super) struct RetryArgs {
-    /// The pairs to retry [default: all failed pairs]
+    /// The pairs or blocks to retry [default: all that failed]
     #[arg(conflicts_with = "class")]
     pub(super) pairs: Vec<String>,
-    /// Retry the pairs that failed with this class: `bad_input`, `no_solution`, io, resource or bug
+    /// Retry the pairs and blocks that failed with this class: `bad_input`, `no_solution`, io, resource or bug
     #[arg(long)]
     pub(super) class: Option<FailureClass>,
 }
 
 pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open().await?;
-    let selection = selection(&args, &catalog).await?;
+    let (selection, block_selection) = selection(&args, &catalog).await?;
     let retried = catalog.retry(&selection).await?;
+    let blocks = catalog.retry_blocks(&block_selection).await?;
     catalog.close().await;
-    if retried == 0 {
+    if retried + blocks == 0 {
         return Err(Refusal::NothingSelected(no_match(&selection)).into());
     }
-    context.print_json(&json!({"schema": 1, "retried": retried}))?;
-    context.info(&format!("{} will run again", count(retried, "pair")));
+    let mut json = json!({"schema": 1, "retried": retried});
+    if blocks > 0 {
+        json["blocks"] = blocks.into();
+    }
+    context.print_json(&json)?;
+    let numbers = [(retried, "pair"), (blocks, "block")].into_iter();
+    let numbers = numbers.filter(|(number, _)| *number > 0);
+    let numbers: Vec<String> = numbers.map(|(number, what)| count(number, what)).collect();
+    context.info(&format!("{} will run again", numbers.join(" and ")));
     context.next("run");
     Ok(ExitCode::Done)
 }
 
-async fn selection(args: &RetryArgs, catalog: &Catalog) -> anyhow::Result<RetrySelection> {
+/// Returns the pairs and the blocks to retry.
+async fn selection(
+    args: &RetryArgs,
+    catalog: &Catalog,
+) -> anyhow::Result<(RetrySelection, BlockRetry)> {
     if let Some(class) = args.class {
-        return Ok(RetrySelection::Class(class));
+        return Ok((RetrySelection::Class(class), BlockRetry::Class(class)));
     }
-    let names = select::some_or_all(catalog, &args.pairs).await?;
-    Ok(names.map_or(RetrySelection::All, RetrySelection::Names))
+    if args.pairs.is_empty() {
+        return Ok((RetrySelection::All, BlockRetry::All));
+    }
+    let (mut blocks, mut pairs) = (Vec::new(), Vec::new());
+    for typed in &args.pairs {
+        match select::block(catalog, typed).await? {
+            Some(block) => blocks.push(block),
+            None => pairs.push(typed.clone()),
+        }
+    }
+    let pairs = select::pairs(catalog, &pairs).await?;
+    Ok((RetrySelection::Names(pairs), BlockRetry::Names(blocks)))
 }
 
 fn no_match(selection: &RetrySelection) -> String {

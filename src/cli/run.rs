@@ -14,10 +14,10 @@ use super::progress::ProgressReporter;
 use super::table::{columns, count};
 use super::time_text::duration;
 use super::{select, signals};
-use crate::catalog::{Catalog, Plan, RerunPolicy};
+use crate::catalog::{BlockPlanEntry, Catalog, Plan, RerunPolicy};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
-use crate::runner::{self, RunOptions, RunPart, RunSummary, Stop};
+use crate::runner::{self, BlockSummary, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use crate::store::Project;
 
 /// Arguments of `run`.
@@ -182,7 +182,10 @@ pub(super) async fn drive(
 pub(super) const fn code(summary: &RunSummary) -> ExitCode {
     if summary.stopped {
         ExitCode::Stopped
-    } else if summary.failed_in_all > 0 || summary.too_many_failures {
+    } else if summary.failed_in_all > 0
+        || summary.blocks.failed_in_all > 0
+        || summary.too_many_failures
+    {
         ExitCode::SomeFailed
     } else {
         ExitCode::Done
@@ -196,9 +199,26 @@ pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: 
         let number = count(summary.failed_in_all, "pair");
         context.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
+    if summary.blocks.failed_in_all > 0 {
+        let number = count(summary.blocks.failed_in_all, "block");
+        let text = failures.blocks.failures_text();
+        context.info(&format!("{number} failed:\n{}", text.trim_end()));
+    }
 }
 
 fn headline(summary: &RunSummary) -> String {
+    let pairs = pair_headline(summary);
+    let BlockSummary {
+        done, failed, left, ..
+    } = summary.blocks;
+    if done + failed + left == 0 {
+        return pairs;
+    }
+    let blocks = count(done, "block");
+    format!("{blocks} done, {failed} failed, {left} left; {pairs}")
+}
+
+fn pair_headline(summary: &RunSummary) -> String {
     let (took, left) = (duration(summary.elapsed_ms), summary.left);
     let done = count(summary.done, "pair");
     if summary.stopped {
@@ -228,12 +248,15 @@ fn headline(summary: &RunSummary) -> String {
 /// Returns the commands that make sense after a run.
 pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
     let mut steps = Vec::new();
-    if summary.status.pairs == 0 {
+    if summary.status.pairs == 0 && failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
     if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) > 0 {
         steps.push("run".to_owned());
+    }
+    if let Some(first) = failures.blocks.first_failed() {
+        steps.push(format!("show {}", shell_quoted(&first)));
     }
     if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
@@ -252,6 +275,7 @@ fn as_json(summary: &RunSummary) -> Value {
         "failed": summary.failed,
         "failed_in_all": summary.failed_in_all,
         "left": summary.left,
+        "blocks": summary.blocks,
         "stages": summary.stages,
         "stopped": summary.stopped,
         "too_many_failures": summary.too_many_failures,
@@ -260,10 +284,13 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn print_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
-    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan});
-    context.print(&json, || plan_text(plan, running))?;
-    if plan.pairs() > 0 || plan.leased > 0 && !running {
+fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+    let (blocks, plan) = (&plan.blocks, &plan.pairs);
+    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
+    context.print(&json, || {
+        plan_text(plan, running) + &block_plan_text(blocks)
+    })?;
+    if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next("run");
     }
     Ok(ExitCode::Done)
@@ -290,6 +317,22 @@ fn plan_text(plan: &Plan, running: bool) -> String {
         vec![pairs, from, entry.to_string()]
     });
     format!("{}\n{}", parts.join(", "), columns(rows, "><<"))
+}
+
+/// Returns a line for each block that would run.
+fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
+    if blocks.is_empty() {
+        return String::new();
+    }
+    let rows = blocks.iter().map(|entry| {
+        let (block, from) = (format!("  {}", entry.block), format!("from {}", entry.from));
+        vec![block, from, entry.why.to_string()]
+    });
+    let number = count(blocks.len() as u64, "block");
+    format!(
+        "{number} would run, which may add pairs\n{}",
+        columns(rows, "<<<")
+    )
 }
 
 #[cfg(test)]

@@ -43,10 +43,29 @@ impl RunProgress {
             }
             RunEvent::PairDone { .. } => self.done += 1,
             RunEvent::PairFailed { stage, skipped, .. } => self.fail(*stage, *skipped),
+            RunEvent::BlockDone {
+                added,
+                changed,
+                stages,
+                ..
+            } => self.add_pairs(added + changed, *stages),
             RunEvent::StageStarted { .. }
+            | RunEvent::BlockStageStarted { .. }
+            | RunEvent::BlockStageFinished { .. }
+            | RunEvent::BlockFailed { .. }
+            | RunEvent::BlockBackingOff { .. }
             | RunEvent::PairBackingOff { .. }
             | RunEvent::Recovered { .. }
             | RunEvent::Stopping { .. } => {}
+        }
+    }
+
+    /// Adds pairs that were cut from a block, each with this many stages to run.
+    fn add_pairs(&mut self, pairs: u64, stages: u64) {
+        self.pairs += pairs;
+        self.stages += pairs * stages;
+        for (_, total) in self.by_stage.iter_mut().take(stages as usize) {
+            *total += pairs;
         }
     }
 

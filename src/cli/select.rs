@@ -3,7 +3,7 @@
 use super::exit::Refusal;
 use crate::catalog::Catalog;
 use crate::config::nearest;
-use crate::domain::PairName;
+use crate::domain::{BlockName, PairName};
 
 /// Looks up pairs by their ids.
 ///
@@ -46,6 +46,19 @@ pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairN
         .into_iter()
         .next()
         .ok_or_else(|| Refusal::NothingSelected(no_such_pair(typed, &[])).into())
+}
+
+/// Returns the block with this id, if there is one and no pair has the same id.
+pub(super) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Option<BlockName>> {
+    let Ok(name) = typed.parse::<BlockName>() else {
+        return Ok(None);
+    };
+    if let Ok(pair) = typed.parse::<PairName>()
+        && catalog.unknown_names(&[pair]).await?.is_empty()
+    {
+        return Ok(None);
+    }
+    Ok(catalog.block_names().await?.contains(&name).then_some(name))
 }
 
 fn no_such_pair(typed: &str, all: &[PairName]) -> String {

@@ -4,9 +4,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::context::{Context, shell_quoted};
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
 use super::screen::{Palette, Tone};
 use super::select;
+use super::show_block::show_block;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::local;
 use super::verdict;
@@ -19,16 +20,25 @@ use crate::store::Project;
 /// Arguments of `show`.
 #[derive(Debug, Args)]
 pub(super) struct ShowArgs {
-    /// The pair
+    /// The pair, or a block
     pub(super) pair: String,
 }
 
 pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
+    if let Some(block) = select::block(&catalog, &args.pair).await? {
+        return show_block(&block, &project, catalog, context).await;
+    }
     let name = select::pair(&catalog, &args.pair).await?;
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     let why = catalog.why(&name, &fingerprints).await?;
     let Some(detail) = catalog.pair(&name).await? else {
+        if catalog.retired_pairs().await?.contains(&name) {
+            let text = format!(
+                "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
+            );
+            return Err(Refusal::NothingSelected(text).into());
+        }
         anyhow::bail!("pair {name} was removed while it was read");
     };
     let manual = manual_results(&catalog, &detail.results).await?;

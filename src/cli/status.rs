@@ -110,6 +110,9 @@ impl ProjectStatus {
     fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
+        if !self.failures.blocks.is_empty() {
+            json["blocks"] = self.failures.blocks.json();
+        }
         if with_failures {
             json["failures"] = self.failures.json();
         }
@@ -160,10 +163,15 @@ fn print_refreshed(
 
 fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
     let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
-    let mut parts = vec![
-        line("project", &headline(status, dir, palette)),
-        stage_table(&status.counts, palette),
-    ];
+    let mut parts = vec![line("project", &headline(status, dir, palette))];
+    if !status.failures.blocks.is_empty() {
+        parts.push(line(
+            "blocks",
+            &status.failures.blocks.line(status.running, palette),
+        ));
+        parts.push(status.failures.blocks.failures_text());
+    }
+    parts.push(stage_table(&status.counts, palette));
     if status.failed() > 0 {
         parts.push(format!("{}\n", palette.paint(Tone::Strong, "failed")));
         parts.push(status.failures.text());
@@ -252,12 +260,16 @@ fn verdict_line(counts: &StatusCounts) -> Option<String> {
 
 fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let mut steps = Vec::new();
-    if status.counts.pairs == 0 {
+    if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
     let running = status.in_process() > 0;
-    if !running && status.waiting() + status.interrupted() + status.counts.stale > 0 {
+    let waiting = status.waiting() + status.failures.blocks.waiting();
+    if !running && waiting + status.interrupted() + status.counts.stale > 0 {
         steps.push("run".to_owned());
+    }
+    if let Some(first) = status.failures.blocks.first_failed() {
+        steps.push(format!("show {}", shell_quoted(&first)));
     }
     if let Some(first) = status.failures.first() {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::ContentHash;
 
+/// Name of the folder of artifacts in a project.
+pub const ARTIFACTS: &str = "artifacts";
+
 /// Reference to one artifact: content hash, extension and length.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArtifactRef {
@@ -18,6 +21,41 @@ pub struct ArtifactRef {
     /// Where it is in an object store. `None` for a file of its own in the project's folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pack: Option<PackLocation>,
+}
+
+impl ArtifactRef {
+    /// Returns the path of the file below the project, with slashes. `None` for an artifact in an object store.
+    pub fn stored_path(&self) -> Option<String> {
+        if self.pack.is_some() {
+            return None;
+        }
+        let hex = self.hash.to_hex();
+        Some(format!("{ARTIFACTS}/{}/{hex}.{}", &hex[..2], self.ext))
+    }
+
+    /// Returns the artifact at a path below the project, of unknown length, or `None` if the path is not one of an
+    /// artifact.
+    ///
+    /// ```
+    /// use mocban::domain::ArtifactRef;
+    ///
+    /// let hex = "5f".repeat(32);
+    /// let path = format!("artifacts/5f/{hex}.ply");
+    /// let artifact = ArtifactRef::at_path(&path);
+    /// assert_eq!(artifact.and_then(|artifact| artifact.stored_path()), Some(path));
+    /// assert_eq!(ArtifactRef::at_path("scans/1.ply"), None);
+    /// ```
+    pub fn at_path(path: &str) -> Option<Self> {
+        let name = path.strip_prefix(ARTIFACTS)?.rsplit('/').next()?;
+        let (hash, ext) = name.split_once('.')?;
+        let found = Self {
+            hash: hash.parse().ok()?,
+            ext: ext.to_owned(),
+            bytes: 0,
+            pack: None,
+        };
+        (found.stored_path().as_deref() == Some(path)).then_some(found)
+    }
 }
 
 /// Position of an artifact in a pack, an object that holds the artifacts of a pair.

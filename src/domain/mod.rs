@@ -3,6 +3,7 @@
 mod artifact;
 pub mod artifact_role;
 mod attention_check;
+mod block;
 mod enum_names;
 mod failure;
 mod file_kind;
@@ -26,8 +27,9 @@ mod unit;
 mod verdict;
 mod worker_metrics;
 
-pub use artifact::{ArtifactRef, ArtifactSet, PackLocation};
+pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
+pub use block::{BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord};
 pub(crate) use enum_names::enum_names;
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;

@@ -122,7 +122,10 @@ impl CsvHeader {
             columns.push((known, name.to_owned()));
         }
         let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| at_line(line, &missing_column(name, record))));
+        problems.extend(missing.map(|name| {
+            let is_known = |name: &str| known_column(name).is_some();
+            at_line(line, &missing_column(name, record, is_known))
+        }));
         problems.check(false)?;
         Ok(Self(columns))
     }
@@ -160,7 +163,17 @@ impl CsvHeader {
 /// Largest number of wrong, missing or swapped letters in a misspelt name of a column.
 const SIMILAR: usize = 2;
 
-fn missing_column(name: &str, record: &::csv::ByteRecord) -> String {
+/// Returns whether a name may be a misspelt name of a column.
+pub(super) fn similar_column(found: &str, name: &str) -> bool {
+    strsim::osa_distance(found, name) <= SIMILAR
+}
+
+/// Describes a missing column. Suggests an unknown column with a similar name.
+pub(super) fn missing_column(
+    name: &str,
+    record: &::csv::ByteRecord,
+    is_known: impl Fn(&str) -> bool,
+) -> String {
     let found: Vec<_> = record
         .iter()
         .take(12)
@@ -169,7 +182,7 @@ fn missing_column(name: &str, record: &::csv::ByteRecord) -> String {
     let shown = found.join(", ");
     let is_similar = |field: &&std::borrow::Cow<'_, str>| {
         let field = field.trim().to_lowercase();
-        known_column(&field).is_none() && strsim::osa_distance(&field, name) <= SIMILAR
+        !is_known(&field) && similar_column(&field, name)
     };
     let hint = found.iter().find(is_similar).map(|field| {
         let field = field.trim();

@@ -1,6 +1,7 @@
-//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem. The functions parse text or lists of paths
+//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and CSV lists of whole blocks. The functions parse text or lists of paths
 //! and read no files. All problems of a list are reported together.
 
+mod block_list;
 mod csv;
 mod draft;
 mod error;
@@ -10,6 +11,7 @@ mod row;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv};
+pub use block_list::{BlockRow, is_block_list, parse_blocks};
 pub use error::ManifestError;
 pub use folders::{FolderPairs, is_named_like_input, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};

@@ -16,7 +16,9 @@ mod xyz;
 
 pub use error::{MeshError, MeshLimits, MeshReadError};
 pub use triangle_mesh::{Mesh, Vertices};
-pub use triangle_stream::{Triangle, TriangleStream, pass_over_binary_stl};
+pub use triangle_stream::{
+    STL_HEAD, Triangle, TriangleStream, binary_stl_triangles, pass_over_binary_stl,
+};
 
 use std::io::Read;
 

@@ -2,9 +2,10 @@
 
 use std::io::Read;
 
-use super::error::{self, MeshLimits, MeshReadError};
+use super::error::{self, MeshError, MeshLimits, MeshReadError};
 use super::stl;
 use super::triangle_mesh::Mesh;
+use crate::domain::FileKind;
 use crate::page_vec::fill;
 
 /// Corners of a triangle in the frame and unit of the mesh.
@@ -43,6 +44,34 @@ impl TriangleStream for &Mesh {
         Ok(())
     }
 }
+
+/// Returns the number of triangles of a binary STL from its first 84 bytes and its length; `None` if it is something else.
+///
+/// # Errors
+/// Returns an error if the file is a binary STL that ends early.
+pub fn binary_stl_triangles(head: &[u8], len: u64, name: &str) -> Result<Option<u32>, MeshError> {
+    if FileKind::of(head) == FileKind::Ply {
+        return Ok(None);
+    }
+    if let Some(count) = stl::whole_binary_count(head, len) {
+        return Ok(Some(count));
+    }
+    let is_named_stl = name.to_ascii_lowercase().ends_with(".stl");
+    let is_binary = head.iter().any(|byte| *byte == 0 || *byte >= 0x80);
+    match stl::binary_count(head) {
+        Some(count) if is_named_stl && is_binary => {
+            let have = len.saturating_sub(stl::HEADER as u64) / stl::FACET as u64;
+            if have < u64::from(count) {
+                return Err(stl::truncated(have, count));
+            }
+            Ok(None)
+        }
+        _ => Ok(None),
+    }
+}
+
+/// Bytes at the beginning of a file that [`binary_stl_triangles`] needs.
+pub const STL_HEAD: usize = stl::HEADER;
 
 /// Passes over the facets of a binary STL, which is read a part at a time.
 ///

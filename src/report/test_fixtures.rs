@@ -111,6 +111,7 @@ pub(crate) fn pending(name: &str) -> PairResults {
             character: None,
             block: None,
             meta: serde_json::Map::new(),
+            prior: None,
         },
         status: JobStatus::Ready,
         next_stage: Some(Stage::Fit),

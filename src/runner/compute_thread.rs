@@ -185,7 +185,7 @@ fn run_stage(
 const MAX_PANIC_CHARS: usize = 160;
 
 /// Describes a panic and what to do about it.
-fn panic_text(payload: &(dyn Any + Send)) -> String {
+pub(super) fn panic_text(payload: &(dyn Any + Send)) -> String {
     let message = payload
         .downcast_ref::<&str>()
         .copied()

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::stop::StopLevel;
 use crate::catalog::StatusCounts;
-use crate::domain::{Failure, PairName, Stage};
+use crate::domain::{BlockName, BlockStage, Failure, PairName, Stage};
 
 /// Something that happened in a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -68,6 +68,59 @@ pub enum RunEvent {
         /// Wait before the retry in milliseconds.
         wait_ms: u64,
     },
+    /// A stage of a block starts.
+    BlockStageStarted {
+        /// The block.
+        block: BlockName,
+        /// The stage.
+        stage: BlockStage,
+    },
+    /// A stage of a block is computed and stored.
+    BlockStageFinished {
+        /// The block.
+        block: BlockName,
+        /// The stage.
+        stage: BlockStage,
+        /// Computing time in milliseconds.
+        ms: u64,
+    },
+    /// All stages of a block are stored, and its characters are pairs.
+    BlockDone {
+        /// The block.
+        block: BlockName,
+        /// Pairs that are new.
+        added: u64,
+        /// Pairs that changed and run again.
+        changed: u64,
+        /// Pairs that stay as they are.
+        unchanged: u64,
+        /// Pairs that were retired because their boxes are gone.
+        retired: u64,
+        /// Stages that each new or changed pair has to run.
+        stages: u64,
+    },
+    /// A block failed, for example because its page belongs to another block.
+    BlockFailed {
+        /// The block.
+        block: BlockName,
+        /// The stage.
+        stage: BlockStage,
+        /// Class and message.
+        #[serde(flatten)]
+        failure: Failure,
+    },
+    /// A stage of a block failed in a way that may pass; it is retried later.
+    BlockBackingOff {
+        /// The block.
+        block: BlockName,
+        /// The stage.
+        stage: BlockStage,
+        /// Class and message.
+        #[serde(flatten)]
+        failure: Failure,
+        /// Wait before the retry in milliseconds.
+        wait_ms: u64,
+    },
     /// Pairs of dead workers are ready again.
     Recovered {
         /// Number of pairs.
@@ -91,6 +144,19 @@ fn is_now<S: Serializer>(level: &StopLevel, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_bool(*level == StopLevel::Now)
 }
 
+/// What a run did with blocks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct BlockSummary {
+    /// Blocks that this run finished.
+    pub done: u64,
+    /// Blocks that failed in this run.
+    pub failed: u64,
+    /// Blocks with stages left to run.
+    pub left: u64,
+    /// Blocks that failed in this or an earlier run.
+    pub failed_in_all: u64,
+}
+
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
@@ -104,6 +170,8 @@ pub struct RunSummary {
     pub left: u64,
     /// Number of selected pairs that this or an earlier run quarantined.
     pub failed_in_all: u64,
+    /// Blocks.
+    pub blocks: BlockSummary,
     /// Whether a signal stopped the run before everything was done.
     pub stopped: bool,
     /// Whether the run ended early because of [`RunOptions::max_failures`](super::RunOptions::max_failures).

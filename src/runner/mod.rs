@@ -3,8 +3,17 @@
 //! `run` prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
 //! `pair_task` and the task starts a `compute_thread`. The thread calls the stages through `stage_executor`. The task
 //! sends computed stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what
-//! follows a failure. The code map in `lib.rs` says where a lost lease is noticed.
+//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task` runs
+//! its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
 
+mod block_artifacts;
+mod block_checkpoint;
+mod block_inputs;
+mod block_pipeline;
+mod block_progress;
+mod block_slot;
+mod block_stages;
+mod block_task;
 mod checkpointer;
 mod claim_size;
 mod compute_thread;
@@ -33,11 +42,15 @@ mod stop;
 mod tests;
 mod worker_session;
 
+pub use block_stages::{
+    BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
+    CharacterOutput, CutFiles,
+};
 pub use error::RunError;
-pub use events::{RunEvent, RunSummary};
+pub use events::{BlockSummary, RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
 pub use options::{RunOptions, RunPart};
-pub use run::{fingerprints, plan, run};
+pub use run::{RunPlan, fingerprints, plan, run};
 pub use run_guard::is_running;
 pub use run_metrics::RunMetrics;
 pub use stage_output::{metric_results, result_hash};

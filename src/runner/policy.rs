@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use crate::catalog::FailureAction;
-use crate::domain::{FailureClass, PairId, UnixMillis};
+use crate::catalog::{BlockFailureAction, FailureAction};
+use crate::domain::{BlockId, FailureClass, PairId, UnixMillis};
 
 /// Attempts of a stage that fails to read or write.
 const IO_ATTEMPTS: u32 = 3;
@@ -30,7 +30,7 @@ pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureA
     match failed.class {
         FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
             FailureAction::BackOff {
-                run_at: now + backoff_ms(failed.pair, failed.attempt),
+                run_at: now + backoff_ms(failed.pair.0, failed.attempt),
             }
         }
         FailureClass::Resource if !failed.exclusive => FailureAction::RetryExclusive,
@@ -42,15 +42,30 @@ pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureA
     }
 }
 
+/// Decides what follows a failed attempt of a stage of a block: a retry after a wait, or quarantine. Unlike a pair, a
+/// block that needs too much time or memory is not retried, because it was the only block of its process.
+pub(super) fn block_failure_action(
+    block: BlockId,
+    class: FailureClass,
+    is_transient: bool,
+    attempt: u32,
+    now: UnixMillis,
+) -> BlockFailureAction {
+    if class == FailureClass::Io && is_transient && attempt < IO_ATTEMPTS {
+        let run_at = now + backoff_ms(block.0, attempt);
+        return BlockFailureAction::BackOff { run_at };
+    }
+    BlockFailureAction::Quarantine
+}
+
 /// Returns the wait after an attempt in milliseconds: `min(cap, base * 2^(attempt - 1))` times a factor from 0.5 to
-/// 1.5. The factor is a hash of pair and attempt. It spreads the retries of pairs that failed together, and is the same
+/// 1.5. The factor is a hash of pair or block, and attempt. It spreads the retries of pairs that failed together, and is the same
 /// in every run.
-fn backoff_ms(pair: PairId, attempt: u32) -> i64 {
+fn backoff_ms(id: i64, attempt: u32) -> i64 {
     let doubled = BACKOFF_BASE.saturating_mul(1 << attempt.saturating_sub(1).min(16));
     let wait = doubled.min(BACKOFF_CAP).as_millis() as i64;
-    let mixed = (pair.0.unsigned_abs() ^ u64::from(attempt) << 48)
-        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-        >> 32;
+    let mixed =
+        (id.unsigned_abs() ^ u64::from(attempt) << 48).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
     wait / 2 + wait * (mixed % 1000) as i64 / 1000
 }
 
@@ -209,10 +224,10 @@ mod tests {
 
     #[test]
     fn waits_double_up_to_the_cap_and_differ_between_pairs() {
-        let waits: BTreeSet<_> = (0..50).map(|pair| backoff_ms(PairId(pair), 1)).collect();
+        let waits: BTreeSet<_> = (0..50).map(|pair| backoff_ms(pair, 1)).collect();
         assert!(waits.len() > 10 && waits.iter().all(|wait| (500..=1500).contains(wait)));
         let cap = BACKOFF_CAP.as_millis() as i64;
-        assert!((cap / 2..=cap * 3 / 2).contains(&backoff_ms(PairId(1), 30)));
+        assert!((cap / 2..=cap * 3 / 2).contains(&backoff_ms(1, 30)));
     }
 
     #[test]

@@ -7,8 +7,11 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
+use super::block_inputs;
+use super::block_pipeline::BlockPipeline;
+use super::block_stages::BlockStages;
 use super::error::RunError;
-use super::events::{RunEvent, RunSummary};
+use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::options::{RunOptions, RunPart};
@@ -20,7 +23,8 @@ use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
 use crate::catalog::{
-    Catalog, DeadWorker, Fingerprints, PairSelection, Plan, StatusCounts, WorkLeft,
+    BlockPlanEntry, BlockSettings, Catalog, DeadWorker, Fingerprints, OutstandingBlocks,
+    PairSelection, Plan, StatusCounts, WorkLeft,
 };
 use crate::domain::WorkerId;
 use crate::page_vec;
@@ -35,6 +39,15 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
 }
 
+/// What a run would do.
+#[derive(Debug, Clone)]
+pub struct RunPlan {
+    /// The pairs. Pairs that are yet to be cut from blocks are not included.
+    pub pairs: Plan,
+    /// The blocks. None if only named pairs would run.
+    pub blocks: Vec<BlockPlanEntry>,
+}
+
 /// Returns what [`run`] would do, for `--dry-run`. Stores in the catalog which input files have changed.
 ///
 /// # Errors
@@ -44,14 +57,32 @@ pub async fn plan(
     catalog: &Catalog,
     settings: &Settings,
     options: &RunOptions,
-) -> Result<Plan, RunError> {
+) -> Result<RunPlan, RunError> {
     let selection = selection(catalog, options).await?;
     let limits = read_limits(options, &Stop::new());
     input_changes::store_changes(project, catalog, selection.as_ref(), &limits).await?;
     let names = options.pairs.as_deref();
-    Ok(catalog
+    let pairs = catalog
         .plan(&fingerprints(settings), names, options.rerun)
-        .await?)
+        .await?;
+    let mut blocks = Vec::new();
+    if selection.is_none() {
+        block_inputs::store_changes(project, catalog, &limits).await?;
+        let settings = block_settings(&BlockPipeline::new(options));
+        blocks = catalog.plan_blocks(&settings, options.rerun).await?;
+    }
+    Ok(RunPlan { pairs, blocks })
+}
+
+/// Returns the settings of the stages of blocks.
+fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
+    BlockSettings::new(|stage| stages.settings(stage))
+}
+
+/// What computes the stages of a run.
+pub(super) struct Executors {
+    pub(super) pairs: Arc<dyn StageExecutor>,
+    pub(super) blocks: Arc<dyn BlockStages>,
 }
 
 /// Runs every stage that has no current result. Passes each event of the run to `on_event`.
@@ -68,13 +99,16 @@ pub async fn run(
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
-    let executor = Arc::new(PipelineExecutor::new(project, settings, options));
+    let executors = Executors {
+        pairs: Arc::new(PipelineExecutor::new(project, settings, options)),
+        blocks: Arc::new(BlockPipeline::new(options)),
+    };
     let fingerprints = fingerprints(settings);
     run_with(
         project,
         catalog,
         &fingerprints,
-        executor,
+        executors,
         options,
         stop,
         on_event,
@@ -82,12 +116,12 @@ pub async fn run(
     .await
 }
 
-/// Like [`run`], with any executor.
+/// Like [`run`], with any executors.
 pub(super) async fn run_with(
     project: &Project,
     catalog: &Catalog,
     fingerprints: &Fingerprints,
-    executor: Arc<dyn StageExecutor>,
+    executors: Executors,
     options: &RunOptions,
     stop: &Stop,
     mut on_event: impl FnMut(RunEvent) + Send,
@@ -106,6 +140,7 @@ pub(super) async fn run_with(
         project,
         catalog,
         fingerprints,
+        blocks: &*executors.blocks,
         options,
         selection: selection.as_ref(),
         clock,
@@ -120,14 +155,22 @@ pub(super) async fn run_with(
         catalog.end_worker(worker, clock.now(), None).await?;
         let status = catalog.status(fingerprints).await?;
         let left = catalog.work_left(options.until, selection.as_ref()).await?;
-        let counts = RunCounts::default();
-        return Ok(summary(&counts, left, status, stop, clock, Duration::ZERO));
+        let ended = RunEnd {
+            counts: RunCounts::default(),
+            left,
+            blocks: catalog.outstanding_blocks().await?,
+            status,
+            compute_time: Duration::ZERO,
+        };
+        return Ok(ended.summary(stop, clock));
     }
     let (events, mut received) = mpsc::unbounded_channel();
     let context = Arc::new(RunContext {
         catalog: catalog.clone(),
         project: project.clone(),
-        executor,
+        executor: executors.pairs,
+        blocks: executors.blocks,
+        block_limits: block_limits(options),
         fingerprints: fingerprint_ids,
         clock,
         timing: Timing::of_this_build(),
@@ -161,8 +204,14 @@ pub(super) async fn run_with(
     ended?;
     let status = catalog.status(fingerprints).await?;
     let left = catalog.work_left(options.until, selection.as_ref()).await?;
-    let compute_time = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
-    Ok(summary(&counts, left, status, stop, clock, compute_time))
+    let ended = RunEnd {
+        counts,
+        left,
+        blocks: catalog.outstanding_blocks().await?,
+        status,
+        compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
+    };
+    Ok(ended.summary(stop, clock))
 }
 
 /// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database server.
@@ -177,6 +226,7 @@ struct RunStart<'a> {
     project: &'a Project,
     catalog: &'a Catalog,
     fingerprints: &'a Fingerprints,
+    blocks: &'a dyn BlockStages,
     options: &'a RunOptions,
     selection: Option<&'a PairSelection>,
     clock: Clock,
@@ -227,6 +277,25 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
+        self.plan_blocks(&limits).await
+    }
+
+    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
+    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
+        if self.selection.is_some() {
+            return Ok(());
+        }
+        let (catalog, policy) = (self.catalog, self.options.rerun);
+        block_inputs::store_changes(self.project, catalog, limits).await?;
+        let settings = block_settings(self.blocks);
+        let requeued = catalog.retry_while_unavailable(async || {
+            catalog.requeue_stale_blocks(&settings, policy).await
+        });
+        requeued.await?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        let ended = catalog
+            .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await);
+        ended.await?;
         Ok(())
     }
 
@@ -272,24 +341,49 @@ async fn selection(
     Ok(Some(catalog.select(names).await?))
 }
 
-fn summary(
-    counts: &RunCounts,
+/// Returns the largest mesh and the largest other file of a block, with the names of the settings.
+const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
+    [
+        (options.mesh_limits.max_bytes, "limits.mesh.max_bytes"),
+        (options.image_limits.max_bytes, "limits.image.max_bytes"),
+    ]
+}
+
+/// What is known when a run has ended.
+struct RunEnd {
+    counts: RunCounts,
     left: WorkLeft,
+    blocks: OutstandingBlocks,
     status: StatusCounts,
-    stop: &Stop,
-    clock: Clock,
     compute_time: Duration,
-) -> RunSummary {
-    RunSummary {
-        done: counts.done,
-        failed: counts.failed,
-        stages: counts.stages,
-        left: left.pairs,
-        failed_in_all: left.quarantined,
-        stopped: left.pairs > 0 && stop.level() > StopLevel::Go,
-        too_many_failures: counts.too_many_failures,
-        compute_time,
-        elapsed_ms: clock.elapsed_ms(),
-        status,
+}
+
+impl RunEnd {
+    fn summary(self, stop: &Stop, clock: Clock) -> RunSummary {
+        let Self {
+            counts,
+            left,
+            blocks,
+            ..
+        } = self;
+        let is_left = left.pairs > 0 || blocks.left() > 0;
+        RunSummary {
+            done: counts.done,
+            failed: counts.failed,
+            stages: counts.stages,
+            left: left.pairs,
+            failed_in_all: left.quarantined,
+            blocks: BlockSummary {
+                done: counts.blocks.done,
+                failed: counts.blocks.failed,
+                left: blocks.left(),
+                failed_in_all: blocks.quarantined,
+            },
+            stopped: is_left && stop.level() > StopLevel::Go,
+            too_many_failures: counts.too_many_failures,
+            compute_time: self.compute_time,
+            elapsed_ms: clock.elapsed_ms(),
+            status: self.status,
+        }
     }
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
+use super::block_stages::BlockStages;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{Clock, Timing};
@@ -21,6 +22,10 @@ pub(super) struct RunContext {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
     pub(super) executor: Arc<dyn StageExecutor>,
+    /// Computes the stages of blocks.
+    pub(super) blocks: Arc<dyn BlockStages>,
+    /// Largest mesh and largest other file of a block in bytes, with the names of the settings.
+    pub(super) block_limits: [(u64, &'static str); 2],
     pub(super) fingerprints: FingerprintIds,
     pub(super) clock: Clock,
     pub(super) timing: Timing,

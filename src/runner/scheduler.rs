@@ -7,6 +7,8 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
+use super::block_slot::{BlockRunCounts, BlockSlot};
+use super::block_task::BlockReport;
 use super::compute_thread::task_result;
 use super::error::RunError;
 use super::events::RunEvent;
@@ -34,6 +36,7 @@ pub(super) struct RunCounts {
     /// Stages computed and stored.
     pub(super) stages: u64,
     pub(super) too_many_failures: bool,
+    pub(super) blocks: BlockRunCounts,
 }
 
 /// The state of the main loop.
@@ -42,6 +45,8 @@ pub(super) struct Scheduler {
     session: WorkerSession,
     selection: Option<PairSelection>,
     prefetch: Prefetch,
+    /// The block in progress. While there is one, this process starts no pairs.
+    block: BlockSlot,
     max_storing: usize,
     max_failures: Option<u64>,
     /// Pairs that are computed.
@@ -68,6 +73,7 @@ impl Scheduler {
         Self {
             session: WorkerSession::new(worker, now, context.timing.lease_ms()),
             prefetch: Prefetch::new(Arc::clone(&context), selection.clone(), options),
+            block: BlockSlot::new(Arc::clone(&context), selection.is_none()),
             context,
             selection,
             max_storing: options.workers.max(1) * MAX_STORING_PER_SLOT,
@@ -119,6 +125,7 @@ impl Scheduler {
                 }
                 Some(computed) = self.computing.join_next() => self.finish_computing(task_result(computed)),
                 Some(report) = self.storing.join_next() => self.count(task_result(report)),
+                Some(report) = self.block.ended() => self.count_block(report),
                 () = self.prefetch.arrive() => {}
                 _ = recoveries.tick() => self.recover().await?,
                 _ = polls.tick(), if self.prefetch.free_slots() > 0 => self.poll().await?,
@@ -131,7 +138,10 @@ impl Scheduler {
         }
         match self.fatal.take() {
             Some(error) => Err(error),
-            None => Ok(std::mem::take(&mut self.counts)),
+            None => Ok(RunCounts {
+                blocks: self.block.counts,
+                ..std::mem::take(&mut self.counts)
+            }),
         }
     }
 
@@ -142,6 +152,9 @@ impl Scheduler {
             return Ok(self.is_idle());
         }
         self.start_pairs().await?;
+        if self.block.start(self.session.worker()).await? {
+            return Ok(false);
+        }
         if !self.prefetch.claim(self.session.worker()).await? {
             return Ok(false);
         }
@@ -156,7 +169,9 @@ impl Scheduler {
             return Ok(false);
         }
         let left = self.outstanding().await?;
-        Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
+        let pairs = left.ready + left.leased + left.backoff;
+        // The cut of a block that another process works on may add pairs.
+        Ok(pairs == 0 && self.block.outstanding().await?.left() == 0)
     }
 
     /// Starts leased pairs while slots and memory are free and fewer than `max_storing` pairs are being stored.
@@ -194,7 +209,10 @@ impl Scheduler {
     }
 
     fn is_idle(&self) -> bool {
-        self.computing.is_empty() && self.storing.is_empty() && self.prefetch.arriving_pairs() == 0
+        self.computing.is_empty()
+            && self.storing.is_empty()
+            && self.prefetch.arriving_pairs() == 0
+            && !self.block.is_busy()
     }
 
     /// Turns the catalog's commit delay off in two cases: a slot is free while a pair is being stored, or more than
@@ -259,6 +277,14 @@ impl Scheduler {
         }
     }
 
+    fn count_block(&mut self, report: BlockReport) {
+        self.prefetch.expect_more();
+        if let Err(error) = self.block.count(report) {
+            self.drain("the run cannot go on");
+            self.fatal.get_or_insert(error);
+        }
+    }
+
     fn drain(&self, reason: &str) {
         if self.context.drain.level() == StopLevel::Go {
             self.context.drain.drain();
@@ -291,6 +317,7 @@ impl Scheduler {
                 .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await)
                 .await?;
         }
+        self.block.poll().await?;
         self.prefetch.expect_more();
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
 
+mod blocks;
+mod fake_blocks;
 mod fake_executor;
 mod prefetch;
 pub(super) mod values;
@@ -10,9 +12,10 @@ use std::time::Duration;
 
 use serde_json::{Map, json};
 
+use fake_blocks::FakeBlocks;
 use fake_executor::FakeExecutor;
 
-use super::run::run_with;
+use super::run::{Executors, run_with};
 use super::{RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
 use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
@@ -23,9 +26,10 @@ struct RunFixture {
     project: Project,
     catalog: Catalog,
     executor: Arc<FakeExecutor>,
+    blocks: Arc<FakeBlocks>,
     stop: Stop,
     events: Mutex<Vec<RunEvent>>,
-    _dir: tempfile::TempDir,
+    _dir: Option<tempfile::TempDir>,
 }
 
 fn name(text: &str) -> PairName {
@@ -66,27 +70,49 @@ impl RunFixture {
             character: None,
             block: None,
             meta: Map::new(),
+            prior: None,
         });
         catalog.import(rows.collect(), 1).await.expect("imported");
         Self {
             project,
             catalog,
             executor: Arc::default(),
+            blocks: Arc::default(),
             stop: Stop::new(),
             events: Mutex::default(),
-            _dir: dir,
+            _dir: Some(dir),
+        }
+    }
+
+    /// A project that exists already. It is not removed.
+    async fn existing(dir: &std::path::Path) -> Self {
+        let project = Project::open(dir).expect("a project");
+        let catalog = Catalog::open(&project.catalog_path()).await;
+        let executor = FakeExecutor::default();
+        let _ = executor.project.set(project.clone());
+        Self {
+            project,
+            catalog: catalog.expect("a catalog"),
+            executor: Arc::new(executor),
+            blocks: Arc::default(),
+            stop: Stop::new(),
+            events: Mutex::default(),
+            _dir: None,
         }
     }
 
     async fn try_run(&self, options: &RunOptions) -> Result<RunSummary, RunError> {
-        let executor = Arc::clone(&self.executor);
+        let executors = Executors {
+            pairs: Arc::clone(&self.executor) as _,
+            blocks: Arc::clone(&self.blocks) as _,
+        };
         let record = |event| self.events.lock().expect("an unpoisoned lock").push(event);
         let (project, catalog) = (&self.project, &self.catalog);
         let summary = run_with(
             project,
             catalog,
             &fingerprints(),
-            executor,
+            executors,
             options,
             &self.stop,
             record,

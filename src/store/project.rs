@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
+use crate::domain::ARTIFACTS;
 use crate::platform::{FileId, stat, with_slashes};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";
 /// Name of the settings file in a project.
 pub const SETTINGS_FILE: &str = "mocban.toml";
-/// Name of the folder of artifacts in a project.
-const ARTIFACTS: &str = "artifacts";
 
 /// A project directory.
 #[derive(Debug, Clone)]

@@ -14,6 +14,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("anyhow", &["cli"]),
     ("toml", &["cli", "config"]),
     ("pulp", &["simd"]),
+    ("quick_xml", &["labels"]),
     ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
 ];
 

@@ -121,7 +121,7 @@ fn numbered(
         }
         before = Some((column, row));
         let share = |count: usize| count as f64 / strokes.area as f64;
-        if strokes.support() < MIN_SUPPORT || share(strokes.agreed) < MIN_AGREED {
+        if strokes.support() < MIN_SUPPORT || share(strokes.only_relief) > MAX_UNSEEN {
             continue;
         }
         boxes.push(FoundBox {

@@ -23,6 +23,8 @@ pub struct AuditedPair {
     pub inputs: KnownInputs,
     /// Status and cursor of the pair's job. `None` if there is no job.
     pub job: Option<(JobStatus, i64)>,
+    /// Whether the pair is retired, so that it has no job.
+    pub is_retired: bool,
     /// Whether a failure is stored.
     pub has_failure: bool,
     /// Every stored result, also of stages that are to run again. Results with invalid values are left out.
@@ -57,8 +59,9 @@ from_row! { AuditedResult { outcome, files, result_hash } }
 
 pub(crate) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
-    j.stage, j.status, f.pair IS NOT NULL AS has_failure
+    j.stage, j.status, f.pair IS NOT NULL AS has_failure, r.pair IS NOT NULL AS is_retired
 FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
+    LEFT JOIN retired_pair AS r ON r.pair = p.id
 WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
 
 pub(crate) const RESULTS: &str = "
@@ -104,6 +107,7 @@ fn pair(row: &Row) -> Result<AuditedPair> {
         name: row.get("name")?,
         inputs: pair_work::known_inputs(row)?,
         job: status.zip(row.get("stage")?),
+        is_retired: row.get("is_retired")?,
         has_failure: row.get("has_failure")?,
         results: BTreeMap::new(),
         metrics: BTreeMap::new(),

@@ -6,8 +6,9 @@ use sqlx::error::BoxDynError;
 use crate::catalog::db::value::{Argument, FromValue, Value as ColumnValue, read_blob, read_text};
 use crate::catalog::queue::lease::FingerprintId;
 use crate::domain::{
-    Affine2, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName,
-    PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+    Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
+    ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName, PrintFromMesh, Reason,
+    ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
 /// Implements [`FromValue`] for domain types. Each line has a type, the type of its column, and a conversion function.
@@ -27,11 +28,16 @@ macro_rules! decode {
 decode! {
     PairId: integer = |id| Ok::<_, String>(Self(id));
     WorkerId: integer = |id| Ok::<_, String>(Self(id));
+    BlockId: integer = |id| Ok::<_, String>(Self(id));
     FingerprintId: integer = |id| Ok::<_, String>(Self(id));
     JobStatus: integer = status;
     Stage: integer = stage;
+    BlockStage: integer = block_stage;
     ContentHash: blob = hash;
     PairName: text = str::parse;
+    BlockName: text = str::parse;
+    BlockSide: text = str::parse;
+    BlockCharacterState: text = str::parse;
     FailureClass: text = str::parse;
     LengthUnit: text = str::parse;
     Reason: text = str::parse;
@@ -62,6 +68,11 @@ fn status(code: i64) -> Result<JobStatus, String> {
 fn stage(index: i64) -> Result<Stage, String> {
     let stage = usize::try_from(index).ok().and_then(Stage::from_index);
     stage.ok_or_else(|| format!("stage {index} is unknown"))
+}
+
+fn block_stage(index: i64) -> Result<BlockStage, String> {
+    let stage = usize::try_from(index).ok().and_then(BlockStage::from_index);
+    stage.ok_or_else(|| format!("stage {index} of a block is unknown"))
 }
 
 fn hash(bytes: &[u8]) -> Result<ContentHash, String> {

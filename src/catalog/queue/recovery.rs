@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
+use crate::catalog::blocks::recovery as blocks;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
@@ -34,6 +35,8 @@ pub struct Recovered {
     pub ready: u64,
     /// Pairs that killed too many workers and are now quarantined.
     pub poisoned: Vec<PairId>,
+    /// Number of blocks that are ready again.
+    pub blocks: u64,
 }
 
 /// Which workers are dead.
@@ -47,7 +50,7 @@ pub enum DeadWorker {
 
 pub(crate) const HOLDERS: &str = "
 SELECT w.id, w.heartbeat FROM worker AS w
-WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
+WHERE w.id IN (SELECT worker FROM job WHERE status = 1 UNION ALL SELECT worker FROM block_job WHERE status = 1)
 ORDER BY w.id";
 
 /// Selects the given workers that hold leases. `died` is 1 if the worker did not end properly.
@@ -147,9 +150,16 @@ impl Catalog {
                 let affected = affected_pairs(conn, &workers).await?;
                 let items = left_by(conn, &workers).await?;
                 let deaths: i64 = query_scalar(DEATHS).fetch_one(&mut *conn).await?;
+                // Before the pairs: a block is blamed only if its worker holds no pair.
+                let most = u32::try_from(deaths).unwrap_or(u32::MAX);
+                let blocks = blocks::recover(conn, &workers, most, now).await?;
                 let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
                 let found = query.bind(deaths).fetch_all(&mut *conn).await?;
-                count_recovered(conn, found, &affected, now).await
+                let recovered = count_recovered(conn, found, &affected, now).await?;
+                Ok(Recovered {
+                    blocks,
+                    ..recovered
+                })
             })
         })
         .await
@@ -202,9 +212,14 @@ async fn overdue(
 ) -> Result<Recovered> {
     let others = holders_but(conn, me).await?;
     let affected = affected_pairs(conn, &others).await?;
+    let blocks = blocks::recover_overdue(conn, &others, margin_ms, now).await?;
     let query = query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
     let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
-    count_recovered(conn, found, &affected, now).await
+    let recovered = count_recovered(conn, found, &affected, now).await?;
+    Ok(Recovered {
+        blocks,
+        ..recovered
+    })
 }
 
 /// Builds the items of [`RECOVER`] for some workers.

@@ -2,7 +2,7 @@
 //!
 //! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction.
 //! A checksum is the first 64 bits of a BLAKE3 hash of the table's number, the row's number and the row's columns. For
-//! a pair, it covers only the imported columns. For a verdict, an answer and a manual alignment, it also covers the
+//! a pair or a block, it covers only the imported columns. For a verdict, an answer and a manual alignment, it also covers the
 //! previous row's checksum. This reveals a row that was removed together with its checksum. The tables of undone rows
 //! have no such chain.
 
@@ -39,12 +39,15 @@ pub enum ChecksummedTable {
     ManualAlignment,
     /// Undone manual alignments.
     ManualAlignmentUndo,
+    /// Blocks as imported.
+    Block,
 }
 
 enum_names! { pub ChecksummedTable, "a table with checksums":
     Pair = "pair", Truth = "truth", Verdict = "verdict", VerdictUndo = "verdict_undo",
     Answer = "attention_check_answer", AnswerUndo = "attention_check_undo",
     ManualAlignment = "manual_alignment", ManualAlignmentUndo = "manual_alignment_undo",
+    Block = "block",
 }
 
 /// What is wrong with a row.
@@ -162,7 +165,7 @@ impl ChecksummedTable {
         match self {
             Self::Pair => statements!("pair", "id",
                 "t.name, t.mesh_path, t.print_path, t.unit, t.scanned_face_down, t.character, t.block, t.meta, \
-                 t.attributes, t.imported",
+                 t.prior, t.attributes, t.imported",
                 "t.id", false),
             Self::Truth => statements!("truth", "pair", "t.body", "t.pair", false),
             Self::Verdict => statements!("verdict", "id", "t.*", "t.pair", true),
@@ -174,12 +177,15 @@ impl ChecksummedTable {
             Self::ManualAlignment => statements!("manual_alignment", "id", "t.*", "t.pair", true),
             Self::ManualAlignmentUndo => statements!("manual_alignment_undo", "alignment", "t.*",
                 "(SELECT a.pair FROM manual_alignment AS a WHERE a.id = t.alignment)", false),
+            Self::Block => statements!("block", "id",
+                "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.attributes, t.imported",
+                "NULL", false),
         }
     }
 
     /// Returns whether rows are only added, never changed.
     const fn is_append_only(self) -> bool {
-        !matches!(self, Self::Pair | Self::Truth)
+        !matches!(self, Self::Pair | Self::Truth | Self::Block)
     }
 
     /// Returns the number by which the table `checksum` refers to this table.

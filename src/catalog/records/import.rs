@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use crate::catalog::blocks::retired;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
@@ -53,21 +54,21 @@ pub struct PairChange {
 }
 
 const SELECT: &str = "
-SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))";
 
 /// Adds new pairs and updates existing ones. If a path changed, clears the `stat` of that file, so that the next run
 /// reads the file again.
 const UPSERT: &str = "
-INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
+INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior, attributes, imported)
 SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', CAST(value ->> 'face_down' AS bigint),
-    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'attributes', ?2
+    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'prior', value ->> 'attributes', ?2
 FROM json_each(?1) WHERE true
 ON CONFLICT (name) DO UPDATE SET
     mesh_stat = CASE WHEN pair.mesh_path = excluded.mesh_path THEN pair.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
     print_stat = CASE WHEN pair.print_path = excluded.print_path THEN pair.print_stat ELSE '' END, print_path = excluded.print_path,
     unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
-    block = excluded.block, meta = excluded.meta, attributes = excluded.attributes
+    block = excluded.block, meta = excluded.meta, prior = excluded.prior, attributes = excluded.attributes
 RETURNING id";
 
 /// Updates the statistics of PostgreSQL's planner.
@@ -94,19 +95,18 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut summary = ImportSummary::default();
+                let mut deltas = Deltas::default();
                 loop {
                     match chunks.recv().await {
                         Some(ImportChunk::Rows(rows)) => {
                             for chunk in rows.chunks(CHUNK) {
-                                import_chunk(conn, chunk, now, &mut summary).await?;
+                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
                             }
                         }
                         Some(ImportChunk::End) => break,
                         None => return Err(CatalogError::CutShort),
                     }
                 }
-                let mut deltas = Deltas::default();
-                deltas.add(CounterKey::NEW, summary.added as i64);
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
                 let stored = ground_truth::set(conn, &truths).await?;
@@ -148,12 +148,16 @@ impl Catalog {
     }
 }
 
-async fn import_chunk(
+/// Adds and updates pairs. Retired pairs get their jobs back.
+pub(crate) async fn import_chunk(
     conn: &mut Conn,
     chunk: &[ImportRow],
     now: UnixMillis,
     summary: &mut ImportSummary,
+    deltas: &mut Deltas,
 ) -> Result<()> {
+    let given: Vec<_> = chunk.iter().map(|row| row.name.clone()).collect();
+    retired::restore(conn, &given, deltas).await?;
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
     let known = query(SELECT).bind(&names);
     let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
@@ -165,6 +169,7 @@ async fn import_chunk(
         let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
             None => {
                 summary.added += 1;
+                deltas.add(CounterKey::NEW, 1);
                 continue;
             }
             Some(Some(old)) if old == *row => {
@@ -201,13 +206,17 @@ fn item(row: &ImportRow) -> Value {
     json!({
         "name": row.name, "mesh": row.mesh_path, "print": row.print_path, "unit": row.unit,
         "face_down": row.scanned_face_down.map(i64::from), "character": row.character, "block": row.block,
-        "meta": json!(row.meta).to_string(), "attributes": result_attributes(row),
+        "meta": json!(row.meta).to_string(), "prior": row.prior, "attributes": result_attributes(row),
     })
 }
 
 /// Returns the manifest attributes that results depend on, as JSON. If this text changes, the results are stale.
 fn result_attributes(row: &ImportRow) -> String {
-    json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
+    let mut attributes = json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit });
+    if let Some(prior) = &row.prior {
+        attributes["prior"] = Value::from(prior.as_str());
+    }
+    attributes.to_string()
 }
 
 fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
@@ -222,6 +231,7 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
             old.scanned_face_down != new.scanned_face_down,
         ),
         ("metadata", old.meta != new.meta),
+        ("prior", old.prior != new.prior),
     ]
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))

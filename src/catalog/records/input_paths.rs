@@ -1,4 +1,4 @@
-//! Finds and replaces the paths of meshes and prints.
+//! Finds and replaces the paths of meshes, prints, pages and labels.
 
 use serde_json::{Value, json};
 
@@ -7,6 +7,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
+use crate::domain::ArtifactRef;
 
 /// Number of pairs that are read at a time.
 const PAGE: i64 = 2_000;
@@ -18,6 +19,13 @@ const SELECT: &str =
 const UPDATE: &str = "
 UPDATE pair SET mesh_path = item.value ->> 1, mesh_stat = '', print_path = item.value ->> 2, print_stat = ''
 FROM json_each(?1) AS item WHERE pair.id = CAST(item.value ->> 0 AS bigint)";
+
+const SELECT_BLOCKS: &str = "SELECT id, mesh_path, page_path, labels_path FROM block ORDER BY id";
+
+/// Clears the `stat` of the files, like [`UPDATE`].
+const UPDATE_BLOCK: &str = "
+UPDATE block SET mesh_path = ?2, mesh_stat = '', page_path = ?3, page_stat = '', labels_path = ?4, labels_stat = ''
+WHERE id = ?1";
 
 /// Selects the input files whose paths end with one of two texts.
 const NAMED: Sql = Sql::pair(
@@ -48,7 +56,7 @@ impl Catalog {
         query.fetch_all(&mut conn).await
     }
 
-    /// Replaces the paths of meshes and prints in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new
+    /// Replaces the paths of the input files of pairs and blocks in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new
     /// one, or `None` to keep the stored path. Returns the paths that were kept.
     ///
     /// # Errors
@@ -74,15 +82,17 @@ async fn replace(
         let rows = query_as(SELECT).bind(after).bind(PAGE);
         let rows: Vec<(i64, String, String)> = rows.fetch_all(&mut *conn).await?;
         let Some((last, ..)) = rows.last() else {
+            replace_in_blocks(conn, find, &mut kept).await?;
             return Ok(kept);
         };
         after = *last;
         let ids: Vec<i64> = rows.iter().map(|(id, ..)| *id).collect();
         let mut new_path = |stored: String| {
-            find(&stored).unwrap_or_else(|| {
-                kept.push(stored.clone());
-                stored
-            })
+            // The files of pairs that were cut from blocks are artifacts, which a run writes again.
+            if ArtifactRef::at_path(&stored).is_some() {
+                return stored;
+            }
+            found_or_kept(stored, &mut find, &mut kept)
         };
         let items = rows
             .into_iter()
@@ -91,4 +101,34 @@ async fn replace(
         query(UPDATE).bind(items).execute(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Pair, &ids).await?;
     }
+}
+
+/// Replaces the paths of the input files of blocks.
+async fn replace_in_blocks(
+    conn: &mut Conn,
+    mut find: impl FnMut(&str) -> Option<String>,
+    kept: &mut Vec<String>,
+) -> Result<()> {
+    let rows: Vec<(i64, String, String, Option<String>)> =
+        query_as(SELECT_BLOCKS).fetch_all(&mut *conn).await?;
+    for (id, mesh, page, labels) in rows {
+        let mut new_path = |stored| found_or_kept(stored, &mut find, kept);
+        let (mesh, page, labels) = (new_path(mesh), new_path(page), labels.map(new_path));
+        let update = query(UPDATE_BLOCK).bind(id).bind(mesh).bind(page);
+        update.bind(labels).execute(&mut *conn).await?;
+        checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+    }
+    Ok(())
+}
+
+/// Returns the new path of an input, or records that the stored path is kept.
+fn found_or_kept(
+    stored: String,
+    find: &mut impl FnMut(&str) -> Option<String>,
+    kept: &mut Vec<String>,
+) -> String {
+    find(&stored).unwrap_or_else(|| {
+        kept.push(stored.clone());
+        stored
+    })
 }

@@ -140,9 +140,12 @@ pub struct PairAttributes {
     pub block: Option<String>,
     /// All other columns of the manifest.
     pub meta: Map<String, Value>,
+    /// The alignment that is expected of a pair cut from a block, as JSON text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<String>,
 }
 
-from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json } }
+from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json, prior } }
 
 /// One pair with its current results, for report and export.
 #[derive(Debug, Clone, PartialEq, Serialize)]

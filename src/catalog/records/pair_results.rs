@@ -24,7 +24,7 @@ macro_rules! select_pairs {
         concat!(
             "
 SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta,
-    p.mesh_hash, p.print_hash, j.stage, j.status, j.attempt, j.crashes, j.run_at, f.stage AS failed_stage, f.class,
+    p.prior, p.mesh_hash, p.print_hash, j.stage, j.status, j.attempt, j.crashes, j.run_at, f.stage AS failed_stage, f.class,
     f.message, f.at AS failed_at, t.body AS truth
 FROM pair AS p JOIN job AS j ON j.pair = p.id
     LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)

@@ -43,7 +43,8 @@ pub struct KnownInputs {
 }
 
 pub(crate) const LEASED: &str = "
-SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.attributes
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.prior,
+    p.attributes
 FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = CAST(wanted.atom AS bigint)";
 
 /// Selects pairs with their input files as last read, in pages by id.

@@ -19,6 +19,7 @@ WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
     WHERE n.pair = v.pair AND n.metric = v.metric AND n.reviewer = v.reviewer AND n.result_hash = v.result_hash
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
+    AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
 GROUP BY v.verdict";
 
 /// Completed pairs whose result of the default metric has a low confidence.

@@ -1,6 +1,7 @@
 //! Tests of the catalog on real databases: files in the module `tests`, PostgreSQL in `tests_on_postgres`.
 
 mod answers;
+mod blocks;
 mod claim_order;
 mod guards;
 mod histories;
@@ -50,6 +51,7 @@ fn row(text: &str) -> ImportRow {
         character: None,
         block: None,
         meta: Map::new(),
+        prior: None,
     }
 }
 

@@ -87,7 +87,7 @@ impl Catalog {
                         return Ok(());
                     }
                     let has_content =
-                        "SELECT EXISTS (SELECT 1 FROM pair) OR EXISTS (SELECT 1 FROM worker)";
+                        "SELECT EXISTS (SELECT 1 FROM pair) OR EXISTS (SELECT 1 FROM worker) OR EXISTS (SELECT 1 FROM block)";
                     if query_scalar(has_content).fetch_one(conn).await? {
                         return Err(CatalogError::NotEmpty(path));
                     }

@@ -80,13 +80,13 @@ macro_rules! table_by_two {
 
 /// Every table, in an order in which no row refers to a later table. The counters are counted anew, and the settings of
 /// the last plan are not copied.
-pub(super) const TABLES: [CopyTable; 17] = [
+pub(super) const TABLES: [CopyTable; 23] = [
     table!("review_key", 2, "id", "key"),
     table!("worker", 10, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "died",
         "metrics"; numbered),
     table!("fingerprint", 5, "id", "stage", "hash", "fields", "upstream"; numbered),
-    table!("pair", 15, "id", "name", "mesh_path", "print_path", "unit", "scanned_face_down", "character", "block", "meta",
-        "attributes", "mesh_hash", "mesh_stat", "print_hash", "print_stat", "imported"; numbered),
+    table!("pair", 16, "id", "name", "mesh_path", "print_path", "unit", "scanned_face_down", "character", "block", "meta",
+        "prior", "attributes", "mesh_hash", "mesh_stat", "print_hash", "print_stat", "imported"; numbered),
     table!(
         "job",
         14,
@@ -172,6 +172,41 @@ pub(super) const TABLES: [CopyTable; 17] = [
     table!("manual_alignment", 14, "id", "event", "pair", "mesh_hash", "print_hash", "depth_hash", "seen", "print_from_depth",
         "print_from_mesh", "iou", "dice", "reviewer", "note", "at"; numbered),
     table!("manual_alignment_undo", 2, "alignment", "at"),
+    table!(
+        "retired_pair",
+        7,
+        "pair",
+        "stage",
+        "is_quarantined",
+        "token",
+        "fingerprint",
+        "low_confidence",
+        "at"
+    ),
+    table!("block", 15, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "attributes", "mesh_hash",
+        "mesh_stat", "page_hash", "page_stat", "labels_hash", "labels_stat", "imported"; numbered),
+    table!(
+        "block_job",
+        14,
+        "block",
+        "stage",
+        "status",
+        "run_at",
+        "attempt",
+        "crashes",
+        "token",
+        "worker",
+        "deadline",
+        "class",
+        "message",
+        "failed_stage",
+        "failed_at",
+        "failed_with"
+    ),
+    table_by_two!("block_result", 9, "block", "stage", "made_with", "outcome", "files", "result_hash", "ms", "worker", "at"; false),
+    table!("block_attempt", 8, "id", "block", "stage", "worker", "class", "message", "ms", "at"; numbered),
+    table_by_two!("block_character", 10, "block", "label", "place", "character", "box", "confidence", "state", "reason", "maps",
+        "pair"; true),
     table_by_two!("checksum", 3, "record", "row", "value"; false),
 ];
 

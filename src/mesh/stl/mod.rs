@@ -5,7 +5,7 @@ mod binary;
 
 pub(super) use ascii::read_ascii;
 pub(super) use binary::{
-    FACET, HEADER, corners, read_binary, read_facets, truncated, whole_binary_count,
+    FACET, HEADER, binary_count, corners, read_binary, read_facets, truncated, whole_binary_count,
 };
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex};
+use std::sync::{Condvar, Mutex, OnceLock};
 
 use serde_json::json;
 
@@ -12,7 +12,7 @@ use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, 
 use crate::runner::pair_context::PairContext;
 use crate::runner::stage_executor::StageExecutor;
 use crate::runner::stage_output::{ExecutionError, StageOutput};
-use crate::store::NewArtifact;
+use crate::store::{NewArtifact, Project, hash_input};
 
 /// Runs fake stages. The part of a pair's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]
@@ -22,6 +22,8 @@ pub(super) struct FakeExecutor {
     running: AtomicUsize,
     /// Most stages that ran at the same time.
     pub(super) most: AtomicUsize,
+    /// Where the files of pairs are, if they exist.
+    pub(super) project: OnceLock<Project>,
     /// Stages of some pairs wait until this is opened.
     gate: (Mutex<bool>, Condvar),
 }
@@ -101,12 +103,21 @@ impl StageExecutor for FakeExecutor {
         let outcome = self.behave(&name, stage, tries);
         self.running.fetch_sub(1, Ordering::SeqCst);
         outcome?;
-        let seen = |text: &str| InputVersion {
-            hash: ContentHash::of(text.as_bytes()),
-            stat: "as it was".to_owned(),
+        let seen = |text: &str, path: &str| {
+            let input = self.project.get().map(|project| project.input(path));
+            let found = input.and_then(|input| hash_input(&input).ok());
+            found.map_or_else(
+                || InputVersion {
+                    hash: ContentHash::of(text.as_bytes()),
+                    stat: "as it was".to_owned(),
+                },
+                InputVersion::from,
+            )
         };
-        pair.inputs.mesh = Some(seen("mesh"));
-        pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
+        let attributes = &pair.attributes;
+        pair.inputs.mesh = Some(seen("mesh", &attributes.mesh_path));
+        pair.inputs.print =
+            (stage >= Stage::Normalize).then(|| seen("print", &attributes.print_path));
         let register = RegisterOutcome {
             ink: 0,
             metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),

@@ -16,6 +16,7 @@ pub(in crate::runner) fn pair_attributes(mesh_path: &str, print_path: &str) -> P
         character: None,
         block: None,
         meta: Map::new(),
+        prior: None,
     }
 }
 

@@ -1,0 +1,103 @@
+//! Rows of the characters of a block.
+
+use serde_json::Value;
+
+use crate::catalog::blocks::model::{NewCharacter, StoredCharacter};
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::{FromRow, Row};
+use crate::catalog::db::value::Json;
+use crate::catalog::{Catalog, Result};
+use crate::domain::{BlockCharacterState, BlockId, BlockName, PairId};
+
+const UPSERT: &str = "
+INSERT INTO block_character (block, label, place, character, box, confidence, state, reason, maps, pair)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, (SELECT id FROM pair WHERE name = ?10))
+ON CONFLICT (block, label) DO UPDATE SET place = excluded.place, character = excluded.character, box = excluded.box,
+    confidence = excluded.confidence, state = excluded.state, reason = excluded.reason, maps = excluded.maps,
+    pair = coalesce(excluded.pair, block_character.pair)";
+
+/// Marks the characters that are not among the labels `?2` as retired, and removes those that never had a pair.
+const GONE: [&str; 2] = [
+    "UPDATE block_character SET state = 'retired', reason = NULL
+    WHERE block = ?1 AND label NOT IN (SELECT atom FROM json_each(?2))",
+    "DELETE FROM block_character WHERE block = ?1 AND pair IS NULL AND label NOT IN (SELECT atom FROM json_each(?2))",
+];
+
+/// Selects the pairs of characters that are not cut any more.
+const UNCUT: &str =
+    "SELECT pair FROM block_character WHERE block = ?1 AND state <> 'cut' AND pair IS NOT NULL";
+
+const LIST: &str = "
+SELECT c.label, c.character, c.box, c.confidence, c.state, c.reason, c.maps, p.name AS pair
+FROM block_character AS c JOIN block AS b ON b.id = c.block LEFT JOIN pair AS p ON p.id = c.pair
+WHERE b.name = ?1 ORDER BY c.state = 'retired', c.place, c.label";
+
+impl FromRow for StoredCharacter {
+    fn from_row(row: &Row) -> Result<Self> {
+        let Json(bounds) = row.get("box")?;
+        let maps: Option<Json<Value>> = row.get("maps")?;
+        Ok(Self {
+            label: row.get("label")?,
+            character: row.get("character")?,
+            bounds,
+            confidence: row.get("confidence")?,
+            state: row.get("state")?,
+            reason: row.get("reason")?,
+            maps: maps.map(|Json(maps)| maps),
+            pair: row.get("pair")?,
+        })
+    }
+}
+
+impl Catalog {
+    /// Returns the characters of a block in reading order, retired ones last.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn block_characters(&self, block: &BlockName) -> Result<Vec<StoredCharacter>> {
+        let mut conn = self.read_conn().await?;
+        let list = query_as(LIST).bind(block.as_str());
+        list.fetch_all(&mut conn).await
+    }
+}
+
+/// Stores the characters of a block. Returns the pairs of characters whose boxes are gone, or which are not cut any more.
+pub(crate) async fn store(
+    conn: &mut Conn,
+    block: BlockId,
+    name: &BlockName,
+    characters: &[NewCharacter],
+) -> Result<Vec<PairId>> {
+    for (place, one) in characters.iter().enumerate() {
+        let pair = match &one.cut {
+            Ok(_) => name.pair(&one.label).ok(),
+            Err(_) => None,
+        };
+        let state = match pair {
+            Some(_) => BlockCharacterState::Cut,
+            None => BlockCharacterState::Left,
+        };
+        query(UPSERT)
+            .bind(block.0)
+            .bind(&one.label)
+            .bind(place as i64)
+            .bind(&one.character)
+            .bind(serde_json::to_string(&one.bounds)?)
+            .bind(one.confidence)
+            .bind(state.name())
+            .bind(one.cut.as_ref().err())
+            .bind(one.maps.as_ref().map(Value::to_string))
+            .bind(pair.as_ref().map(|pair| pair.as_str()))
+            .execute(&mut *conn)
+            .await?;
+    }
+    let labels: Vec<&str> = characters.iter().map(|one| one.label.as_str()).collect();
+    let labels = serde_json::to_string(&labels)?;
+    for sql in GONE {
+        let gone = query(sql).bind(block.0).bind(&labels);
+        gone.execute(&mut *conn).await?;
+    }
+    let uncut = query_scalar(UNCUT).bind(block.0);
+    uncut.fetch_all(conn).await
+}

@@ -1,0 +1,552 @@
+//! Blocks: import, leases, results, and the pairs that are cut from them.
+
+use serde_json::json;
+
+use super::{World, name, register};
+use crate::catalog::{
+    BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
+    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutOutcome, CutPair, CutSummary,
+    DeadWorker, InputVersion, MadeWith, NewCharacter, NewVerdict, RerunPolicy, ReviewContext,
+};
+use crate::domain::{
+    ArtifactSet, BlockCharacterState, BlockName, BlockStage, BlockStageRecord, ContentHash,
+    Failure, FailureClass, JobStatus, Stage, ThresholdMetric, Verdict, WorkerId,
+};
+
+pub(super) fn block(text: &str) -> BlockName {
+    BlockName::new(text).expect("a valid name")
+}
+
+pub(super) fn attributes(text: &str) -> BlockAttributes {
+    BlockAttributes {
+        name: block(text),
+        mesh_path: format!("{text}.stl"),
+        page_path: format!("{text}.png"),
+        labels_path: Some(format!("{text}.json")),
+        unit: None,
+        side: None,
+    }
+}
+
+fn settings(revision: [u32; 4]) -> BlockSettings {
+    BlockSettings::new(|stage| json!({ "revision": revision[stage.index()] }))
+}
+
+fn version(text: &str) -> InputVersion {
+    InputVersion {
+        hash: ContentHash::of(text.as_bytes()),
+        stat: format!("{text} stat"),
+    }
+}
+
+fn inputs(texts: [&str; 3]) -> BlockInputVersions {
+    BlockInputVersions {
+        mesh: Some(version(texts[0])),
+        page: Some(version(texts[1])),
+        labels: Some(version(texts[2])),
+    }
+}
+
+fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
+    let inputs = inputs(["mesh", "page", "labels"]);
+    let settings = settings([1; 4]);
+    BlockCheckpoint {
+        record: BlockStageRecord {
+            stage,
+            outcome: json!({ "stage": stage }).to_string(),
+            files: ArtifactSet::new(),
+            result_hash: ContentHash::of(stage.name().as_bytes()),
+        },
+        made_with: MadeWith::new(stage, settings.of(stage), &work.attributes, &inputs),
+        inputs,
+        ms: 5,
+        at: 100,
+        next_deadline: 2_000,
+        alive_since: 0,
+    }
+}
+
+/// A character whose files have this content.
+fn character(label: &str, content: &str) -> NewCharacter {
+    NewCharacter {
+        label: label.to_owned(),
+        character: Some("天".to_owned()),
+        bounds: [1.0, 2.0, 30.5, 40.25],
+        confidence: Some(0.75),
+        maps: Some(json!({ "page_from_crop": [1, 2] })),
+        cut: Ok(CutPair {
+            mesh_path: format!("artifacts/{content}.ply"),
+            mesh: version(content),
+            print_path: format!("artifacts/{content}.png"),
+            print: version(&format!("{content} print")),
+            unit: None,
+            scanned_face_down: None,
+            prior: Some(json!({ "angle_deg": 0.5 }).to_string()),
+        }),
+    }
+}
+
+impl World {
+    async fn claim_block(&self, worker: WorkerId) -> Option<(BlockLease, BlockWork)> {
+        let claim = self.catalog.claim_block(worker, 1_000, 0);
+        claim.await.expect("a claim")
+    }
+
+    async fn leased_block(&self) -> (BlockLease, BlockWork) {
+        self.claim_block(self.worker).await.expect("a ready block")
+    }
+
+    /// Runs the remaining stages of the next block. The last one cuts these characters.
+    async fn finish_block(&self, characters: Vec<NewCharacter>) -> CutOutcome {
+        let (mut lease, work) = self.leased_block().await;
+        while lease.cursor() != BlockStage::Cut {
+            let stage = done(&work, lease.cursor());
+            let stored = self.catalog.checkpoint_block(lease, stage).await;
+            lease = stored.expect("stored").expect("a valid lease");
+        }
+        let stage = done(&work, BlockStage::Cut);
+        let cut = self.catalog.finish_cut(lease, stage, characters).await;
+        cut.expect("stored")
+    }
+
+    /// Requeues stale blocks, and returns why each would run.
+    async fn requeue_blocks(&self, revision: [u32; 4]) -> Vec<(BlockStage, BlockReason)> {
+        let settings = settings(revision);
+        let policy = RerunPolicy::Changed;
+        let plan = self.catalog.plan_blocks(&settings, policy).await;
+        let requeued = self.catalog.requeue_stale_blocks(&settings, policy).await;
+        requeued.expect("requeued");
+        let plan = plan.expect("a plan").into_iter();
+        plan.map(|entry| (entry.from, entry.why)).collect()
+    }
+
+    async fn import_block(&self, row: BlockAttributes) {
+        let imported = self.catalog.import_blocks(vec![row], 1).await;
+        imported.expect("imported");
+    }
+
+    async fn character_states(&self) -> Vec<(String, BlockCharacterState, Option<String>)> {
+        let characters = self.catalog.block_characters(&block("b")).await;
+        let characters = characters.expect("a read").into_iter();
+        characters
+            .map(|one| (one.label, one.state, one.pair))
+            .collect()
+    }
+}
+
+async fn world() -> World {
+    let world = World::new(0).await;
+    world.import_block(attributes("b")).await;
+    world
+}
+
+fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> CutOutcome {
+    CutOutcome::Stored(CutSummary {
+        added,
+        changed,
+        unchanged,
+        retired,
+    })
+}
+
+#[tokio::test]
+async fn an_import_is_idempotent_and_names_what_changed() {
+    let world = world().await;
+    let again = world.catalog.import_blocks(vec![attributes("b")], 2).await;
+    let again = again.expect("imported");
+    assert_eq!((again.added, again.unchanged), (0, 1));
+    let other = BlockAttributes {
+        page_path: "other.png".to_owned(),
+        labels_path: None,
+        ..attributes("b")
+    };
+    let changed = world.catalog.import_blocks(vec![other], 2).await;
+    let changed = changed.expect("imported").changed;
+    assert_eq!(changed, [(block("b"), vec!["page", "labels"])]);
+    assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
+    assert_eq!(world.catalog.block_names().await.expect("a read").len(), 1);
+}
+
+#[tokio::test]
+async fn a_finished_block_leaves_pairs_that_run() {
+    let world = world().await;
+    let cut = vec![character("c01-r01", "a"), character("c01-r02", "b")];
+    assert_eq!(world.finish_block(cut).await, stored(2, 0, 0, 0));
+    world.assert_counters().await;
+    let detail = world.catalog.block(&block("b")).await.expect("a read");
+    let detail = detail.expect("the block");
+    assert_eq!(detail.state.status, JobStatus::Done);
+    assert_eq!((detail.stages.len(), detail.attempts.len()), (4, 4));
+    assert_eq!(detail.state.characters, 2);
+    let pair = world
+        .catalog
+        .pair(&name("b_c01-r02"))
+        .await
+        .expect("a read");
+    let attributes = pair.expect("the pair").results.attributes;
+    assert_eq!(attributes.block.as_deref(), Some("b"));
+    assert_eq!(attributes.character.as_deref(), Some("天"));
+    assert_eq!(attributes.prior.as_deref(), Some(r#"{"angle_deg":0.5}"#));
+    assert!(world.claim_block(world.worker).await.is_none());
+    assert_eq!(world.claim(9).await.len(), 2);
+    assert_eq!(world.requeue_blocks([1; 4]).await, []);
+}
+
+#[tokio::test]
+async fn only_changed_characters_run_again_and_verdicts_stay() {
+    let world = world().await;
+    let [a, b, c] = ["a", "b", "c"].map(|label| character(label, label));
+    let first = vec![a.clone(), b.clone(), c.clone()];
+    assert_eq!(world.finish_block(first).await, stored(3, 0, 0, 0));
+    for _ in 0..3 {
+        world.finish_one().await;
+    }
+    judge(&world, "b_c").await;
+    let new_labels = BlockAttributes {
+        labels_path: Some("new.json".to_owned()),
+        ..attributes("b")
+    };
+    world.import_block(new_labels).await;
+    let changed = BlockInputVersions {
+        labels: Some(version("other labels")),
+        ..BlockInputVersions::default()
+    };
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let seen = vec![(known[0].block, changed)];
+    world
+        .catalog
+        .store_block_inputs(seen)
+        .await
+        .expect("stored");
+    let requeued = world.requeue_blocks([1; 4]).await;
+    assert_eq!(requeued, [(BlockStage::Boxes, BlockReason::Labels)]);
+    // `b` has other bytes, the box of `c` is gone.
+    let second = vec![a.clone(), character("b", "new b")];
+    assert_eq!(world.finish_block(second).await, stored(0, 1, 1, 1));
+    world.assert_counters().await;
+    assert_eq!(status_of(&world, "b_a").await, Some(JobStatus::Done));
+    assert_eq!(status_of(&world, "b_b").await, Some(JobStatus::Ready));
+    assert_eq!(status_of(&world, "b_c").await, None);
+    let retired = world.catalog.retired_pairs().await.expect("a read");
+    assert_eq!(retired, [name("b_c")]);
+    let log = world.catalog.verdict_log(None).await.expect("a read");
+    assert_eq!(log.len(), 1);
+    let states = world.character_states().await;
+    let gone = (
+        "c".to_owned(),
+        BlockCharacterState::Retired,
+        Some("b_c".to_owned()),
+    );
+    assert_eq!(states[2], gone);
+    // The box comes back with the same bytes.
+    world
+        .catalog
+        .reset_blocks(vec![(known[0].block, BlockStage::Cut)])
+        .await
+        .expect("reset");
+    let third = vec![a, character("b", "new b"), c];
+    assert_eq!(world.finish_block(third).await, stored(0, 0, 3, 0));
+    world.assert_counters().await;
+    assert_eq!(status_of(&world, "b_c").await, Some(JobStatus::Done));
+    let log = world.catalog.verdict_log(None).await.expect("a read");
+    assert!(log[0].current, "{log:?}");
+}
+
+#[tokio::test]
+async fn a_changed_pair_loses_its_lease() {
+    let world = world().await;
+    world.finish_block(vec![character("a", "a")]).await;
+    let lease = world.claim(1).await.pop().expect("a pair");
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let reset = world
+        .catalog
+        .reset_blocks(vec![(known[0].block, BlockStage::Cut)]);
+    reset.await.expect("reset");
+    let again = world.finish_block(vec![character("a", "new")]).await;
+    assert_eq!(again, stored(0, 1, 0, 0));
+    let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
+    let late = late.await.expect("a reply");
+    assert!(matches!(late, crate::catalog::CheckpointOutcome::LeaseLost));
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_pair_that_is_not_of_the_block_is_not_replaced() {
+    let world = world().await;
+    let row = super::row("b_a");
+    world.catalog.import(vec![row], 1).await.expect("imported");
+    let cut = world.finish_block(vec![character("a", "a")]).await;
+    assert_eq!(cut, CutOutcome::NameTaken(name("b_a")));
+    let states = world.catalog.block_states().await.expect("a read");
+    assert_eq!(states[0].next_stage, Some(BlockStage::Cut));
+    assert_eq!(world.character_states().await, []);
+}
+
+#[tokio::test]
+async fn changes_make_the_right_stages_stale() {
+    let world = world().await;
+    world.finish_block(vec![character("a", "a")]).await;
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let id = known[0].block;
+    for (texts, revision, from, why) in [
+        (
+            ["new", "page", "labels"],
+            [1; 4],
+            BlockStage::Face,
+            BlockReason::Mesh,
+        ),
+        (
+            ["mesh", "new", "labels"],
+            [1; 4],
+            BlockStage::Align,
+            BlockReason::Page,
+        ),
+        (
+            ["mesh", "page", "new"],
+            [1; 4],
+            BlockStage::Boxes,
+            BlockReason::Labels,
+        ),
+        (
+            ["mesh", "page", "labels"],
+            [1, 2, 1, 1],
+            BlockStage::Align,
+            BlockReason::Settings,
+        ),
+        (
+            ["mesh", "page", "labels"],
+            [1, 1, 1, 2],
+            BlockStage::Cut,
+            BlockReason::Settings,
+        ),
+    ] {
+        let seen = vec![(id, inputs(texts))];
+        world
+            .catalog
+            .store_block_inputs(seen)
+            .await
+            .expect("stored");
+        assert_eq!(world.requeue_blocks(revision).await, [(from, why)]);
+        let lease = world.leased_block().await;
+        assert_eq!(lease.0.cursor(), from);
+        assert_eq!(lease.1.results.len(), from.index());
+        world
+            .catalog
+            .release_block(lease.0)
+            .await
+            .expect("released");
+        // The stages compute the old inputs again.
+        world.finish_block(vec![character("a", "a")]).await;
+    }
+    let other_side = BlockAttributes {
+        side: Some(crate::domain::BlockSide::Back),
+        ..attributes("b")
+    };
+    world.import_block(other_side).await;
+    let requeued = world.requeue_blocks([1; 4]).await;
+    assert_eq!(requeued, [(BlockStage::Face, BlockReason::Attributes)]);
+}
+
+fn failed(work: &BlockWork, stage: BlockStage, action: BlockFailureAction) -> BlockFailure {
+    let done = done(work, stage);
+    BlockFailure {
+        stage,
+        failure: Failure::new(
+            FailureClass::NoSolution,
+            "b.png: the page is of another block",
+        ),
+        action,
+        made_with: done.made_with,
+        inputs: done.inputs,
+        ms: Some(3),
+        at: 100,
+        alive_since: 0,
+    }
+}
+
+#[tokio::test]
+async fn a_refused_block_stays_until_a_retry_or_another_page() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    let refused = failed(&work, BlockStage::Face, BlockFailureAction::Quarantine);
+    assert!(
+        world
+            .catalog
+            .fail_block(lease.clone(), refused.clone())
+            .await
+            .expect("stored")
+    );
+    assert!(
+        !world
+            .catalog
+            .fail_block(lease, refused)
+            .await
+            .expect("a reply")
+    );
+    assert!(world.claim_block(world.worker).await.is_none());
+    assert_eq!(world.requeue_blocks([1; 4]).await, []);
+    let states = world.catalog.block_states().await.expect("a read");
+    let failure = states[0].failure.clone().expect("a failure");
+    assert_eq!(
+        failure.failure.message,
+        "b.png: the page is of another block"
+    );
+    let other = RerunPolicy::Failed;
+    let plan = world
+        .catalog
+        .plan_blocks(&settings([1; 4]), other)
+        .await
+        .expect("a plan");
+    assert_eq!(plan[0].why, BlockReason::Requested);
+    let known = world.catalog.known_blocks().await.expect("a read");
+    let seen = vec![(known[0].block, inputs(["other", "page", "labels"]))];
+    world
+        .catalog
+        .store_block_inputs(seen)
+        .await
+        .expect("stored");
+    let requeued = world.requeue_blocks([1; 4]).await;
+    assert_eq!(requeued, [(BlockStage::Face, BlockReason::FailedBefore)]);
+    let (lease, work) = world.leased_block().await;
+    let refused = failed(&work, BlockStage::Face, BlockFailureAction::Quarantine);
+    world
+        .catalog
+        .fail_block(lease, refused)
+        .await
+        .expect("stored");
+    let retried = world
+        .catalog
+        .retry_blocks(&BlockRetry::Names(vec![block("b")]))
+        .await;
+    assert_eq!(retried.expect("a reply"), 1);
+    assert_eq!(world.leased_block().await.0.attempt(), 1);
+}
+
+#[tokio::test]
+async fn a_block_backs_off_and_becomes_due() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    let waits = failed(
+        &work,
+        BlockStage::Face,
+        BlockFailureAction::BackOff { run_at: 500 },
+    );
+    assert!(
+        world
+            .catalog
+            .fail_block(lease, waits)
+            .await
+            .expect("stored")
+    );
+    let left = world.catalog.outstanding_blocks().await.expect("a read");
+    assert_eq!(
+        (left.backoff, left.next_due, left.left()),
+        (1, Some(500), 1)
+    );
+    assert_eq!(
+        world
+            .catalog
+            .release_due_blocks(499, 1_000)
+            .await
+            .expect("a reply"),
+        0
+    );
+    assert_eq!(
+        world
+            .catalog
+            .release_due_blocks(500, 1_000)
+            .await
+            .expect("a reply"),
+        1
+    );
+    assert_eq!(world.leased_block().await.0.attempt(), 2);
+}
+
+#[tokio::test]
+async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    // A second claim of the same worker returns the same lease: the reply to the first may have been lost.
+    assert_eq!(world.leased_block().await.0, lease);
+    let other = register(&world.catalog).await;
+    assert!(world.claim_block(other).await.is_none());
+    let recovered = world
+        .catalog
+        .recover(DeadWorker::AllExcept(other), 60)
+        .await;
+    assert_eq!(recovered.expect("a recovery").blocks, 1);
+    let stage = done(&work, BlockStage::Face);
+    let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
+    assert_eq!(late.expect("a reply"), None);
+    let (lease, _) = world.claim_block(other).await.expect("a ready block");
+    let advanced = world
+        .catalog
+        .checkpoint_block(lease.clone(), stage.clone())
+        .await;
+    let advanced = advanced.expect("a reply").expect("a valid lease");
+    assert_eq!(advanced.cursor(), BlockStage::Align);
+    // The reply was lost, and the worker sends the same checkpoint again.
+    let again = world.catalog.checkpoint_block(lease, stage).await;
+    assert_eq!(again.expect("a reply"), Some(advanced));
+}
+
+#[tokio::test]
+async fn a_block_that_kills_its_workers_is_quarantined() {
+    let world = world().await;
+    let mut worker = world.worker;
+    for crashes in 1..=3 {
+        assert!(world.claim_block(worker).await.is_some(), "{crashes}");
+        worker = register(&world.catalog).await;
+        let recovered = world
+            .catalog
+            .recover(DeadWorker::AllExcept(worker), 60)
+            .await;
+        let ready = u64::from(crashes < 3);
+        assert_eq!(recovered.expect("a recovery").blocks, ready, "{crashes}");
+    }
+    let states = world.catalog.block_states().await.expect("a read");
+    let failure = states[0].failure.clone().expect("a failure");
+    let message = "3 workers died or hung over it at face";
+    assert_eq!(failure.failure.message, message);
+    assert_eq!(world.requeue_blocks([9; 4]).await, []);
+}
+
+#[tokio::test]
+async fn a_worker_without_heartbeats_stores_nothing() {
+    let world = world().await;
+    let (lease, work) = world.leased_block().await;
+    let late = BlockCheckpoint {
+        alive_since: 50,
+        ..done(&work, BlockStage::Face)
+    };
+    let stored = world.catalog.checkpoint_block(lease.clone(), late).await;
+    assert_eq!(stored.expect("a reply"), None);
+    let ended = world.catalog.end_worker(world.worker, 60, None).await;
+    ended.expect("ended");
+    let stage = done(&work, BlockStage::Face);
+    let stored = world.catalog.checkpoint_block(lease, stage).await;
+    assert_eq!(stored.expect("a reply"), None);
+}
+
+async fn status_of(world: &World, pair: &str) -> Option<JobStatus> {
+    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+    detail.map(|detail| detail.results.status)
+}
+
+async fn judge(world: &World, pair: &str) {
+    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+    let results = detail.expect("the pair").results;
+    assert_eq!(results.status, JobStatus::Done);
+    let verdict = NewVerdict {
+        pair: name(pair),
+        metric: Some(ThresholdMetric::DEFAULT),
+        verdict: Verdict::Pass,
+        reviewer: "lan".to_owned(),
+        reason: None,
+        note: None,
+        look: ReviewContext::default(),
+        at: None,
+    };
+    let stored = world.catalog.verdict_set(vec![verdict], 5).await;
+    stored.expect("stored");
+}

@@ -1,0 +1,274 @@
+//! PAGE-XML: regions, lines, words and glyphs of one page.
+
+use quick_xml::XmlVersion;
+use quick_xml::escape::resolve_predefined_entity;
+use quick_xml::events::{BytesRef, BytesStart, Event};
+use quick_xml::reader::Reader;
+
+use crate::labels::error::LabelsProblem;
+use crate::labels::message::{line_at, quoted};
+use crate::labels::region::{Corners, LabelRegion, PageRegions, checked, filled, polygon};
+
+/// Elements that may stand for characters, the smallest first.
+const LEVELS: [&str; 4] = ["Glyph", "Word", "TextLine", "TextRegion"];
+/// Deepest nesting of elements.
+const MAX_DEPTH: usize = 64;
+
+/// An element that is open, and what it holds so far.
+#[derive(Debug, Default)]
+struct OpenElement {
+    name: String,
+    id: Option<String>,
+    corners: Option<Corners>,
+    /// Alternative text: the first or the one with the smallest index.
+    text: Option<(u32, String)>,
+    /// Index of a `TextEquiv`. Of a `Unicode`: 1 once its text was taken.
+    index: u32,
+}
+
+/// Regions of a page while its file is read.
+#[derive(Debug, Default)]
+struct PageParser {
+    open: Vec<OpenElement>,
+    /// Regions of each of [`LEVELS`].
+    found: [Vec<LabelRegion>; LEVELS.len()],
+    page: Option<PageRegions>,
+}
+
+/// Reads the glyphs of a page, or its words if there are no glyphs, else its lines, else its regions.
+pub(in crate::labels) fn read(text: &str) -> Result<PageRegions, LabelsProblem> {
+    let mut reader = Reader::from_str(text);
+    let mut parser = PageParser::default();
+    loop {
+        let event = reader.read_event();
+        let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
+        let event = event.map_err(|error| match error {
+            // Errors of syntax are parts without end.
+            quick_xml::Error::Syntax(_) => truncated(text),
+            error => damaged(text, at, &error.to_string()),
+        })?;
+        let result = match event {
+            Event::Start(element) => parser.start(&element),
+            Event::Empty(element) => parser.start(&element).and_then(|()| parser.end()),
+            Event::End(_) => parser.end(),
+            Event::Text(part) => part
+                .decode()
+                .map(|part| parser.text(&part))
+                .map_err(|error| error.to_string().into()),
+            Event::CData(part) => part
+                .decode()
+                .map(|part| parser.text(&part))
+                .map_err(|error| error.to_string().into()),
+            Event::GeneralRef(reference) => parser.reference(&reference),
+            Event::Eof => break,
+            Event::Comment(_) | Event::Decl(_) | Event::PI(_) | Event::DocType(_) => Ok(()),
+        };
+        result.map_err(|problem| match problem {
+            XmlProblem::Syntax(reason) => damaged(text, at, &reason),
+            XmlProblem::Content(problem) => problem,
+        })?;
+    }
+    if !parser.open.is_empty() {
+        return Err(truncated(text));
+    }
+    let no_page = || LabelsProblem::at("the element PcGts", "it has no element Page");
+    let mut page = parser.page.ok_or_else(no_page)?;
+    page.regions = parser
+        .found
+        .into_iter()
+        .find(|all| !all.is_empty())
+        .unwrap_or_default();
+    Ok(page)
+}
+
+/// A problem inside the file.
+enum XmlProblem {
+    Syntax(String),
+    Content(LabelsProblem),
+}
+
+impl From<String> for XmlProblem {
+    fn from(reason: String) -> Self {
+        Self::Syntax(reason)
+    }
+}
+
+fn truncated(text: &str) -> LabelsProblem {
+    LabelsProblem::Truncated {
+        format: "XML",
+        line: text.lines().count(),
+    }
+}
+
+fn damaged(text: &str, at: usize, reason: &str) -> LabelsProblem {
+    let line = line_at(text, at);
+    LabelsProblem::Damaged {
+        format: "XML",
+        reason: format!("{reason} at line {line}"),
+    }
+}
+
+/// Returns the value of an attribute.
+fn attribute(element: &BytesStart<'_>, key: &str) -> Result<Option<String>, XmlProblem> {
+    let found = element.try_get_attribute(key);
+    let Some(found) = found.map_err(|error| error.to_string())? else {
+        return Ok(None);
+    };
+    let value = found.normalized_value(XmlVersion::default());
+    Ok(Some(value.map_err(|error| error.to_string())?.into_owned()))
+}
+
+impl PageParser {
+    fn start(&mut self, element: &BytesStart<'_>) -> Result<(), XmlProblem> {
+        let name = String::from_utf8_lossy(element.local_name().as_ref()).into_owned();
+        if self.open.is_empty() && name != "PcGts" {
+            return Err(XmlProblem::Content(LabelsProblem::UnknownXml(name)));
+        }
+        if self.open.len() == MAX_DEPTH {
+            return Err(format!("more than {MAX_DEPTH} elements are nested").into());
+        }
+        match name.as_str() {
+            "Page" => self.start_page(element)?,
+            "Coords" => {
+                if let Some(points) = attribute(element, "points")? {
+                    let corners = self.points(&points)?;
+                    self.set_corners(corners);
+                }
+            }
+            // Before 2013, each point was an element.
+            "Point" => {
+                let (x, y) = (attribute(element, "x")?, attribute(element, "y")?);
+                let point = format!("{},{}", x.unwrap_or_default(), y.unwrap_or_default());
+                let corners = self.points(&point)?;
+                self.add_corners(corners);
+            }
+            _ => {}
+        }
+        let index = match name.as_str() {
+            "TextEquiv" => attribute(element, "index")?,
+            _ => None,
+        };
+        self.open.push(OpenElement {
+            id: attribute(element, "id")?.as_deref().and_then(filled),
+            index: index.and_then(|index| index.parse().ok()).unwrap_or(0),
+            name,
+            ..OpenElement::default()
+        });
+        Ok(())
+    }
+
+    fn start_page(&mut self, element: &BytesStart<'_>) -> Result<(), XmlProblem> {
+        if self.page.is_some() {
+            let problem = LabelsProblem::at("the element PcGts", "it has several elements Page");
+            return Err(XmlProblem::Content(problem));
+        }
+        let side = |key| -> Result<Option<f64>, XmlProblem> {
+            let side = attribute(element, key)?.and_then(|side| side.trim().parse::<f64>().ok());
+            Ok(side.filter(|side| side.is_finite() && *side >= 1.0))
+        };
+        let size = side("imageWidth")?.zip(side("imageHeight")?);
+        self.page = Some(PageRegions {
+            file_name: attribute(element, "imageFilename")?,
+            size: size.map(|(width, height)| [width, height]),
+            ..PageRegions::default()
+        });
+        Ok(())
+    }
+
+    /// Reads `x,y x,y`.
+    fn points(&self, text: &str) -> Result<Corners, XmlProblem> {
+        let number = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
+        let point = |word: &str| {
+            let (x, y) = word.split_once(',')?;
+            Some([number(x)?, number(y)?])
+        };
+        let point = |word: &str| {
+            let [x, y] = point(word).ok_or_else(|| format!("{} is not a point", quoted(word)))?;
+            Ok([checked(x, "x")?, checked(y, "y")?])
+        };
+        let points = text
+            .split_whitespace()
+            .map(point)
+            .collect::<Result<_, String>>();
+        points.map_err(|reason| XmlProblem::Content(LabelsProblem::at(self.place(), reason)))
+    }
+
+    /// Returns the innermost open element that has an id, for a message.
+    fn place(&self) -> String {
+        let named = self
+            .open
+            .iter()
+            .rev()
+            .find_map(|element| Some((&element.name, element.id.as_ref()?)));
+        named.map_or_else(
+            || "the coordinates".to_owned(),
+            |(name, id)| format!("the coordinates of {name} {}", quoted(id)),
+        )
+    }
+
+    /// Sets the corners of the element around `Coords`.
+    fn set_corners(&mut self, corners: Corners) {
+        if let Some(element) = self.open.last_mut() {
+            element.corners = Some(corners);
+        }
+    }
+
+    /// Adds corners to the element around the open `Coords`; points of other elements, such as baselines, are ignored.
+    fn add_corners(&mut self, corners: Corners) {
+        if let [.., element, coords] = self.open.as_mut_slice()
+            && coords.name == "Coords"
+        {
+            element.corners.get_or_insert_default().extend(corners);
+        }
+    }
+
+    /// Adds a part of the text inside `Unicode`, which is inside `TextEquiv` inside the element that it belongs to.
+    fn text(&mut self, part: &str) {
+        if let [.., element, equivalent, unicode] = self.open.as_mut_slice()
+            && unicode.name == "Unicode"
+            && equivalent.name == "TextEquiv"
+        {
+            let index = equivalent.index;
+            match &mut element.text {
+                // The same element `Unicode` goes on.
+                Some((_, text)) if unicode.index == 1 => text.push_str(part),
+                Some((best, _)) if *best <= index => {}
+                text => {
+                    *text = Some((index, part.to_owned()));
+                    unicode.index = 1;
+                }
+            }
+        }
+    }
+
+    /// Adds a character that is written as a reference, such as `&amp;` or `&#22825;`.
+    fn reference(&mut self, reference: &BytesRef<'_>) -> Result<(), XmlProblem> {
+        let code = reference
+            .resolve_char_ref()
+            .map_err(|error| error.to_string())?;
+        if let Some(code) = code {
+            self.text(code.encode_utf8(&mut [0; 4]));
+            return Ok(());
+        }
+        let name = reference.decode().map_err(|error| error.to_string())?;
+        let text = resolve_predefined_entity(&name);
+        self.text(text.ok_or_else(|| format!("the entity {} is unknown", quoted(&name)))?);
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), XmlProblem> {
+        let Some(element) = self.open.pop() else {
+            return Err("an element ends that did not begin".to_owned().into());
+        };
+        if let Some(level) = LEVELS.iter().position(|level| **level == element.name) {
+            let found = &mut self.found[level];
+            found.push(LabelRegion {
+                number: found.len() + 1,
+                name: element.id,
+                text: element.text.as_ref().and_then(|(_, text)| filled(text)),
+                corners: element.corners.and_then(polygon),
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,228 @@
+//! Fitting of regions to their page: scale, boxes outside, repeated boxes, names.
+
+use std::collections::HashMap;
+
+use super::error::LabelsProblem;
+use super::message::{boxes, for_count, list, quoted};
+use super::model::{LabelBox, PageFile, bounds};
+use super::page_choice::is_same_file;
+use super::region::{Corners, LabelRegion, PageRegions};
+use crate::domain::PairName;
+
+/// Maximum number of boxes of a page.
+pub const MAX_BOXES: usize = 100_000;
+/// Largest difference of the ratio of width to height between labels and page that is scaled.
+const MAX_STRETCH: f64 = 0.01;
+/// Smallest side of a box in pixels of the page.
+const MIN_SIDE: f64 = 1.0;
+/// Boxes with a smaller share of their area on the page lie outside.
+const MIN_INSIDE: f64 = 0.5;
+/// Boxes whose edges are equal within this many pixels are the same.
+const SAME_EDGE: f64 = 0.01;
+
+/// A region with an area, and its corners on the page.
+struct PlacedRegion {
+    region: LabelRegion,
+    corners: Corners,
+}
+
+/// Returns the boxes of a page in the order of the file, in the pixel convention of [`LabelBox`], and warnings.
+///
+/// A box with less than half of its area on the page is left out. The others are cut at the edges of the page.
+pub(super) fn fit_to_page(
+    file: PageRegions,
+    page: &PageFile<'_>,
+) -> Result<(Vec<LabelBox>, Vec<String>), LabelsProblem> {
+    let (count, limit) = (file.regions.len(), MAX_BOXES);
+    if count == 0 {
+        return Err(LabelsProblem::NoBoxes(file.file_name));
+    }
+    if count > limit {
+        return Err(LabelsProblem::TooManyBoxes { count, limit });
+    }
+    let mut warnings = page_warnings(&file, page);
+    let scale = scale(file.size, page, &mut warnings)?;
+    let placed = with_area(file.regions, scale, &mut warnings);
+    if placed.is_empty() {
+        return Err(LabelsProblem::NoBoxes(file.file_name));
+    }
+    let inside = on_page(placed, page, &mut warnings)?;
+    let unique = without_repeats(inside, &mut warnings);
+    check_names(&unique)?;
+    let pixel_centres = |corners: Corners| corners.into_iter().map(|[x, y]| [x - 0.5, y - 0.5]);
+    let finished = unique.into_iter().map(|placed| {
+        let name = placed.region.name.as_deref().map(PairName::new).transpose();
+        let place = || format!("the name of box {}", placed.region.number);
+        Ok(LabelBox {
+            name: name
+                .map_err(|error| LabelsProblem::at(place(), error.to_string()))?
+                .map(String::from),
+            text: placed.region.text,
+            outline: pixel_centres(placed.corners).collect(),
+        })
+    });
+    Ok((finished.collect::<Result<_, _>>()?, warnings))
+}
+
+/// Warns about another file name and another size in bytes.
+fn page_warnings(file: &PageRegions, page: &PageFile<'_>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(name) = file.file_name.as_deref()
+        && !is_same_file(name, page.name)
+    {
+        let (labelled, name) = (quoted(name), quoted(page.name));
+        warnings.push(format!("the labels are of {labelled}, the page is {name}"));
+    }
+    if let Some(bytes) = file.bytes.filter(|bytes| *bytes != page.bytes) {
+        warnings.push(format!(
+            "the labels were made for a file of {bytes} bytes, the page has {}",
+            page.bytes
+        ));
+    }
+    warnings
+}
+
+/// Returns the factors from the size that the file names to that of the page.
+fn scale(
+    size: Option<[f64; 2]>,
+    page: &PageFile<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<[f64; 2], LabelsProblem> {
+    let page_size = [page.width, page.height];
+    let Some(labels) = size else {
+        return Ok([1.0; 2]);
+    };
+    let scale = [0, 1].map(|axis| f64::from(page_size[axis]) / labels[axis]);
+    if scale == [1.0; 2] {
+        return Ok(scale);
+    }
+    if (scale[0] / scale[1] - 1.0).abs() > MAX_STRETCH {
+        return Err(LabelsProblem::OtherSize {
+            labels,
+            page: page_size,
+        });
+    }
+    warnings.push(format!(
+        "the labels are for an image of {} x {} px, the page is {} x {} px; the boxes were scaled",
+        labels[0], labels[1], page.width, page.height
+    ));
+    Ok(scale)
+}
+
+/// Drops points, lines and boxes smaller than a pixel.
+fn with_area(
+    regions: Vec<LabelRegion>,
+    scale: [f64; 2],
+    warnings: &mut Vec<String>,
+) -> Vec<PlacedRegion> {
+    let mut flat = Vec::new();
+    let mut placed = Vec::with_capacity(regions.len());
+    for region in regions {
+        let scaled = |[x, y]: &[f64; 2]| [x * scale[0], y * scale[1]];
+        let corners: Corners = region.corners.iter().flatten().map(scaled).collect();
+        let [x0, y0, x1, y1] = bounds(&corners);
+        if x1 - x0 >= MIN_SIDE && y1 - y0 >= MIN_SIDE {
+            placed.push(PlacedRegion { region, corners });
+        } else {
+            flat.push(region.shown());
+        }
+    }
+    if !flat.is_empty() {
+        let verb = for_count(flat.len(), "is", "are");
+        let left_out = for_count(flat.len(), "was", "were");
+        let (count, names) = (boxes(flat.len()), list(&flat));
+        warnings.push(format!(
+            "{count} {verb} smaller than a pixel, a point or a line and {left_out} left out: {names}"
+        ));
+    }
+    placed
+}
+
+/// Drops boxes outside the page and cuts the others at its edges.
+fn on_page(
+    placed: Vec<PlacedRegion>,
+    page: &PageFile<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<PlacedRegion>, LabelsProblem> {
+    let count = placed.len();
+    let size = [f64::from(page.width), f64::from(page.height)];
+    let is_inside =
+        |placed: &PlacedRegion| share_inside(bounds(&placed.corners), size) >= MIN_INSIDE;
+    let (mut inside, outside): (Vec<_>, Vec<_>) = placed.into_iter().partition(is_inside);
+    if 2 * outside.len() > count {
+        return Err(LabelsProblem::Outside {
+            outside: outside.len(),
+            count,
+            page: [page.width, page.height],
+        });
+    }
+    if !outside.is_empty() {
+        let names: Vec<String> = outside.iter().map(|placed| placed.region.shown()).collect();
+        let verb = for_count(
+            names.len(),
+            "lies outside the page and was",
+            "lie outside the page and were",
+        );
+        let (outside, names) = (names.len(), list(&names));
+        warnings.push(format!(
+            "{outside} of {} {verb} left out: {names}",
+            boxes(count)
+        ));
+    }
+    for corner in inside.iter_mut().flat_map(|placed| &mut placed.corners) {
+        *corner = [corner[0].clamp(0.0, size[0]), corner[1].clamp(0.0, size[1])];
+    }
+    Ok(inside)
+}
+
+/// Returns the share of the area of a box that lies on the page.
+fn share_inside([x0, y0, x1, y1]: [f64; 4], [width, height]: [f64; 2]) -> f64 {
+    let share = |from: f64, to: f64, end: f64| (to.min(end) - from.max(0.0)).max(0.0) / (to - from);
+    share(x0, x1, width) * share(y0, y1, height)
+}
+
+/// Keeps the first of boxes with the same edges. It gets the name and the text of the others if it has none.
+fn without_repeats(placed: Vec<PlacedRegion>, warnings: &mut Vec<String>) -> Vec<PlacedRegion> {
+    let mut known: HashMap<[i64; 4], usize> = HashMap::new();
+    let mut unique: Vec<PlacedRegion> = Vec::with_capacity(placed.len());
+    let mut repeats = Vec::new();
+    for other in placed {
+        let edges = bounds(&other.corners).map(|edge| (edge / SAME_EDGE).round() as i64);
+        if let Some(first) = known.get(&edges).map(|k| &mut unique[*k].region) {
+            repeats.push(format!("{} as {}", other.region.shown(), first.shown()));
+            first.name = first.name.take().or(other.region.name);
+            first.text = first.text.take().or(other.region.text);
+        } else {
+            known.insert(edges, unique.len());
+            unique.push(other);
+        }
+    }
+    if !repeats.is_empty() {
+        let verb = for_count(
+            repeats.len(),
+            "repeats another and was",
+            "repeat others and were",
+        );
+        let (count, names) = (boxes(repeats.len()), list(&repeats));
+        warnings.push(format!("{count} {verb} left out: {names}"));
+    }
+    unique
+}
+
+/// Refuses names that two boxes have.
+fn check_names(placed: &[PlacedRegion]) -> Result<(), LabelsProblem> {
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    for region in placed.iter().map(|placed| &placed.region) {
+        let Some(name) = region.name.as_deref() else {
+            continue;
+        };
+        if let Some(first) = known.insert(name, region.number) {
+            return Err(LabelsProblem::SameName {
+                name: name.to_owned(),
+                first,
+                second: region.number,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,8 @@
+//! Labels of one page in all formats.
+
+mod any_bytes;
+mod errors;
+mod format_agreement;
+mod page_fit;
+mod round_trips;
+mod samples;

@@ -1,0 +1,279 @@
+//! Lists of whole blocks: CSV with the columns block, mesh, page and optionally labels, unit and side.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::csv::{missing_column, similar_column};
+use super::error::{ManifestError, at_line, of_list};
+use super::text::{LineCounter, as_utf8, delimiter};
+use crate::domain::{BlockName, BlockSide, LengthUnit};
+
+/// The columns of a list of blocks. The first three are required.
+const COLUMNS: [&str; 6] = ["block", "mesh", "page", "labels", "unit", "side"];
+const REQUIRED: usize = 3;
+
+/// Longest path in bytes; the system accepts no longer one.
+const MAX_PATH_BYTES: usize = 4096;
+
+/// A block of a list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BlockRow {
+    /// Line of the list, from 1.
+    pub line: usize,
+    /// The id.
+    pub name: BlockName,
+    /// Path of the mesh, relative to the list.
+    pub mesh: PathBuf,
+    /// Path of the image of the page, relative to the list.
+    pub page: PathBuf,
+    /// Path of the labels, relative to the list.
+    pub labels: Option<PathBuf>,
+    /// Unit of the mesh.
+    pub unit: Option<LengthUnit>,
+    /// The side of the scan that the page shows.
+    pub side: Option<BlockSide>,
+}
+
+/// Returns whether a list is one of blocks, by its header: it has the column `page`, or the column `block` with `labels`
+/// or `side` and without the columns of a list of pairs.
+pub fn is_block_list(bytes: &[u8]) -> bool {
+    let Ok(bytes) = as_utf8(bytes) else {
+        return false;
+    };
+    let mut record = ::csv::StringRecord::new();
+    if !matches!(reader(&bytes).read_record(&mut record), Ok(true)) {
+        return false;
+    }
+    let names: Vec<String> = record.iter().map(str::to_lowercase).collect();
+    let has = |name: &str| names.iter().any(|found| found == name);
+    has("page") || has("block") && (has("labels") || has("side")) && !has("id") && !has("print")
+}
+
+fn reader(bytes: &[u8]) -> ::csv::Reader<&[u8]> {
+    ::csv::ReaderBuilder::new()
+        .delimiter(delimiter(bytes))
+        .trim(::csv::Trim::All)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(bytes)
+}
+
+/// Parses a list of blocks. Columns may be in any order, and their names in any case. Blank lines are ignored.
+///
+/// # Errors
+/// Returns an error if the list cannot be decoded, contains no blocks, or has an invalid header or row. The error names
+/// the lines of invalid rows.
+pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
+    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
+    let mut reader = reader(bytes);
+    let mut lines = LineCounter::new(bytes);
+    let mut record = ::csv::ByteRecord::new();
+    let mut problems = ManifestError::default();
+    let mut header: Option<Vec<&'static str>> = None;
+    let (mut rows, mut seen) = (Vec::new(), BTreeMap::new());
+    loop {
+        let start = reader.position().clone();
+        let is_read = match reader.read_byte_record(&mut record) {
+            Ok(is_read) => is_read,
+            Err(error) => {
+                let line = lines.at(Some(&start));
+                problems.add(at_line(line, &error.to_string()));
+                break;
+            }
+        };
+        if !is_read {
+            break;
+        }
+        let line = lines.at(Some(record.position().unwrap_or(&start)));
+        let Some(columns) = &header else {
+            header = Some(columns_of(line, &record)?);
+            continue;
+        };
+        if record.iter().all(<[u8]>::is_empty) {
+            continue;
+        }
+        let mut reasons = Vec::new();
+        if let Some(row) = row(line, columns, &record, &mut reasons) {
+            if let Some(first) = seen.insert(row.name.clone(), line) {
+                reasons.push(format!("block \"{}\" is already on line {first}", row.name));
+            }
+            rows.push(row);
+        }
+        problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
+    }
+    if problems == ManifestError::default() && rows.is_empty() {
+        return Err(of_list("the list contains no blocks").into());
+    }
+    problems.check(false)?;
+    Ok(rows)
+}
+
+/// Returns the columns of a header.
+fn columns_of(line: usize, record: &::csv::ByteRecord) -> Result<Vec<&'static str>, ManifestError> {
+    let mut problems = ManifestError::default();
+    let is_known = |name: &str| COLUMNS.contains(&name);
+    let mut columns = Vec::new();
+    for field in record {
+        let name = String::from_utf8_lossy(field).to_lowercase();
+        let found = COLUMNS.into_iter().find(|column| *column == name);
+        match found {
+            Some(column) if columns.contains(&column) => {
+                problems.add(at_line(line, &format!("two columns are named {column:?}")));
+            }
+            Some(column) => columns.push(column),
+            None => {
+                let optional = COLUMNS[REQUIRED..].iter();
+                let similar = optional
+                    .copied()
+                    .find(|column| similar_column(&name, column));
+                let hint =
+                    similar.map(|column| format!("; rename it to {column:?} if it is meant"));
+                let hint = hint.unwrap_or_default();
+                let known = COLUMNS.join(", ");
+                let reason =
+                    format!("column {name:?} is unknown{hint}; a list of blocks has: {known}");
+                problems.add(at_line(line, &reason));
+            }
+        }
+    }
+    let missing = COLUMNS[..REQUIRED].iter();
+    let missing = missing.filter(|name| !columns.contains(*name));
+    let missing: Vec<_> = missing
+        .map(|name| at_line(line, &missing_column(name, record, is_known)))
+        .collect();
+    if !missing.is_empty() {
+        // A misspelt name is also unknown; say it once.
+        problems = ManifestError::default();
+        problems.extend(missing);
+    }
+    problems.check(false)?;
+    Ok(columns)
+}
+
+/// Returns a row, or records why it is not valid.
+fn row(
+    line: usize,
+    columns: &[&'static str],
+    record: &::csv::ByteRecord,
+    reasons: &mut Vec<String>,
+) -> Option<BlockRow> {
+    if record.len() != columns.len() {
+        let (cells, names) = (record.len(), columns.len());
+        reasons.push(format!("the row has {cells} cells, the header has {names}"));
+        return None;
+    }
+    let mut cells = BTreeMap::new();
+    for (column, cell) in columns.iter().zip(record) {
+        let Ok(cell) = std::str::from_utf8(cell) else {
+            reasons.push(format!("the cell of column {column:?} is not UTF-8"));
+            return None;
+        };
+        if cell.len() > MAX_PATH_BYTES {
+            let (len, limit) = (cell.len(), MAX_PATH_BYTES);
+            reasons.push(format!(
+                "{column} has {len} bytes, over the limit of {limit}"
+            ));
+            return None;
+        }
+        if !cell.is_empty() {
+            cells.insert(*column, cell);
+        }
+    }
+    for column in &COLUMNS[1..REQUIRED] {
+        if !cells.contains_key(column) {
+            reasons.push(format!("{column} is empty"));
+        }
+    }
+    let name = cells.get("block").copied().unwrap_or_default();
+    let name = BlockName::new(name).map_err(|error| error.to_string());
+    let unit = cells.get("unit").map(|cell| cell.to_ascii_lowercase());
+    let unit = unit.map(|cell| cell.parse::<LengthUnit>()).transpose();
+    let side = cells.get("side").map(|cell| cell.to_ascii_lowercase());
+    let side = side.map(|cell| cell.parse::<BlockSide>()).transpose();
+    let mut record = |reason: Option<&String>| reasons.extend(reason.cloned());
+    record(name.as_ref().err());
+    record(unit.as_ref().err());
+    record(side.as_ref().err());
+    Some(BlockRow {
+        line,
+        name: name.ok()?,
+        mesh: PathBuf::from(cells.get("mesh")?),
+        page: PathBuf::from(cells.get("page")?),
+        labels: cells.get("labels").map(PathBuf::from),
+        unit: unit.ok()?,
+        side: side.ok()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_block_list, parse_blocks};
+    use crate::domain::{BlockSide, LengthUnit};
+
+    fn refusal(text: &str) -> String {
+        parse_blocks(text.as_bytes()).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn the_header_tells_a_list_of_blocks_from_one_of_pairs() {
+        for text in [
+            "block,mesh,page\n",
+            "Block;Mesh;Page;labels\n",
+            "block,mesh,pages,labels\n",
+        ] {
+            assert!(is_block_list(text.as_bytes()), "{text}");
+        }
+        for text in [
+            "id,mesh,print,block\n",
+            "id,mesh,print\n",
+            "",
+            "block,mesh\n",
+        ] {
+            assert!(!is_block_list(text.as_bytes()), "{text}");
+        }
+    }
+
+    #[test]
+    fn rows_have_optional_labels_unit_and_side() {
+        let text = "block,mesh,page,labels,unit,side\nb1,m/1.stl,p/1.jpg,l/1.json,MM,back\n\nb2,m/2.ply,p/2.png,,,\n";
+        let rows = parse_blocks(text.as_bytes()).expect("valid");
+        assert_eq!((rows.len(), rows[1].line), (2, 4));
+        assert_eq!(rows[0].unit, Some(LengthUnit::Mm));
+        assert_eq!(rows[0].side, Some(BlockSide::Back));
+        assert_eq!(rows[0].labels.as_deref(), Some("l/1.json".as_ref()));
+        assert_eq!((&rows[1].labels, rows[1].side), (&None, None));
+    }
+
+    #[test]
+    fn problems_name_line_and_column() {
+        for (text, expected) in [
+            (
+                "block,mesh,pages,labels\nb,m,p,l\n",
+                "rename \"pages\" to \"page\" if it is meant",
+            ),
+            (
+                "block,mesh,page,lables\nb,m,p,l\n",
+                "rename it to \"labels\" if it is meant",
+            ),
+            (
+                "block,mesh,page,color\nb,m,p,l\n",
+                "column \"color\" is unknown; a list of blocks has",
+            ),
+            ("block,mesh,page\nb,m\n", "line 2: the row has 2 cells"),
+            ("block,mesh,page\nb,,p\n", "line 2: mesh is empty"),
+            (
+                "block,mesh,page\nb,m,p\nb,m,p\n",
+                "line 3: block \"b\" is already on line 2",
+            ),
+            (
+                "block,mesh,page,side\nb,m,p,top\n",
+                "is not a side (front, back)",
+            ),
+            ("block,mesh,page\na/b,m,p\n", "an id has no slashes"),
+            ("block,mesh,page\n", "the list contains no blocks"),
+        ] {
+            let found = refusal(text);
+            assert!(found.contains(expected), "{text:?}: {found}");
+        }
+    }
+}

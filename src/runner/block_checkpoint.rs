@@ -1,0 +1,278 @@
+//! Stores results and failures of the stages of a block.
+
+use std::collections::BTreeSet;
+
+use super::block_inputs::as_failure;
+use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
+use super::compute_thread::run_blocking;
+use super::error::RunError;
+use super::events::RunEvent;
+use super::policy;
+use super::run_context::RunContext;
+use super::stage_output::result_hash;
+use crate::catalog::{
+    BlockCheckpoint, BlockFailure, BlockFailureAction, CutOutcome, CutPair, CutSummary,
+    InputVersion, MadeWith, NewCharacter,
+};
+use crate::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
+use crate::failpoint::{self, Point};
+use crate::store::{Project, stat_input};
+
+/// Calls an idempotent operation again while the database server is unavailable.
+macro_rules! while_unavailable {
+    ($catalog:expr, $call:expr) => {{
+        let mut attempt = 0;
+        loop {
+            match $call.await {
+                Err(error) if $catalog.may_retry(attempt, &error).await => attempt += 1,
+                outcome => break outcome,
+            }
+        }
+    }};
+}
+pub(super) use while_unavailable;
+
+/// Stores a computed stage. Fails the block instead if the output is not valid.
+pub(super) async fn store_stage(
+    context: &RunContext,
+    block: BlockInProgress,
+    stage: BlockStage,
+    computed: ComputedBlockStage,
+) -> Result<AfterStage, RunError> {
+    let ms = computed.ms;
+    let name = block.work.attributes.name.clone();
+    let ComputedBlockStage { output, files, .. } = computed;
+    let BlockStageOutput {
+        outcome,
+        characters,
+    } = output;
+    let outcome = outcome.to_string();
+    let record = BlockStageRecord {
+        stage,
+        result_hash: result_hash(&outcome, &files),
+        outcome,
+        files,
+    };
+    let (project, inner) = (context.project.clone(), name.clone());
+    let characters = run_blocking(move || {
+        failpoint::hit(stage, Point::Synced, Some(&inner));
+        new_characters(&project, &inner, characters)
+    });
+    let characters = match characters.await {
+        Ok(characters) => characters,
+        Err(error) => return store_failure(context, block, stage, error, Some(ms)).await,
+    };
+    let settings = context.blocks.settings(stage);
+    let checkpoint = BlockCheckpoint {
+        made_with: MadeWith::new(stage, &settings, &block.work.attributes, &block.inputs),
+        record: record.clone(),
+        inputs: block.inputs.clone(),
+        ms,
+        at: context.clock.now(),
+        next_deadline: context.deadline(),
+        alive_since: context.alive_since(),
+    };
+    let after = match stage.next() {
+        Some(next) => advance(context, block, record, checkpoint, next).await?,
+        None => finish_cut(context, block, checkpoint, characters).await?,
+    };
+    if !matches!(
+        after,
+        AfterStage::End(BlockEnd::LeaseLost | BlockEnd::Failed, _)
+    ) {
+        failpoint::hit(stage, Point::Committed, Some(&name));
+        context.emit(RunEvent::BlockStageFinished {
+            block: name.clone(),
+            stage,
+            ms,
+        });
+    }
+    Ok(after)
+}
+
+async fn advance(
+    context: &RunContext,
+    mut block: BlockInProgress,
+    record: BlockStageRecord,
+    checkpoint: BlockCheckpoint,
+    next: BlockStage,
+) -> Result<AfterStage, RunError> {
+    let (catalog, lease) = (&context.catalog, &block.lease);
+    let stored = while_unavailable!(
+        catalog,
+        catalog.checkpoint_block(lease.clone(), checkpoint.clone())
+    );
+    let Some(lease) = stored? else {
+        return Ok(AfterStage::End(BlockEnd::LeaseLost, 0));
+    };
+    let stage = record.stage;
+    block.lease = lease;
+    block.work.results.retain(|earlier| earlier.stage < stage);
+    block.work.results.push(record);
+    Ok(AfterStage::Continue(block, next))
+}
+
+async fn finish_cut(
+    context: &RunContext,
+    block: BlockInProgress,
+    checkpoint: BlockCheckpoint,
+    characters: Vec<NewCharacter>,
+) -> Result<AfterStage, RunError> {
+    let (catalog, lease) = (&context.catalog, &block.lease);
+    let stored = while_unavailable!(
+        catalog,
+        catalog.finish_cut(lease.clone(), checkpoint.clone(), characters.clone())
+    );
+    let summary = match stored? {
+        CutOutcome::Stored(summary) => summary,
+        CutOutcome::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
+        CutOutcome::NameTaken(taken) => {
+            let text = format!(
+                "there is a pair {taken} that was not cut from this block; import the block with another --name"
+            );
+            let error = BlockStageError::failed(FailureClass::BadInput, text);
+            return store_failure(context, block, BlockStage::Cut, error, Some(checkpoint.ms))
+                .await;
+        }
+    };
+    let CutSummary {
+        added,
+        changed,
+        unchanged,
+        retired,
+    } = summary;
+    context.emit(RunEvent::BlockDone {
+        block: block.work.attributes.name,
+        added,
+        changed,
+        unchanged,
+        retired,
+        stages: context.until.index() as u64 + 1,
+    });
+    Ok(AfterStage::End(BlockEnd::Done, added + changed))
+}
+
+/// Stores a failure of a stage.
+pub(super) async fn store_failure(
+    context: &RunContext,
+    block: BlockInProgress,
+    stage: BlockStage,
+    error: BlockStageError,
+    ms: Option<u64>,
+) -> Result<AfterStage, RunError> {
+    check_in_place(context).await?;
+    let (failure, is_transient) = as_failure(error);
+    let (id, attempt) = (block.lease.block(), block.lease.attempt());
+    let now = context.clock.now();
+    let action = policy::block_failure_action(id, failure.class, is_transient, attempt, now);
+    let settings = context.blocks.settings(stage);
+    let failed = BlockFailure {
+        stage,
+        failure: failure.clone(),
+        action,
+        made_with: MadeWith::new(stage, &settings, &block.work.attributes, &block.inputs),
+        inputs: block.inputs,
+        ms,
+        at: now,
+        alive_since: context.alive_since(),
+    };
+    if !context.catalog.fail_block(block.lease, failed).await? {
+        return Ok(AfterStage::End(BlockEnd::LeaseLost, 0));
+    }
+    let block = block.work.attributes.name;
+    let end = match action {
+        BlockFailureAction::Quarantine => {
+            context.emit(RunEvent::BlockFailed {
+                block,
+                stage,
+                failure,
+            });
+            BlockEnd::Failed
+        }
+        BlockFailureAction::BackOff { run_at } => {
+            context.emit(RunEvent::BlockBackingOff {
+                block,
+                stage,
+                failure,
+                wait_ms: (run_at - now).unsigned_abs(),
+            });
+            BlockEnd::Retry
+        }
+    };
+    Ok(AfterStage::End(end, 0))
+}
+
+/// Checks that the project's directory was not renamed. Otherwise, the run ends instead of failing the block.
+async fn check_in_place(context: &RunContext) -> Result<(), RunError> {
+    let project = context.project.clone();
+    run_blocking(move || project.check_in_place()).await?;
+    Ok(())
+}
+
+/// Converts the characters of a cut to their stored form.
+///
+/// # Errors
+/// Returns an error if two characters have the same label, a label cannot be part of an id, or a file is missing.
+fn new_characters(
+    project: &Project,
+    block: &BlockName,
+    characters: Vec<CharacterOutput>,
+) -> Result<Vec<NewCharacter>, BlockStageError> {
+    let mut labels = BTreeSet::new();
+    characters
+        .into_iter()
+        .map(|one| {
+            let refused = |text: String| BlockStageError::failed(FailureClass::BadInput, text);
+            if !labels.insert(one.label.clone()) {
+                let text = format!("two characters have the label {:?}; rename one", one.label);
+                return Err(refused(text));
+            }
+            if let Err(error) = block.pair(&one.label) {
+                let text = format!("label {:?} cannot be part of an id: {error}", one.label);
+                return Err(refused(text));
+            }
+            let cut = match one.cut {
+                Ok(files) => {
+                    let (mesh_path, mesh) = input_of(project, &files.mesh)?;
+                    let (print_path, print) = input_of(project, &files.print)?;
+                    Ok(CutPair {
+                        mesh_path,
+                        mesh,
+                        print_path,
+                        print,
+                        unit: files.unit,
+                        scanned_face_down: files.scanned_face_down,
+                        prior: files.prior.map(|prior| prior.to_string()),
+                    })
+                }
+                Err(reason) => Err(reason),
+            };
+            Ok(NewCharacter {
+                label: one.label,
+                character: one.character,
+                bounds: one.bounds,
+                confidence: one.confidence,
+                maps: one.maps,
+                cut,
+            })
+        })
+        .collect()
+}
+
+/// Returns the path of an artifact as an input of a pair, and its version.
+fn input_of(
+    project: &Project,
+    artifact: &ArtifactRef,
+) -> Result<(String, InputVersion), BlockStageError> {
+    let Some(path) = artifact.stored_path() else {
+        let text = "the files of characters cannot be in an object store".to_owned();
+        return Err(BlockStageError::failed(FailureClass::BadInput, text));
+    };
+    let stat = stat_input(&project.input(&path))?;
+    let version = InputVersion {
+        hash: artifact.hash,
+        stat,
+    };
+    Ok((path, version))
+}

@@ -1,0 +1,120 @@
+//! The stage `boxes`: reads or finds the boxes of the characters, and places them on the face.
+
+use std::collections::HashSet;
+
+use super::held::HeldPage;
+use super::outcomes::{AlignOutcome, BoxesOutcome};
+use super::{BlockPipeline, StageContext, output};
+use crate::block::{CharacterBox, PageMap, StoredPageMap, check_label_fit, place_characters};
+use crate::domain::{BlockStage, FailureClass};
+use crate::labels::{self, PageFile, reading_order};
+use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+
+/// Characters with at least this confidence count as sure.
+const SURE: f64 = 0.5;
+
+/// Boxes on a page, and where they come from.
+struct PageBoxes {
+    /// Format of the labels; `None` if the boxes were found.
+    labels: Option<String>,
+    warnings: Vec<String>,
+    boxes: Vec<CharacterBox>,
+}
+
+impl BlockPipeline {
+    /// Places the characters on the face.
+    pub(super) fn boxes(
+        &self,
+        context: &StageContext<'_>,
+    ) -> Result<BlockStageOutput, BlockStageError> {
+        let page = self.page(context)?;
+        let faces = self.faces(context)?;
+        let aligned: AlignOutcome = context.outcome(BlockStage::Align)?;
+        let rerun = || BlockStageError::RerunFrom(BlockStage::Align);
+        let face = faces.iter().find(|(side, _)| *side == aligned.side);
+        let (_, face) = face.ok_or_else(rerun)?;
+        let map = PageMap::try_from(aligned.page_from_face)
+            .ok()
+            .ok_or_else(rerun)?;
+        let read = match &context.inputs.labels {
+            Some(file) => read_labels(context, file, &page)?,
+            None => {
+                return Err(context
+                    .inputs
+                    .page
+                    .failed(FailureClass::NoSolution, "it has no labels"));
+            }
+        };
+        let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
+        let sure = placed
+            .characters
+            .iter()
+            .filter(|c| c.confidence >= SURE)
+            .count();
+        output(&BoxesOutcome {
+            labels: read.labels,
+            warnings: read.warnings,
+            count: placed.characters.len(),
+            sure,
+            page_from_face: StoredPageMap::from(&placed.map),
+            characters: placed.characters,
+        })
+    }
+}
+
+/// Reads the labels of a page and gives boxes without a name the one of their place in the reading order.
+fn read_labels(
+    context: &StageContext<'_>,
+    file: &BlockFile,
+    page: &HeldPage,
+) -> Result<PageBoxes, BlockStageError> {
+    let bytes = file.read(labels::MAX_BYTES as u64, context.stop)?;
+    let size = page.ink.size();
+    let page_file = PageFile {
+        name: context.inputs.page.name(),
+        bytes: context.inputs.page.size(),
+        width: size[0] as u32,
+        height: size[1] as u32,
+    };
+    let read = labels::read(&bytes, file.name(), &page_file)
+        .map_err(|error| BlockStageError::failed(FailureClass::BadInput, error.to_string()))?;
+    let bounds: Vec<[f64; 4]> = read.boxes.iter().map(labels::LabelBox::bounds).collect();
+    let order = reading_order(&bounds);
+    let given: HashSet<&str> = read
+        .boxes
+        .iter()
+        .filter_map(|b| b.name.as_deref())
+        .collect();
+    let mut boxes: Vec<(usize, CharacterBox)> = (read.boxes.iter().zip(&bounds).zip(&order))
+        .enumerate()
+        .map(|(place, ((label, bounds), place_name))| {
+            let name = label.name.clone().unwrap_or_else(|| {
+                let name = place_name.to_string();
+                // A name from the file may look like a place.
+                if given.contains(name.as_str()) {
+                    format!("{name}-{place}")
+                } else {
+                    name
+                }
+            });
+            let text = label.text.clone();
+            (
+                place,
+                CharacterBox {
+                    name,
+                    text,
+                    page_box: *bounds,
+                },
+            )
+        })
+        .collect();
+    boxes.sort_by(|a, b| order[a.0].cmp(&order[b.0]));
+    let boxes: Vec<CharacterBox> = boxes.into_iter().map(|(_, label)| label).collect();
+    check_label_fit(&page.ink, &boxes)
+        .map_err(|error| file.failed(FailureClass::NoSolution, error))?;
+    Ok(PageBoxes {
+        labels: Some(read.format.to_string()),
+        warnings: read.warnings,
+        boxes,
+    })
+}

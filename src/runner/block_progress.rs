@@ -1,0 +1,45 @@
+//! A block between two of its stages.
+
+use super::block_inputs::BlockSources;
+use super::block_stages::BlockStageOutput;
+use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
+use crate::domain::{ArtifactSet, BlockStage};
+
+/// How a block's task ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BlockEnd {
+    /// Every stage is stored.
+    Done,
+    /// The block failed.
+    Failed,
+    /// The block will be retried.
+    Retry,
+    /// The block was released unfinished.
+    Released,
+    /// The lease was lost: it expired, or another process of the run recovered the job.
+    LeaseLost,
+}
+
+/// A block in progress.
+pub(super) struct BlockInProgress {
+    pub(super) lease: BlockLease,
+    pub(super) work: BlockWork,
+    pub(super) sources: BlockSources,
+    /// Versions of the input files, as far as they are known.
+    pub(super) inputs: BlockInputVersions,
+}
+
+/// A computed stage.
+pub(super) struct ComputedBlockStage {
+    pub(super) output: BlockStageOutput,
+    pub(super) files: ArtifactSet,
+    pub(super) ms: u64,
+}
+
+/// What happens to a block after a stage.
+pub(super) enum AfterStage {
+    /// It goes on with this stage.
+    Continue(BlockInProgress, BlockStage),
+    /// Its task ends. The number of pairs that were added or changed.
+    End(BlockEnd, u64),
+}

@@ -1,0 +1,120 @@
+//! The block that a process works on: at most one at a time, before any pair.
+
+use std::sync::Arc;
+
+use tokio::task::JoinSet;
+
+use super::block_progress::BlockEnd;
+use super::block_task::{BlockReport, process_block};
+use super::compute_thread::task_result;
+use super::error::RunError;
+use super::policy;
+use super::run_context::RunContext;
+use crate::catalog::OutstandingBlocks;
+use crate::domain::WorkerId;
+
+/// What a run has counted about blocks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct BlockRunCounts {
+    pub(super) done: u64,
+    pub(super) failed: u64,
+}
+
+/// The slot of a process for a block.
+pub(super) struct BlockSlot {
+    context: Arc<RunContext>,
+    /// Whether this run works on blocks. A run of named pairs does not.
+    is_enabled: bool,
+    /// Whether a claim may find a block.
+    may_find_one: bool,
+    task: JoinSet<BlockReport>,
+    pub(super) counts: BlockRunCounts,
+}
+
+impl BlockSlot {
+    pub(super) fn new(context: Arc<RunContext>, is_enabled: bool) -> Self {
+        Self {
+            context,
+            is_enabled,
+            may_find_one: is_enabled,
+            task: JoinSet::new(),
+            counts: BlockRunCounts::default(),
+        }
+    }
+
+    /// Returns whether a block is in progress.
+    pub(super) fn is_busy(&self) -> bool {
+        !self.task.is_empty()
+    }
+
+    /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now.
+    pub(super) async fn start(&mut self, worker: WorkerId) -> Result<bool, RunError> {
+        if self.is_busy() {
+            return Ok(true);
+        }
+        if !self.may_find_one {
+            return Ok(false);
+        }
+        let context = &self.context;
+        let (deadline, alive_since) = (context.deadline(), context.alive_since());
+        let catalog = &context.catalog;
+        let claimed = catalog.retry_while_unavailable(async || {
+            catalog.claim_block(worker, deadline, alive_since).await
+        });
+        match claimed.await? {
+            Some((lease, work)) => {
+                let task = process_block(Arc::clone(context), lease, work);
+                self.task.spawn(task);
+                Ok(true)
+            }
+            None => {
+                self.may_find_one = false;
+                Ok(false)
+            }
+        }
+    }
+
+    /// Waits for the end of the block in progress. Returns `None` at once if there is none.
+    pub(super) async fn ended(&mut self) -> Option<BlockReport> {
+        self.task.join_next().await.map(task_result)
+    }
+
+    /// Counts a block that ended. Returns the number of pairs that it added or changed.
+    ///
+    /// # Errors
+    /// Returns the error that ends the run.
+    pub(super) fn count(&mut self, report: BlockReport) -> Result<u64, RunError> {
+        self.may_find_one = self.is_enabled;
+        match report.end? {
+            BlockEnd::Done => self.counts.done += 1,
+            BlockEnd::Failed => self.counts.failed += 1,
+            BlockEnd::Retry | BlockEnd::Released | BlockEnd::LeaseLost => {}
+        }
+        Ok(report.pairs)
+    }
+
+    /// Returns how many blocks any process has yet to finish.
+    pub(super) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
+        if !self.is_enabled {
+            return Ok(OutstandingBlocks::default());
+        }
+        let catalog = &self.context.catalog;
+        let left = catalog.retry_while_unavailable(async || catalog.outstanding_blocks().await);
+        Ok(left.await?)
+    }
+
+    /// Ends back-offs that are due, and finds out whether a claim may find a block.
+    pub(super) async fn poll(&mut self) -> Result<(), RunError> {
+        let left = self.outstanding().await?;
+        let (now, longest) = (self.context.clock.now(), policy::longest_backoff_ms());
+        let is_due = left.next_due.is_some_and(|due| due <= now);
+        if is_due {
+            let catalog = &self.context.catalog;
+            catalog
+                .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await)
+                .await?;
+        }
+        self.may_find_one = self.is_enabled && (is_due || left.ready > 0);
+        Ok(())
+    }
+}

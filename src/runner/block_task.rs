@@ -1,0 +1,220 @@
+//! The task of one block: runs its remaining stages one after another on a thread of their own, and stores each result
+//! before the next stage begins.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use tokio::sync::oneshot;
+
+use super::block_artifacts::StageArtifacts;
+use super::block_checkpoint::{store_failure, store_stage, while_unavailable};
+use super::block_inputs::{BlockSources, outdated};
+use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::block_stages::BlockStageError;
+use super::compute_thread::panic_text;
+use super::error::RunError;
+use super::events::RunEvent;
+use super::run_context::RunContext;
+use super::stop::StopLevel;
+use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
+use crate::domain::{BlockStage, BlockStageRecord, FailureClass};
+use crate::failpoint::{self, Point};
+
+/// Times that a stage may find the result of an earlier stage unusable before the block fails.
+const MAX_RERUNS: usize = 4;
+
+/// What a block's task reports at its end.
+#[derive(Debug)]
+pub(super) struct BlockReport {
+    /// How it ended, or the error that ends the run.
+    pub(super) end: Result<BlockEnd, RunError>,
+    /// Number of pairs that were added or run again.
+    pub(super) pairs: u64,
+}
+
+/// Runs the remaining stages of a leased block.
+pub(super) async fn process_block(
+    context: Arc<RunContext>,
+    lease: BlockLease,
+    work: BlockWork,
+) -> BlockReport {
+    let name = work.attributes.name.clone();
+    failpoint::hit(lease.cursor(), Point::Claimed, Some(&name));
+    let sources = BlockSources::new(&context.project, &work.attributes, context.block_limits);
+    let inputs = work.inputs.clone();
+    let (mut stage, mut reruns) = (lease.cursor(), 0);
+    let mut block = BlockInProgress {
+        lease,
+        work,
+        sources,
+        inputs,
+    };
+    loop {
+        if context.is_draining() {
+            let end = release(&context, block.lease).await;
+            return BlockReport { end, pairs: 0 };
+        }
+        let after = match run_stage(&context, &mut block, stage).await {
+            Ok(computed) => store_stage(&context, block, stage, computed).await,
+            Err(Interruption::Rerun(earlier)) if reruns < MAX_RERUNS && earlier < stage => {
+                reruns += 1;
+                stage = earlier;
+                continue;
+            }
+            Err(Interruption::Rerun(earlier)) => {
+                let error = BlockStageError::RerunFrom(earlier);
+                store_failure(&context, block, stage, error, None).await
+            }
+            Err(Interruption::Failed(error, ms)) => {
+                store_failure(&context, block, stage, error, ms).await
+            }
+            Err(Interruption::Stopped) => {
+                let end = release(&context, block.lease).await;
+                return BlockReport { end, pairs: 0 };
+            }
+            Err(Interruption::Run(error)) => Err(error),
+        };
+        match after {
+            Ok(AfterStage::Continue(next, at)) => (block, stage) = (next, at),
+            Ok(AfterStage::End(end, pairs)) => {
+                return BlockReport {
+                    end: Ok(end),
+                    pairs,
+                };
+            }
+            Err(error) => {
+                return BlockReport {
+                    end: Err(error),
+                    pairs: 0,
+                };
+            }
+        }
+    }
+}
+
+async fn release(context: &RunContext, lease: BlockLease) -> Result<BlockEnd, RunError> {
+    context.catalog.release_block(lease).await?;
+    Ok(BlockEnd::Released)
+}
+
+/// Why a stage has no result.
+enum Interruption {
+    /// An earlier stage must run again.
+    Rerun(BlockStage),
+    /// The stage failed, after this many milliseconds.
+    Failed(BlockStageError, Option<u64>),
+    /// The run stops at once.
+    Stopped,
+    /// The run cannot go on.
+    Run(RunError),
+}
+
+/// Reads the versions of the input files and computes a stage.
+async fn run_stage(
+    context: &Arc<RunContext>,
+    block: &mut BlockInProgress,
+    stage: BlockStage,
+) -> Result<ComputedBlockStage, Interruption> {
+    context.emit(RunEvent::BlockStageStarted {
+        block: block.work.attributes.name.clone(),
+        stage,
+    });
+    let (sources, known) = (block.sources.clone(), block.inputs.clone());
+    let versions = on_thread(context, move |_| sources.versions(stage, &known)).await?;
+    let versions = versions.map_err(|error| Interruption::Failed(error, None))?;
+    let earlier = outdated(stage, &block.inputs, &versions);
+    let BlockInputVersions { mesh, page, labels } = versions;
+    let seen = BlockInputVersions {
+        mesh: mesh.or_else(|| block.inputs.mesh.take()),
+        page: page.or_else(|| block.inputs.page.take()),
+        labels: labels.or_else(|| block.inputs.labels.take()),
+    };
+    if let Some(earlier) = earlier {
+        block.inputs = seen;
+        return Err(Interruption::Rerun(earlier));
+    }
+    if seen != block.work.inputs {
+        // Before the computation, so that a later run knows which files it failed on if the process dies.
+        let item = vec![(block.lease.block(), seen.clone())];
+        let catalog = &context.catalog;
+        let stored = while_unavailable!(catalog, catalog.store_block_inputs(item.clone()));
+        stored.map_err(|error| Interruption::Run(error.into()))?;
+        block.work.inputs = seen.clone();
+    }
+    block.inputs = seen;
+    let results = block.work.results.iter();
+    let earlier: Vec<_> = results
+        .filter(|record| record.stage < stage)
+        .cloned()
+        .collect();
+    compute(context, block, stage, earlier).await
+}
+
+/// Computes a stage on its own thread.
+async fn compute(
+    context: &Arc<RunContext>,
+    block: &BlockInProgress,
+    stage: BlockStage,
+    earlier: Vec<BlockStageRecord>,
+) -> Result<ComputedBlockStage, Interruption> {
+    let begun = Instant::now();
+    let (sources, read) = (block.sources.clone(), block.inputs.clone());
+    let inner = Arc::clone(context);
+    let outcome = on_thread(context, move |stop| {
+        let inputs = sources.inputs();
+        let artifacts = StageArtifacts::new(&inner.project, &inputs.name, stage);
+        let output = inner
+            .blocks
+            .run(stage, &inputs, &earlier, &artifacts, stop)?;
+        sources.check_unchanged(&read)?;
+        failpoint::hit(stage, Point::Computed, Some(&inputs.name));
+        Ok((output, artifacts.finish()))
+    });
+    let outcome = outcome.await?;
+    let ms = begun.elapsed().as_millis() as u64;
+    match outcome {
+        Ok((output, files)) => Ok(ComputedBlockStage { output, files, ms }),
+        Err(BlockStageError::RerunFrom(earlier)) => Err(Interruption::Rerun(earlier)),
+        Err(error) => Err(Interruption::Failed(error, Some(ms))),
+    }
+}
+
+/// Runs blocking work on a thread of its own, with a flag that tells it to stop. Waits for at most as long as one stage
+/// may take; then, and after an immediate stop of the run, sets the flag and abandons the thread.
+async fn on_thread<T: Send + 'static>(
+    context: &RunContext,
+    work: impl FnOnce(&AtomicBool) -> Result<T, BlockStageError> + Send + 'static,
+) -> Result<Result<T, BlockStageError>, Interruption> {
+    let failed =
+        |class, text: String| Interruption::Failed(BlockStageError::failed(class, text), None);
+    let stop = Arc::new(AtomicBool::new(false));
+    let (sender, receiver) = oneshot::channel();
+    let inner = Arc::clone(&stop);
+    let thread = std::thread::Builder::new().name("block".to_owned());
+    let spawned = thread.spawn(move || {
+        let outcome = catch_unwind(AssertUnwindSafe(|| work(&inner)));
+        // The receiver is gone if the thread was abandoned.
+        let _ = sender.send(outcome.map_err(|payload| panic_text(&*payload)));
+    });
+    if let Err(error) = spawned {
+        let text = format!("the system gave no thread: {error}");
+        return Err(failed(FailureClass::Resource, text));
+    }
+    let interruption = tokio::select! {
+        biased;
+        outcome = receiver => return match outcome {
+            Ok(Ok(outcome)) => Ok(outcome),
+            Ok(Err(text)) => Err(failed(FailureClass::Bug, text)),
+            Err(_) => Err(failed(FailureClass::Bug, "the block's thread ended without a result".to_owned())),
+        },
+        () = context.stop.reached(StopLevel::Now) => Interruption::Stopped,
+        () = tokio::time::sleep(context.stage_timeout) => {
+            let seconds = context.stage_timeout.as_secs_f64();
+            failed(FailureClass::Resource, format!("the stage took longer than {seconds} s (run.stage_timeout_s)"))
+        }
+    };
+    stop.store(true, Ordering::Relaxed);
+    Err(interruption)
+}
