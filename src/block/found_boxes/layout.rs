@@ -1,6 +1,7 @@
 //! The strokes of a page without frame and rules, and the part of the page inside the frame.
 
-use super::rules::{Rule, erase_solid, take_rules};
+use super::columns::Column;
+use super::rules::{Rule, find_solid, take_rules};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use crate::raster::{Grid, Mask};
 
@@ -12,8 +13,8 @@ pub(super) const CELL_MM: f64 = CELL as f64 * PIXEL_MM;
 const FRAME_MM: f64 = 5.0;
 /// Share of the strokes beyond a frame, at most.
 const BEYOND_FRAME: f64 = 0.02;
-/// Marks that contain a square of this side are no characters, mm.
-const SOLID_MM: f64 = 2.7;
+/// Marks in the strip that contain a square of this side are ornaments, in widths of the strip.
+const SOLID: f64 = 0.28;
 /// Least value of strokes, of 255.
 const STROKE: u8 = 128;
 
@@ -48,11 +49,6 @@ impl Layout {
             *erased |= across;
             *text &= !across;
         }
-        let before = text.clone();
-        erase_solid(&mut text, (SOLID_MM / PIXEL_MM) as usize);
-        for ((erased, before), text) in erased.data_mut().iter_mut().zip(before.data()).zip(text.data()) {
-            *erased |= before & !text;
-        }
         let cells = cells(image, &erased);
         let (left, right) = frame(&along_y, &sums(&cells, false));
         let (top, bottom) = frame(&along_x, &sums(&cells, true));
@@ -69,12 +65,29 @@ impl Layout {
         let length = |rules: &[Rule]| {
             rules.iter().map(|r| r.length as f64 * PIXEL_MM).sum::<f64>()
         };
+        if std::env::var("D").is_ok() { for r in &along_y { eprintln!("{:?}", r); } }
         Self {
             cells,
             text,
             inside,
             inner_rules: inner_y.iter().map(|rule| (rule.at + 0.5) / CELL as f64).collect(),
             rule_lengths_mm: [length(&inner_y), length(&inner_x)],
+        }
+    }
+
+    /// Erases the ornaments of a strip at the fold.
+    pub(super) fn erase_ornaments(&mut self, strip: &Column) {
+        let [left, right] = strip.across.map(|x| x * CELL);
+        let height = self.text.height();
+        let part = Mask::from_fn(right - left, height, |x, y| self.text.at(left + x, y));
+        let solid = find_solid(&part, (SOLID * (right - left) as f64) as usize);
+        for y in 0..height {
+            for x in (left..right).filter(|x| solid.at(x - left, y)) {
+                self.text.set(x, y, false);
+                if y / CELL < self.cells.height() {
+                    self.cells.set(x / CELL, y / CELL, 0.0);
+                }
+            }
         }
     }
 

@@ -16,7 +16,7 @@ use self::direction::{is_upside_down, upright_image};
 use self::layout::CELL_MM;
 use self::places::{Half, Place, Strokes, measure, places};
 use self::rows::{RowPitches, find_rows};
-use super::align::BlockSide;
+use super::align::Face;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 
@@ -24,9 +24,9 @@ use super::page_map::PageMap;
 const MIN_AREA_MM2: f64 = 0.8;
 const MIN_SIDE: f64 = 0.25;
 /// Least mean relief below the ink of a character.
-const MIN_SUPPORT: f64 = 0.25;
-/// Least share of a character's strokes where page and block agree.
-const MIN_AGREED: f64 = 0.5;
+const MIN_SUPPORT: f64 = 0.08;
+/// Largest share of a character's strokes where the page does not show the block.
+const MAX_UNSEEN: f64 = 0.5;
 
 /// Half of a row of notes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -66,11 +66,15 @@ impl FoundBox {
 }
 
 /// Finds the characters of a page in reading order: columns from right to left, each from the top.
-pub fn find_boxes(side: &BlockSide, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
-    let (image, layout) = upright_image(side, page, map);
+pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
+    let (image, mut layout) = upright_image(face, page, map);
     let Some(columns) = find_columns(&layout) else {
         return Vec::new();
     };
+    for strip in columns.columns.iter().filter(|column| column.is_strip) {
+        layout.erase_ornaments(strip);
+    }
+    if std::env::var("D").is_ok() { eprintln!("inside {:?} rules {:?} lengths {:?}\ncolumns {:?}", layout.inside, layout.inner_rules, layout.rule_lengths_mm, columns); crate::block::dump(&image, &layout); }
     let (rows, pitches) = find_rows(&layout, &columns);
     let places = places(&columns, &rows);
     let strokes = measure(&image, &layout, map, &places);
@@ -133,4 +137,11 @@ fn numbered(
         });
     }
     boxes
+}
+
+pub(crate) fn dump(image: &text_image::TextImage, layout: &layout::Layout) {
+    let g = crate::raster::Grid::from_fn(image.relief.width(), image.relief.height(), |x, y| {
+        [image.relief.at(x, y), image.ink.at(x, y), if layout.text.at(x, y) { 255 } else { match image.trust_at(x, y) { text_image::Trust::Both => 0, text_image::Trust::Relief => 60, text_image::Trust::Ink => 120 } }]
+    });
+    std::fs::write("/tmp/dump.png", crate::raster::png_rgb8(&g)).unwrap();
 }

@@ -15,21 +15,25 @@ const HEIGHTS: [f64; 2] = [0.65, 1.4];
 /// Cost of a row whose height differs by a whole pitch from the pitch.
 const HEIGHT_COST: f64 = 4.0;
 /// Cost of a cut through as much ink as is usual.
-const CUT_COST: f64 = 1.0;
+const CUT_COST: f64 = 1.5;
 /// Cost of the ink of a character that belongs to no row, and of a blank of one pitch.
 const SKIPPED_INK_COST: f64 = 4.0;
 const BLANK_COST: f64 = 0.3;
-/// Share of the usual ink of a character at which a row counts fully.
-const FULL_INK: f64 = 0.1;
+/// Cost of a row of characters.
+const ROW_COST: f64 = 0.35;
 /// Cost of a character without ink in the middle, and of a note with it.
 const EMPTY_MIDDLE_COST: f64 = 1.1;
 const INKED_MIDDLE_COST: f64 = 2.5;
+/// Further cost of a character without ink in the middle across and along.
+const EMPTY_CROSS_COST: f64 = 1.5;
 /// Cost of a change from characters to notes.
 const NOTES_COST: f64 = 1.4;
 /// Middles that are tried, in widths of the column on both sides.
 const MIDDLE_REACH: f64 = 0.09;
 /// Ink of the middle that counts as a stroke.
 const MIDDLE_INK: f64 = 0.12;
+/// Ink of a line that counts as a stroke, in the usual ink of a line.
+const MIDDLE_LINE: f64 = 0.2;
 
 /// What a row holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,6 +138,14 @@ impl ColumnProfile {
         }
     }
 
+    /// Returns 1 if a line in the middle third of a row is empty, 0 if all have usual ink.
+    fn emptiest(&self, from: usize, to: usize, usual: f64) -> f64 {
+        let third = (to - from) / 3;
+        let lines = &self.lines[from + third..to - third];
+        let least = lines.iter().copied().fold(f64::INFINITY, f64::min);
+        (1.0 - least / (MIDDLE_LINE * usual)).max(0.0)
+    }
+
     /// Returns the position across with the least ink near the middle of a row, and the share of it that is inked.
     fn middle(&self, from: usize, to: usize) -> (usize, f64) {
         let rows = (to - from) as f64;
@@ -234,7 +246,7 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
                 for height in shortest.max(1)..=longest.min(to) {
                     let from = to - height;
                     let before = best[usize::from(notes)][from];
-                    if before.cost + cuts[from] + cuts[to] - 1.0 >= step.cost {
+                    if before.cost + cuts[from] + cuts[to] >= step.cost {
                         continue;
                     }
                     let row = row_cost(profile, usual, pitches, notes, from, to);
@@ -263,10 +275,8 @@ fn row_cost(profile: &ColumnProfile, usual: f64, pitches: RowPitches, notes: boo
     let pitch = if notes { pitches.note } else { pitches.row };
     let share = pitch / pitches.row;
     let full = usual * pitch;
-    let ink = (profile.all[to] - profile.all[from]) / full;
     let height = (to - from) as f64 / pitch - 1.0;
     let even = HEIGHT_COST * height * height;
-    let gain = (ink / FULL_INK).min(1.0);
     let (_, middle) = profile.middle(from, to);
     let empty = (1.0 - middle / MIDDLE_INK).max(0.0);
     let middle = if notes {
@@ -274,12 +284,12 @@ fn row_cost(profile: &ColumnProfile, usual: f64, pitches: RowPitches, notes: boo
     } else {
         let has_ink = |half: &Vec<f64>| half[to] - half[from] > 0.1 * full;
         if profile.halves.iter().all(has_ink) {
-            EMPTY_MIDDLE_COST * empty
+            (EMPTY_MIDDLE_COST + EMPTY_CROSS_COST * profile.emptiest(from, to, usual)) * empty
         } else {
             0.0
         }
     };
-    share * (even - gain + middle)
+    share * (even + ROW_COST + middle)
 }
 
 /// Returns the rows of the cheapest sequence.
@@ -318,8 +328,7 @@ fn strip_rows(profile: &ColumnProfile, usual: f64, row: f64) -> Vec<Row> {
             let pitch = row * (STRIP_PITCHES[0] + share * (STRIP_PITCHES[1] - STRIP_PITCHES[0]));
             let pitches = RowPitches { row: pitch, note: pitch / 2.0 };
             let (cost, rows) = divide(profile, 0.7 * usual, pitches, false);
-            // Each row gains at most 1; more rows must have clear cuts to be better.
-            (cost + 0.55 * rows.len() as f64, rows)
+            (cost, rows)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, rows)| rows)

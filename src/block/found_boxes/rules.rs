@@ -1,6 +1,7 @@
 //! Frame and rules between columns, and other marks that are no text.
 
 use super::text_image::PIXEL_MM;
+use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
 
 /// Length over which a rule is straight and nearly without gaps, mm, and the share of it that is covered.
@@ -8,6 +9,8 @@ const RULE_MM: f64 = 25.0;
 const RULE_COVER: f64 = 0.9;
 /// Least length of all parts of a rule, mm.
 const LINE_MM: f64 = 40.0;
+/// Least length of all parts of a rule, in relation to the longest rule. Strokes of a few characters may lie in line.
+const LINE_SHARE: f64 = 0.35;
 /// Wanderings of a rule across its direction, mm.
 const LINE_SPREAD_MM: f64 = 0.6;
 /// Width of the strokes beside the middle of a rule that belong to it, mm.
@@ -27,7 +30,9 @@ pub(super) struct Rule {
 /// Finds the rules along y and erases them. Rules along x are found in the transposed mask.
 pub(super) fn take_rules(strokes: &mut Mask, erased: &mut Mask) -> Vec<Rule> {
     let found = long_runs(strokes);
-    let rules = group(&found);
+    let mut rules = group(&found);
+    let longest = rules.iter().map(|rule| rule.length).max().unwrap_or(0);
+    rules.retain(|rule| rule.length as f64 >= LINE_SHARE * longest as f64);
     for rule in &rules {
         erase_thin(strokes, erased, rule);
     }
@@ -151,13 +156,11 @@ fn erase_thin(strokes: &mut Mask, erased: &mut Mask, rule: &Rule) {
     }
 }
 
-/// Erases solid marks, such as the fish tails at the fold: parts that contain a square of `side` pixels.
-pub(super) fn erase_solid(strokes: &mut Mask, side: usize) {
-    let solid = opened(strokes, side);
-    if !solid.data().iter().any(|set| *set) {
-        return;
-    }
-    let components = crate::raster::components::ConnectedComponents::label(strokes);
+/// Returns the pixels of solid marks, such as the fish tails at the fold: parts that contain a square of `side` pixels,
+/// or the solid pixels alone if they are the smaller part.
+pub(super) fn find_solid(strokes: &Mask, side: usize) -> Mask {
+    let solid = opened(strokes, side.max(1));
+    let components = ConnectedComponents::label(strokes);
     let mut areas: Vec<[usize; 2]> = Vec::new();
     for y in 0..strokes.height() {
         for x in 0..strokes.width() {
@@ -170,16 +173,12 @@ pub(super) fn erase_solid(strokes: &mut Mask, side: usize) {
             }
         }
     }
-    for y in 0..strokes.height() {
-        for x in 0..strokes.width() {
-            if let Some(label) = components.label_at(x, y) {
-                let [all, part] = areas[label];
-                if 4 * part > all || solid.at(x, y) {
-                    strokes.set(x, y, false);
-                }
-            }
-        }
-    }
+    Mask::from_fn(strokes.width(), strokes.height(), |x, y| {
+        components.label_at(x, y).is_some_and(|label| {
+            let [all, part] = areas[label];
+            2 * part > all || solid.at(x, y)
+        })
+    })
 }
 
 /// Returns the union of all squares of `side` pixels within a mask.

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::block::align::BlockSide;
+use crate::block::align::Face;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::PageMap;
-use crate::block::relief::FACE_CELL;
+use crate::block::face_layer::FACE_CELL;
 use crate::raster::Grid;
 
 /// Size of a pixel, mm: that of height maps.
@@ -35,7 +35,7 @@ pub(super) struct TextFrame {
 
 impl TextFrame {
     /// Returns the frame around the face whose x axis is turned from u to v by an angle in rad.
-    pub(super) fn around(side: &BlockSide, angle: f64) -> Self {
+    pub(super) fn around(side: &Face, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -103,7 +103,7 @@ pub(super) enum Trust {
 impl TextImage {
     /// Samples relief and ink in a frame.
     pub(super) fn sample(
-        side: &BlockSide,
+        side: &Face,
         page: &PageInk,
         map: &PageMap,
         frame: TextFrame,
@@ -164,7 +164,7 @@ impl TextImage {
 }
 
 /// Interpolates the relief along a row of the frame.
-fn sample_relief(side: &BlockSide, frame: &TextFrame, y: usize, out: &mut [u8]) {
+fn sample_relief(side: &Face, frame: &TextFrame, y: usize, out: &mut [u8]) {
     let soft = &side.relief.soft;
     let first = frame.face_from_pixel([0.0, y as f64]);
     let start = [0, 1]
