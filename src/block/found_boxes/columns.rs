@@ -11,6 +11,8 @@ const WIDTHS: [f64; 2] = [0.65, 1.45];
 const STRIP_WIDTHS: [f64; 2] = [0.4, 0.97];
 /// Cost of a column whose width differs by a whole pitch from the pitch.
 const WIDTH_COST: f64 = 6.0;
+/// The narrowest column between two rules is the strip if it is narrower than this, in widths of the others.
+const STRIP_WIDTH: f64 = 0.93;
 /// Cost of a strip.
 const STRIP_COST: f64 = 0.5;
 /// Largest cost of ink on a boundary, in relation to the ink around it.
@@ -90,6 +92,21 @@ fn means(values: &[f64], reach: usize) -> Vec<f64> {
         .collect()
 }
 
+/// Marks the strip at the fold: a narrower column inside the page with rules at both sides.
+fn mark_strip(columns: &mut [Column], is_ruled: &dyn Fn(usize) -> bool) {
+    let width = |column: &Column| column.across[1] - column.across[0];
+    let mut widths: Vec<usize> = columns.iter().map(width).collect();
+    widths.sort_unstable();
+    let usual = widths[widths.len() / 2] as f64;
+    let last = columns.len().saturating_sub(1);
+    let narrow = (columns.iter_mut().enumerate())
+        .filter(|(k, column)| *k > 0 && *k < last && column.across.iter().all(|at| is_ruled(*at)))
+        .min_by_key(|(_, column)| width(column));
+    if let Some((_, column)) = narrow {
+        column.is_strip |= (width(column) as f64) < STRIP_WIDTH * usual;
+    }
+}
+
 /// Divides a profile into columns of about one pitch.
 fn divide(profile: &[f64], is_rule: &[usize], pitch: f64) -> Option<Columns> {
     let count = profile.len();
@@ -160,6 +177,7 @@ fn divide(profile: &[f64], is_rule: &[usize], pitch: f64) -> Option<Columns> {
         to = from;
     }
     columns.reverse();
+    mark_strip(&mut columns, &is_end);
     Some(Columns {
         columns,
         pitch,

@@ -14,7 +14,7 @@ const FRAME_MM: f64 = 5.0;
 /// Share of the strokes beyond a frame, at most.
 const BEYOND_FRAME: f64 = 0.02;
 /// Marks in the strip that contain a square of this side are ornaments, in widths of the strip.
-const SOLID: f64 = 0.28;
+const SOLID: f64 = 0.18;
 /// Least value of strokes, of 255.
 const STROKE: u8 = 128;
 

@@ -25,6 +25,8 @@ const MIN_AREA_MM2: f64 = 0.8;
 const MIN_SIDE: f64 = 0.25;
 /// Least mean relief below the ink of a character.
 const MIN_SUPPORT: f64 = 0.08;
+/// Least share of the relief of a character that is printed.
+const MIN_PRINTED: f64 = 0.5;
 /// Largest share of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
 
@@ -79,7 +81,7 @@ pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
     let places = places(&columns, &rows);
     let strokes = measure(&image, &layout, map, &places);
     let is_upside_down = is_upside_down(&layout, &places, &strokes, &image, map);
-    numbered(&places, &strokes, &pitches, columns.columns.len(), is_upside_down)
+    numbered(&places, &strokes, &pitches, columns.columns.len(), is_upside_down, page.size())
 }
 
 /// Returns whether a place holds a character.
@@ -89,6 +91,12 @@ fn is_character(place: &Place, strokes: &Strokes, pitches: &RowPitches) -> bool 
     strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
 }
 
+/// Returns whether a box lies on the page, with a tolerance of one pixel.
+fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
+    let [left, top, right, bottom] = strokes.page_bounds;
+    left >= -1.5 && top >= -1.5 && right <= width as f64 + 0.5 && bottom <= height as f64 + 0.5
+}
+
 /// Numbers the characters in reading order and leaves out those that the block or the page does not show.
 fn numbered(
     places: &[Place],
@@ -96,6 +104,7 @@ fn numbered(
     pitches: &RowPitches,
     columns: usize,
     is_upside_down: bool,
+    page_size: [usize; 2],
 ) -> Vec<FoundBox> {
     let mut characters: Vec<(u32, i64, Option<NoteHalf>, &Strokes)> = places
         .iter()
@@ -125,7 +134,7 @@ fn numbered(
         }
         before = Some((column, row));
         let share = |count: usize| count as f64 / strokes.area as f64;
-        if strokes.support() < MIN_SUPPORT || share(strokes.only_relief) > MAX_UNSEEN {
+        if !is_on_page(strokes, page_size) || strokes.printed < MIN_PRINTED || strokes.support() < MIN_SUPPORT || share(strokes.only_relief) > MAX_UNSEEN {
             continue;
         }
         boxes.push(FoundBox {

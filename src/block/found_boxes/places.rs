@@ -48,6 +48,8 @@ pub(super) struct Strokes {
     /// Number of pixels where relief and ink agree, and where only the relief shows the text.
     pub(super) agreed: usize,
     pub(super) only_relief: usize,
+    /// Share of the relief in the place that is printed.
+    pub(super) printed: f64,
 }
 
 impl Strokes {
@@ -58,6 +60,7 @@ impl Strokes {
         relief: 0,
         agreed: 0,
         only_relief: 0,
+        printed: 0.0,
     };
 
     /// Returns the area in mm^2.
@@ -189,7 +192,27 @@ pub(super) fn measure(
             extend(&mut found.page_bounds, local[number].page(corner.map(|k| edges[k])));
         }
     });
+    for (found, place) in strokes.iter_mut().zip(places) {
+        found.printed = printed(image, layout, place);
+    }
     strokes
+}
+
+/// Returns the share of the relief in a place that is printed; 1 if there is none.
+fn printed(image: &TextImage, layout: &Layout, place: &Place) -> f64 {
+    let [left, top, right, bottom] = place.room;
+    let (mut all, mut printed) = (1.0, 1.0);
+    for y in top * CELL..bottom * CELL {
+        for x in left * CELL..right * CELL {
+            // Rules are no part of the character.
+            if layout.cells.at(x / CELL, y / CELL) > 0.0 {
+                let relief = f64::from(image.relief.at(x, y));
+                all += relief;
+                printed += relief * f64::from(image.ink.at(x, y)) / 255.0;
+            }
+        }
+    }
+    printed / all
 }
 
 fn extend(bounds: &mut [f64; 4], [x, y]: [f64; 2]) {

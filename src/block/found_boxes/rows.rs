@@ -6,12 +6,13 @@ use super::layout::{CELL_MM, Layout};
 /// Pitches of rows that are tried, in pitches of columns.
 const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
 /// Pitches of notes that are tried, in pitches of rows.
-const NOTE_PITCHES: [f64; 2] = [0.46, 0.68];
+const NOTE_PITCHES: [f64; 2] = [0.44, 0.64];
 const NOTE_PITCH_STEP: f64 = 0.02;
-/// Pitches of the strip at the fold that are tried, in pitches of rows.
-const STRIP_PITCHES: [f64; 2] = [0.6, 1.05];
-/// Heights of a row that are tried, in pitches.
+/// Pitches of the strip at the fold that are tried, in widths of the strip.
+const STRIP_PITCHES: [f64; 2] = [0.75, 1.05];
+/// Heights of a row of characters and of notes that are tried, in pitches.
 const HEIGHTS: [f64; 2] = [0.65, 1.4];
+const NOTE_HEIGHTS: [f64; 2] = [0.75, 1.25];
 /// Cost of a row whose height differs by a whole pitch from the pitch.
 const HEIGHT_COST: f64 = 4.0;
 /// Cost of a cut through as much ink as is usual.
@@ -19,6 +20,8 @@ const CUT_COST: f64 = 1.5;
 /// Cost of the ink of a character that belongs to no row, and of a blank of one pitch.
 const SKIPPED_INK_COST: f64 = 4.0;
 const BLANK_COST: f64 = 0.3;
+/// Cost of a blank of one pitch of rows among notes, which stand closely.
+const NOTE_BLANK_COST: f64 = 2.5;
 /// Cost of a row of characters.
 const ROW_COST: f64 = 0.35;
 /// Cost of a character without ink in the middle, and of a note with it.
@@ -83,7 +86,7 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<Row>>, R
         .iter()
         .map(|profile| {
             if profile.is_strip {
-                strip_rows(profile, usual, row)
+                strip_rows(profile, usual)
             } else {
                 divide(profile, usual, pitches, true).1
             }
@@ -95,6 +98,7 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<Row>>, R
 /// Sums of the cells of a column.
 struct ColumnProfile {
     is_strip: bool,
+    width: usize,
     top: usize,
     /// Sum of each line of cells.
     lines: Vec<f64>,
@@ -127,6 +131,7 @@ impl ColumnProfile {
         };
         Self {
             is_strip: column.is_strip,
+            width: right - left,
             top,
             lines: (top..bottom).map(|y| line(y, left, right)).collect(),
             all: before(left, right),
@@ -236,13 +241,15 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
             let mut step = best[usize::from(notes)][to];
             if to > 0 {
                 let before = best[usize::from(notes)][to - 1];
+                let blank = if notes { NOTE_BLANK_COST } else { BLANK_COST };
                 let ink = profile.lines[to - 1] / (usual * pitches.row);
-                let cost = before.cost + SKIPPED_INK_COST * ink + BLANK_COST / pitches.row;
+                let cost = before.cost + SKIPPED_INK_COST * ink + blank / pitches.row;
                 if cost < step.cost {
                     step = Step { cost, from: to - 1, from_notes: notes, is_row: false };
                 }
                 let pitch = if notes { pitches.note } else { pitches.row };
-                let [shortest, longest] = HEIGHTS.map(|share| (share * pitch) as usize);
+                let heights = if notes { NOTE_HEIGHTS } else { HEIGHTS };
+                let [shortest, longest] = heights.map(|share| (share * pitch) as usize);
                 for height in shortest.max(1)..=longest.min(to) {
                     let from = to - height;
                     let before = best[usize::from(notes)][from];
@@ -320,12 +327,12 @@ fn rows_of(profile: &ColumnProfile, best: &[Vec<Step>; 2]) -> Vec<Row> {
 }
 
 /// Divides the strip at the fold, whose characters are often smaller: the pitch with the clearest cuts.
-fn strip_rows(profile: &ColumnProfile, usual: f64, row: f64) -> Vec<Row> {
+fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<Row> {
     let steps = 10;
     (0..=steps)
         .map(|step| {
             let share = f64::from(step) / f64::from(steps);
-            let pitch = row * (STRIP_PITCHES[0] + share * (STRIP_PITCHES[1] - STRIP_PITCHES[0]));
+            let pitch = profile.width as f64 * (STRIP_PITCHES[0] + share * (STRIP_PITCHES[1] - STRIP_PITCHES[0]));
             let pitches = RowPitches { row: pitch, note: pitch / 2.0 };
             let (cost, rows) = divide(profile, 0.7 * usual, pitches, false);
             (cost, rows)

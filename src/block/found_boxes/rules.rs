@@ -176,7 +176,7 @@ pub(super) fn find_solid(strokes: &Mask, side: usize) -> Mask {
     Mask::from_fn(strokes.width(), strokes.height(), |x, y| {
         components.label_at(x, y).is_some_and(|label| {
             let [all, part] = areas[label];
-            2 * part > all || solid.at(x, y)
+            5 * part > 2 * all || solid.at(x, y)
         })
     })
 }
