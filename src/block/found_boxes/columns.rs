@@ -24,6 +24,8 @@ const RULE_GAIN: f64 = 1.0;
 const CROSSED_RULE_COST: f64 = 1.5;
 /// Distance of a boundary from its rule, mm.
 const RULE_REACH_MM: f64 = 0.7;
+/// Share of the gain that is lost at this distance.
+const RULE_SLOPE: f64 = 0.3;
 
 /// A column of text.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,10 +51,17 @@ pub(super) struct Columns {
 pub(super) fn find_columns(layout: &Layout) -> Option<Columns> {
     let profile = layout.profile_across();
     let is_rule = rules_near(layout, profile.len());
+    let nearness = |k: usize| match is_rule[k] {
+        0 => 0.0,
+        number => {
+            let at = layout.inner_rules[number - 1] - layout.inside[0] as f64;
+            1.0 - RULE_SLOPE * (k as f64 - at).abs() * CELL_MM / RULE_REACH_MM
+        }
+    };
     let count = (PITCHES_MM[1] / PITCHES_MM[0]).ln() / PITCH_RATIO.ln();
     (0..=count as i32)
         .map(|k| PITCHES_MM[0] / CELL_MM * PITCH_RATIO.powi(k))
-        .filter_map(|pitch| divide(&profile, &is_rule, pitch))
+        .filter_map(|pitch| divide(&profile, &is_rule, &nearness, pitch))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .map(|mut found| {
             let left = layout.inside[0];
@@ -108,7 +117,12 @@ fn mark_strip(columns: &mut [Column], is_ruled: &dyn Fn(usize) -> bool) {
 }
 
 /// Divides a profile into columns of about one pitch.
-fn divide(profile: &[f64], is_rule: &[usize], pitch: f64) -> Option<Columns> {
+fn divide(
+    profile: &[f64],
+    is_rule: &[usize],
+    nearness: &dyn Fn(usize) -> f64,
+    pitch: f64,
+) -> Option<Columns> {
     let count = profile.len();
     let all = profile.iter().sum::<f64>() / count as f64;
     let around = means(profile, (pitch / 2.0) as usize);
@@ -118,7 +132,7 @@ fn divide(profile: &[f64], is_rule: &[usize], pitch: f64) -> Option<Columns> {
         }
         let ink = (profile[k - 1] + profile[k]) / 2.0;
         let ink = (ink / around[k].max(0.3 * all).max(1e-9)).min(MAX_INK_COST);
-        let rule = if is_rule[k] > 0 { RULE_GAIN } else { 0.0 };
+        let rule = RULE_GAIN * nearness(k);
         ink - BOUNDARY_GAIN - rule
     };
     let cuts: Vec<f64> = (0..=count).map(cut).collect();

@@ -58,19 +58,28 @@ impl Layout {
             at > low as f64 + 1.0 && at + 1.0 < high as f64
         };
         let inner = |rules: &[Rule], low: usize, high: usize| {
-            let inner: Vec<Rule> = rules.iter().filter(|r| within(r, low, high)).copied().collect();
+            let inner: Vec<Rule> = rules
+                .iter()
+                .filter(|r| within(r, low, high))
+                .copied()
+                .collect();
             inner
         };
         let (inner_y, inner_x) = (inner(&along_y, left, right), inner(&along_x, top, bottom));
         let length = |rules: &[Rule]| {
-            rules.iter().map(|r| r.length as f64 * PIXEL_MM).sum::<f64>()
+            rules
+                .iter()
+                .map(|r| r.length as f64 * PIXEL_MM)
+                .sum::<f64>()
         };
-        if std::env::var("D").is_ok() { for r in &along_y { eprintln!("{:?}", r); } }
         Self {
             cells,
             text,
             inside,
-            inner_rules: inner_y.iter().map(|rule| (rule.at + 0.5) / CELL as f64).collect(),
+            inner_rules: inner_y
+                .iter()
+                .map(|rule| (rule.at + 0.5) / CELL as f64)
+                .collect(),
             rule_lengths_mm: [length(&inner_y), length(&inner_x)],
         }
     }
@@ -103,6 +112,16 @@ impl Layout {
         let rows = (bottom - top).max(1) as f64;
         sums.into_iter().map(|sum| sum / rows).collect()
     }
+
+    /// Returns the mean of the cells at each position along y, inside the frame.
+    pub(super) fn profile_along(&self) -> Vec<f64> {
+        let [left, top, right, bottom] = self.inside;
+        let mean = |y: usize| {
+            let row = &self.cells.row(y)[left..right];
+            row.iter().map(|cell| f64::from(*cell)).sum::<f64>() / row.len().max(1) as f64
+        };
+        (top..bottom).map(mean).collect()
+    }
 }
 
 /// Returns the means of the strokes that relief and ink show together, apart from what was erased.
@@ -132,7 +151,14 @@ fn cells(image: &TextImage, erased: &Mask) -> Grid<f32> {
 
 /// Returns the sums of the cells of each column or row.
 fn sums(cells: &Grid<f32>, of_rows: bool) -> Vec<f64> {
-    let mut sums = vec![0.0; if of_rows { cells.height() } else { cells.width() }];
+    let mut sums = vec![
+        0.0;
+        if of_rows {
+            cells.height()
+        } else {
+            cells.width()
+        }
+    ];
     for y in 0..cells.height() {
         for (x, cell) in cells.row(y).iter().enumerate() {
             sums[if of_rows { y } else { x }] += f64::from(*cell);
@@ -153,9 +179,17 @@ fn frame(rules: &[Rule], sums: &[f64]) -> (usize, usize) {
     let mut high = None;
     if let (Some(first), Some(last)) = (rules.first(), rules.last()) {
         let inner = rules.iter().take_while(|r| r.at <= first.at + near).last();
-        low = inner.map(|rule| cell(rule.edges[1]) + 1).filter(|low| beyond(0, *low));
-        let inner = rules.iter().rev().take_while(|r| r.at >= last.at - near).last();
-        high = inner.map(|rule| cell(rule.edges[0])).filter(|high| beyond(*high, count));
+        low = inner
+            .map(|rule| cell(rule.edges[1]) + 1)
+            .filter(|low| beyond(0, *low));
+        let inner = rules
+            .iter()
+            .rev()
+            .take_while(|r| r.at >= last.at - near)
+            .last();
+        high = inner
+            .map(|rule| cell(rule.edges[0]))
+            .filter(|high| beyond(*high, count));
     }
     let text = |share: f64| {
         let mut sum = 0.0;
@@ -165,6 +199,12 @@ fn frame(rules: &[Rule], sums: &[f64]) -> (usize, usize) {
         })
     };
     let low = low.or_else(|| text(0.002)).unwrap_or(0);
-    let high = high.or_else(|| text(0.998).map(|at| at + 1)).unwrap_or(count);
-    if low + 1 < high { (low, high) } else { (0, count) }
+    let high = high
+        .or_else(|| text(0.998).map(|at| at + 1))
+        .unwrap_or(count);
+    if low + 1 < high {
+        (low, high)
+    } else {
+        (0, count)
+    }
 }

@@ -12,7 +12,7 @@ mod text_image;
 use serde::{Deserialize, Serialize};
 
 use self::columns::find_columns;
-use self::direction::{is_upside_down, upright_image};
+use self::direction::Upright;
 use self::layout::CELL_MM;
 use self::places::{Half, Place, Strokes, measure, places};
 use self::rows::{RowPitches, find_rows};
@@ -29,6 +29,9 @@ const MIN_SUPPORT: f64 = 0.08;
 const MIN_PRINTED: f64 = 0.5;
 /// Largest share of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
+
+/// What a character loses in confidence when all of its strokes were divided.
+const DIVIDED_DOUBT: f64 = 0.5;
 
 /// Half of a row of notes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -69,26 +72,44 @@ impl FoundBox {
 
 /// Finds the characters of a page in reading order: columns from right to left, each from the top.
 pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
-    let (image, mut layout) = upright_image(face, page, map);
-    let Some(columns) = find_columns(&layout) else {
+    let mut upright = Upright::of(face, page, map);
+    let Some(columns) = find_columns(&upright.layout) else {
         return Vec::new();
     };
     for strip in columns.columns.iter().filter(|column| column.is_strip) {
-        layout.erase_ornaments(strip);
+        upright.layout.erase_ornaments(strip);
     }
-    if std::env::var("D").is_ok() { eprintln!("inside {:?} rules {:?} lengths {:?}\ncolumns {:?}", layout.inside, layout.inner_rules, layout.rule_lengths_mm, columns); crate::block::dump(&image, &layout); }
-    let (rows, pitches) = find_rows(&layout, &columns);
+    let (rows, pitches) = find_rows(&upright.layout, &columns);
     let places = places(&columns, &rows);
-    let strokes = measure(&image, &layout, map, &places);
-    let is_upside_down = is_upside_down(&layout, &places, &strokes, &image, map);
-    numbered(&places, &strokes, &pitches, columns.columns.len(), is_upside_down, page.size())
+    let strokes = measure(&upright.image, &upright.layout, map, &places);
+    let is_upside_down = upright.is_upside_down(&places, &strokes);
+    numbered(
+        &places,
+        &strokes,
+        &pitches,
+        columns.columns.len(),
+        is_upside_down,
+        page.size(),
+    )
 }
 
 /// Returns whether a place holds a character.
 fn is_character(place: &Place, strokes: &Strokes, pitches: &RowPitches) -> bool {
-    let pitch = if place.half.is_some() { pitches.note } else { pitches.row };
+    let pitch = if place.half.is_some() {
+        pitches.note
+    } else {
+        pitches.row
+    };
     let [width, height] = strokes.size_mm();
     strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
+}
+
+/// Returns the geometric mean of the share of the ink over relief and of the share of the relief that is printed, less if
+/// strokes were divided between this character and its neighbours.
+fn confidence(strokes: &Strokes) -> f64 {
+    let divided = strokes.divided as f64 / strokes.area.max(1) as f64;
+    let agreement = (strokes.support() * strokes.printed).max(0.0).sqrt();
+    (agreement * (1.0 - DIVIDED_DOUBT * divided)).clamp(0.0, 1.0)
 }
 
 /// Returns whether a box lies on the page, with a tolerance of one pixel.
@@ -118,7 +139,12 @@ fn numbered(
             if is_upside_down {
                 (place.column as u32 + 1, -(place.row as i64), half, strokes)
             } else {
-                ((columns - place.column) as u32, place.row as i64, half, strokes)
+                (
+                    (columns - place.column) as u32,
+                    place.row as i64,
+                    half,
+                    strokes,
+                )
             }
         })
         .collect();
@@ -134,7 +160,11 @@ fn numbered(
         }
         before = Some((column, row));
         let share = |count: usize| count as f64 / strokes.area as f64;
-        if !is_on_page(strokes, page_size) || strokes.printed < MIN_PRINTED || strokes.support() < MIN_SUPPORT || share(strokes.only_relief) > MAX_UNSEEN {
+        if !is_on_page(strokes, page_size)
+            || strokes.printed < MIN_PRINTED
+            || strokes.support() < MIN_SUPPORT
+            || share(strokes.only_relief) > MAX_UNSEEN
+        {
             continue;
         }
         boxes.push(FoundBox {
@@ -142,15 +172,8 @@ fn numbered(
             column,
             row: number,
             half,
-            confidence: strokes.support(),
+            confidence: confidence(strokes),
         });
     }
     boxes
-}
-
-pub(crate) fn dump(image: &text_image::TextImage, layout: &layout::Layout) {
-    let g = crate::raster::Grid::from_fn(image.relief.width(), image.relief.height(), |x, y| {
-        [image.relief.at(x, y), image.ink.at(x, y), if layout.text.at(x, y) { 255 } else { match image.trust_at(x, y) { text_image::Trust::Both => 0, text_image::Trust::Relief => 60, text_image::Trust::Ink => 120 } }]
-    });
-    std::fs::write("/tmp/dump.png", crate::raster::png_rgb8(&g)).unwrap();
 }

@@ -45,9 +45,10 @@ pub(super) struct Strokes {
     pub(super) page_bounds: [f64; 4],
     /// Sum of the relief below the strokes, 0..=255.
     pub(super) relief: u64,
-    /// Number of pixels where relief and ink agree, and where only the relief shows the text.
-    pub(super) agreed: usize,
+    /// Number of pixels where only the relief shows the text.
     pub(super) only_relief: usize,
+    /// Number of pixels of parts that were divided between places.
+    pub(super) divided: usize,
     /// Share of the relief in the place that is printed.
     pub(super) printed: f64,
 }
@@ -55,11 +56,21 @@ pub(super) struct Strokes {
 impl Strokes {
     const EMPTY: Self = Self {
         area: 0,
-        bounds: [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
-        page_bounds: [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
+        bounds: [
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+        ],
+        page_bounds: [
+            f64::INFINITY,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NEG_INFINITY,
+        ],
         relief: 0,
-        agreed: 0,
         only_relief: 0,
+        divided: 0,
         printed: 0.0,
     };
 
@@ -87,7 +98,12 @@ pub(super) fn places(columns: &Columns, rows: &[Vec<Row>]) -> Vec<Place> {
         for (row, found) in rows.iter().enumerate() {
             let [top, bottom] = found.along;
             let mut add = |half: Option<Half>, left: usize, right: usize| {
-                places.push(Place { column, row, half, room: [left, top, right, bottom] });
+                places.push(Place {
+                    column,
+                    row,
+                    half,
+                    room: [left, top, right, bottom],
+                });
             };
             match found.kind {
                 RowKind::Character => add(None, left, right),
@@ -113,9 +129,7 @@ impl LocalMap {
         let page = |x: f64, y: f64| map.page_from_face(image.frame.face_from_pixel([x, y]));
         let reach = 10.0;
         let [x, y] = centre;
-        let slope = |a: [f64; 2], b: [f64; 2]| {
-            [0, 1].map(|k: usize| (b[k] - a[k]) / (2.0 * reach))
-        };
+        let slope = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|k: usize| (b[k] - a[k]) / (2.0 * reach));
         Self {
             centre,
             page: page(x, y),
@@ -164,7 +178,8 @@ pub(super) fn measure(
     let local: Vec<LocalMap> = places
         .iter()
         .map(|place| {
-            let middle = |k: usize| (place.room[k] + place.room[k + 2]) as f64 / 2.0 * CELL as f64 - 0.5;
+            let middle =
+                |k: usize| (place.room[k] + place.room[k + 2]) as f64 / 2.0 * CELL as f64 - 0.5;
             LocalMap::at(image, map, [middle(0), middle(1)])
         })
         .collect();
@@ -178,18 +193,27 @@ pub(super) fn measure(
         };
         let found = &mut strokes[number];
         found.area += x1 - x0;
+        if parts[label] == Part::Divided {
+            found.divided += x1 - x0;
+        }
         let relief = &image.relief.row(y)[x0..x1];
         found.relief += relief.iter().map(|r| u64::from(*r)).sum::<u64>();
-        match image.trust_at(x0, y) {
-            Trust::Both => found.agreed += x1 - x0,
-            Trust::Relief => found.only_relief += x1 - x0,
-            Trust::Ink => {}
+        if image.trust_at(x0, y) == Trust::Relief {
+            found.only_relief += x1 - x0;
         }
-        let edges = [x0 as f64 - 0.5, y as f64 - 0.5, x1 as f64 - 0.5, y as f64 + 0.5];
+        let edges = [
+            x0 as f64 - 0.5,
+            y as f64 - 0.5,
+            x1 as f64 - 0.5,
+            y as f64 + 0.5,
+        ];
         extend(&mut found.bounds, [edges[0], edges[1]]);
         extend(&mut found.bounds, [edges[2], edges[3]]);
         for corner in [[0, 1], [2, 1], [2, 3], [0, 3]] {
-            extend(&mut found.page_bounds, local[number].page(corner.map(|k| edges[k])));
+            extend(
+                &mut found.page_bounds,
+                local[number].page(corner.map(|k| edges[k])),
+            );
         }
     });
     for (found, place) in strokes.iter_mut().zip(places) {
@@ -267,7 +291,10 @@ fn assign(
             Some((_, count)) => *count += x1 - x0,
             None => places.push((owner, x1 - x0)),
         }
-        *relief += image.relief.row(y)[x0..x1].iter().map(|r| u64::from(*r)).sum::<u64>();
+        *relief += image.relief.row(y)[x0..x1]
+            .iter()
+            .map(|r| u64::from(*r))
+            .sum::<u64>();
     });
     let pixel = PIXEL_MM * PIXEL_MM;
     shares

@@ -1,7 +1,7 @@
 //! Rows of a column: the cheapest sequence of characters, notes and blanks.
 
 use super::columns::{Column, Columns};
-use super::layout::{CELL_MM, Layout};
+use super::layout::Layout;
 
 /// Pitches of rows that are tried, in pitches of columns.
 const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
@@ -9,12 +9,12 @@ const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
 const NOTE_PITCHES: [f64; 2] = [0.44, 0.64];
 const NOTE_PITCH_STEP: f64 = 0.02;
 /// Pitches of the strip at the fold that are tried, in widths of the strip.
-const STRIP_PITCHES: [f64; 2] = [0.75, 1.05];
-/// Heights of a row of characters and of notes that are tried, in pitches.
+const STRIP_PITCHES: [f64; 2] = [0.66, 1.06];
+/// Heights of a row of characters, and of notes and in the strip that are tried, in pitches.
 const HEIGHTS: [f64; 2] = [0.65, 1.4];
-const NOTE_HEIGHTS: [f64; 2] = [0.75, 1.25];
+const NARROW_HEIGHTS: [f64; 2] = [0.75, 1.25];
 /// Cost of a row whose height differs by a whole pitch from the pitch.
-const HEIGHT_COST: f64 = 4.0;
+const HEIGHT_COST: f64 = 7.0;
 /// Cost of a cut through as much ink as is usual.
 const CUT_COST: f64 = 1.5;
 /// Cost of the ink of a character that belongs to no row, and of a blank of one pitch.
@@ -75,7 +75,9 @@ pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<Row>>, R
         let note = row * (NOTE_PITCHES[0] + f64::from(step) * NOTE_PITCH_STEP);
         let pitches = RowPitches { row, note };
         let full = profiles.iter().filter(|profile| !profile.is_strip);
-        let cost = full.map(|profile| divide(profile, usual, pitches, true).0).sum();
+        let cost = full
+            .map(|profile| divide(profile, usual, pitches, true).0)
+            .sum();
         if best.is_none_or(|(least, _)| cost < least) {
             best = Some((cost, note));
         }
@@ -183,7 +185,10 @@ fn row_pitch(profiles: &[ColumnProfile], column_pitch: f64) -> f64 {
     for profile in profiles.iter().filter(|profile| !profile.is_strip) {
         let lines = &profile.lines;
         let mean = lines.iter().sum::<f64>() / lines.len().max(1) as f64;
-        let lines: Vec<f64> = lines.iter().map(|line| line.min(3.0 * mean) - mean).collect();
+        let lines: Vec<f64> = lines
+            .iter()
+            .map(|line| line.min(3.0 * mean) - mean)
+            .collect();
         for (lag, sum) in sums.iter_mut().enumerate().skip(lags[0].saturating_sub(1)) {
             let pairs = lines.iter().zip(lines.iter().skip(lag));
             *sum += pairs.map(|(a, b)| a * b).sum::<f64>();
@@ -220,7 +225,12 @@ const UNREACHED: Step = Step {
 };
 
 /// Divides a column into rows. Returns the cost and the rows.
-fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: bool) -> (f64, Vec<Row>) {
+fn divide(
+    profile: &ColumnProfile,
+    usual: f64,
+    pitches: RowPitches,
+    with_notes: bool,
+) -> (f64, Vec<Row>) {
     let count = profile.lines.len();
     let cut = |k: usize| {
         if k == 0 || k == count {
@@ -245,10 +255,19 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
                 let ink = profile.lines[to - 1] / (usual * pitches.row);
                 let cost = before.cost + SKIPPED_INK_COST * ink + blank / pitches.row;
                 if cost < step.cost {
-                    step = Step { cost, from: to - 1, from_notes: notes, is_row: false };
+                    step = Step {
+                        cost,
+                        from: to - 1,
+                        from_notes: notes,
+                        is_row: false,
+                    };
                 }
                 let pitch = if notes { pitches.note } else { pitches.row };
-                let heights = if notes { NOTE_HEIGHTS } else { HEIGHTS };
+                let heights = if notes || profile.is_strip {
+                    NARROW_HEIGHTS
+                } else {
+                    HEIGHTS
+                };
                 let [shortest, longest] = heights.map(|share| (share * pitch) as usize);
                 for height in shortest.max(1)..=longest.min(to) {
                     let from = to - height;
@@ -259,7 +278,12 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
                     let row = row_cost(profile, usual, pitches, notes, from, to);
                     let cost = before.cost + row + cuts[from] + cuts[to];
                     if cost < step.cost {
-                        step = Step { cost, from, from_notes: notes, is_row: true };
+                        step = Step {
+                            cost,
+                            from,
+                            from_notes: notes,
+                            is_row: true,
+                        };
                     }
                 }
             }
@@ -268,9 +292,19 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
         if with_notes {
             let [text, notes] = [best[0][to], best[1][to]];
             if text.cost + NOTES_COST < notes.cost {
-                best[1][to] = Step { cost: text.cost + NOTES_COST, from: to, from_notes: false, is_row: false };
+                best[1][to] = Step {
+                    cost: text.cost + NOTES_COST,
+                    from: to,
+                    from_notes: false,
+                    is_row: false,
+                };
             } else if notes.cost < text.cost {
-                best[0][to] = Step { cost: notes.cost, from: to, from_notes: true, is_row: false };
+                best[0][to] = Step {
+                    cost: notes.cost,
+                    from: to,
+                    from_notes: true,
+                    is_row: false,
+                };
             }
         }
     }
@@ -278,7 +312,14 @@ fn divide(profile: &ColumnProfile, usual: f64, pitches: RowPitches, with_notes: 
 }
 
 /// Returns the cost of a row apart from the cuts at its ends.
-fn row_cost(profile: &ColumnProfile, usual: f64, pitches: RowPitches, notes: bool, from: usize, to: usize) -> f64 {
+fn row_cost(
+    profile: &ColumnProfile,
+    usual: f64,
+    pitches: RowPitches,
+    notes: bool,
+    from: usize,
+    to: usize,
+) -> f64 {
     let pitch = if notes { pitches.note } else { pitches.row };
     let share = pitch / pitches.row;
     let full = usual * pitch;
@@ -332,18 +373,17 @@ fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<Row> {
     (0..=steps)
         .map(|step| {
             let share = f64::from(step) / f64::from(steps);
-            let pitch = profile.width as f64 * (STRIP_PITCHES[0] + share * (STRIP_PITCHES[1] - STRIP_PITCHES[0]));
-            let pitches = RowPitches { row: pitch, note: pitch / 2.0 };
+            let pitch = profile.width as f64
+                * (STRIP_PITCHES[0] + share * (STRIP_PITCHES[1] - STRIP_PITCHES[0]));
+            let pitches = RowPitches {
+                row: pitch,
+                note: pitch / 2.0,
+            };
             let (cost, rows) = divide(profile, 0.7 * usual, pitches, false);
-            (cost, rows)
+            // Only the cuts decide, not the number of rows.
+            (cost - ROW_COST * rows.len() as f64, rows)
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, rows)| rows)
         .unwrap_or_default()
-}
-
-/// Returns a length in cells.
-#[allow(dead_code)]
-pub(super) fn in_cells(mm: f64) -> f64 {
-    mm / CELL_MM
 }

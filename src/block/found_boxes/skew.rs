@@ -34,7 +34,12 @@ pub(super) fn text_angle(side: &Face, page_angle: f64) -> f64 {
         };
         let angles = (-steps..=steps).map(|k| best + (f64::from(k) * step).to_radians());
         let sharpest = angles
-            .map(|angle| (sharpness(&points, relief.soft.width(), relief.soft.height(), angle), angle))
+            .map(|angle| {
+                (
+                    sharpness(&points, relief.soft.width(), relief.soft.height(), angle),
+                    angle,
+                )
+            })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         best = sharpest.map_or(best, |(_, angle)| angle);
     }

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use crate::block::align::Face;
+use crate::block::face_layer::FACE_CELL;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::PageMap;
-use crate::block::face_layer::FACE_CELL;
 use crate::raster::Grid;
 
 /// Size of a pixel, mm: that of height maps.
@@ -50,7 +50,10 @@ impl TextFrame {
             for x in ends.into_iter().flatten() {
                 let u = side.map.origin_mm[0] + x as f64 * step;
                 let v = side.map.origin_mm[1] + y as f64 * step;
-                for (k, at) in [cos * u + sin * v, cos * v - sin * u].into_iter().enumerate() {
+                for (k, at) in [cos * u + sin * v, cos * v - sin * u]
+                    .into_iter()
+                    .enumerate()
+                {
                     low[k] = low[k].min(at);
                     high[k] = high[k].max(at + step);
                 }
@@ -102,12 +105,7 @@ pub(super) enum Trust {
 
 impl TextImage {
     /// Samples relief and ink in a frame.
-    pub(super) fn sample(
-        side: &Face,
-        page: &PageInk,
-        map: &PageMap,
-        frame: TextFrame,
-    ) -> Self {
+    pub(super) fn sample(side: &Face, page: &PageInk, map: &PageMap, frame: TextFrame) -> Self {
         let [width, height] = frame.size;
         let mut relief = vec![0_u8; width * height];
         let mut ink = vec![0_u8; width * height];
@@ -167,8 +165,8 @@ impl TextImage {
 fn sample_relief(side: &Face, frame: &TextFrame, y: usize, out: &mut [u8]) {
     let soft = &side.relief.soft;
     let first = frame.face_from_pixel([0.0, y as f64]);
-    let start = [0, 1]
-        .map(|k: usize| ((first[k] - side.map.origin_mm[k]) / HEIGHT_STEP_MM) as f32 * 256.0);
+    let start =
+        [0, 1].map(|k: usize| ((first[k] - side.map.origin_mm[k]) / HEIGHT_STEP_MM) as f32 * 256.0);
     let step = frame.right.map(|part| part as f32 * 256.0);
     let (width, height) = (soft.width() as i32, soft.height() as i32);
     let data = soft.data();
