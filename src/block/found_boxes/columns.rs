@@ -15,6 +15,8 @@ const WIDTH_COST: f64 = 6.0;
 const STRIP_WIDTH: f64 = 0.93;
 /// Cost of a strip.
 const STRIP_COST: f64 = 0.5;
+/// The ink around a boundary counts at least as this share of that of the page.
+const LEAST_AROUND: f64 = 0.3;
 /// Largest cost of ink on a boundary, in relation to the ink around it.
 const MAX_INK_COST: f64 = 1.5;
 /// What a boundary gains.
@@ -61,7 +63,10 @@ pub(super) fn find_columns(layout: &Layout) -> Option<Columns> {
     let count = (PITCHES_MM[1] / PITCHES_MM[0]).ln() / PITCH_RATIO.ln();
     (0..=count as i32)
         .map(|k| PITCHES_MM[0] / CELL_MM * PITCH_RATIO.powi(k))
-        .filter_map(|pitch| divide(&profile, &is_rule, &nearness, pitch))
+        .filter_map(|pitch| {
+            let boundaries = Boundaries::of(&profile, &is_rule, &nearness, pitch);
+            divide(&profile, &boundaries, pitch)
+        })
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .map(|mut found| {
             let left = layout.inside[0];
@@ -116,62 +121,85 @@ fn mark_strip(columns: &mut [Column], is_ruled: &dyn Fn(usize) -> bool) {
     }
 }
 
-/// Divides a profile into columns of about one pitch.
-fn divide(
-    profile: &[f64],
-    is_rule: &[usize],
-    nearness: &dyn Fn(usize) -> f64,
-    pitch: f64,
-) -> Option<Columns> {
-    let count = profile.len();
-    let all = profile.iter().sum::<f64>() / count as f64;
-    let around = means(profile, (pitch / 2.0) as usize);
-    let cut = |k: usize| {
-        if k == 0 || k == count {
-            return 0.0;
+/// Costs of the boundaries of columns.
+struct Boundaries<'a> {
+    /// Number of the rule near each position, from 1; 0 where there is none.
+    rule_at: &'a [usize],
+    /// Cost of a boundary at each position.
+    cuts: Vec<f64>,
+    /// Number of rules that begin at or before each position.
+    rules_before: Vec<usize>,
+}
+
+impl<'a> Boundaries<'a> {
+    fn of(
+        profile: &[f64],
+        rule_at: &'a [usize],
+        nearness: &dyn Fn(usize) -> f64,
+        pitch: f64,
+    ) -> Self {
+        let count = profile.len();
+        let all = profile.iter().sum::<f64>() / count as f64;
+        let around = means(profile, (pitch / 2.0) as usize);
+        let cut = |k: usize| {
+            if k == 0 || k == count {
+                return 0.0;
+            }
+            let ink = f64::midpoint(profile[k - 1], profile[k]);
+            let usual = around[k].max(LEAST_AROUND * all).max(1e-9);
+            (ink / usual).min(MAX_INK_COST) - BOUNDARY_GAIN - RULE_GAIN * nearness(k)
+        };
+        let mut rules_before = vec![0_usize; count + 1];
+        for k in 1..=count {
+            let is_new = rule_at[k] > 0 && rule_at[k] != rule_at[k - 1];
+            rules_before[k] = rules_before[k - 1] + usize::from(is_new);
         }
-        let ink = (profile[k - 1] + profile[k]) / 2.0;
-        let ink = (ink / around[k].max(0.3 * all).max(1e-9)).min(MAX_INK_COST);
-        let rule = RULE_GAIN * nearness(k);
-        ink - BOUNDARY_GAIN - rule
-    };
-    let cuts: Vec<f64> = (0..=count).map(cut).collect();
-    let mut rules_before = vec![0_usize; count + 1];
-    for k in 1..=count {
-        let is_new = is_rule[k] > 0 && is_rule[k] != is_rule[k - 1];
-        rules_before[k] = rules_before[k - 1] + usize::from(is_new);
+        Self {
+            rule_at,
+            cuts: (0..=count).map(cut).collect(),
+            rules_before,
+        }
     }
-    let last_rule = rules_before[count];
-    let crossed = |from: usize, to: usize| {
-        // Rules at either end belong to the boundary.
-        let first = rules_before[from];
-        let mut last = rules_before[to];
-        if is_rule[to] > 0 {
-            last -= 1;
-        }
-        last.min(last_rule).saturating_sub(first) as f64 * CROSSED_RULE_COST
-    };
-    let is_end = |k: usize| k == 0 || k == count || is_rule[k] > 0;
+
+    /// Returns whether a position is an end of the page or on a rule.
+    fn is_ruled(&self, k: usize) -> bool {
+        k == 0 || k + 1 == self.cuts.len() || self.rule_at[k] > 0
+    }
+
+    /// Returns the cost of the rules inside a column. Those at its ends belong to the boundaries.
+    fn crossed(&self, from: usize, to: usize) -> f64 {
+        let last = self.rules_before[to] - usize::from(self.rule_at[to] > 0);
+        CROSSED_RULE_COST * last.saturating_sub(self.rules_before[from]) as f64
+    }
+
+    /// Returns the cost of a column apart from its boundaries, and whether it is the strip; `None` for a wrong width.
+    fn column(&self, from: usize, to: usize, pitch: f64) -> Option<(f64, bool)> {
+        let width = (to - from) as f64 / pitch;
+        let even = WIDTH_COST * (width - 1.0) * (width - 1.0);
+        let is_strip = (STRIP_WIDTHS[0]..STRIP_WIDTHS[1]).contains(&width)
+            && self.is_ruled(from)
+            && self.is_ruled(to)
+            && STRIP_COST < even;
+        let cost = if is_strip { STRIP_COST } else { even };
+        (is_strip || width >= WIDTHS[0]).then(|| (cost + self.crossed(from, to), is_strip))
+    }
+}
+
+/// Divides a profile into columns of about one pitch.
+fn divide(profile: &[f64], boundaries: &Boundaries, pitch: f64) -> Option<Columns> {
+    let count = profile.len();
+    let shortest = ((STRIP_WIDTHS[0] * pitch) as usize).max(1);
+    let longest = (WIDTHS[1] * pitch) as usize;
+    // Cost up to each boundary, the boundary before, and whether the strip lies between.
     let mut best = vec![(f64::INFINITY, 0_usize, false); count + 1];
     best[0] = (0.0, 0, false);
     for to in 1..=count {
-        let shortest = (STRIP_WIDTHS[0] * pitch) as usize;
-        let longest = (WIDTHS[1] * pitch) as usize;
-        for from in to.saturating_sub(longest)..=to.saturating_sub(shortest.max(1)) {
-            if best[from].0.is_infinite() {
+        for from in to.saturating_sub(longest)..=to.saturating_sub(shortest) {
+            let before = best[from].0;
+            let Some((cost, is_strip)) = boundaries.column(from, to, pitch) else {
                 continue;
-            }
-            let width = (to - from) as f64 / pitch;
-            let even = WIDTH_COST * (width - 1.0) * (width - 1.0);
-            let is_strip = (STRIP_WIDTHS[0]..STRIP_WIDTHS[1]).contains(&width)
-                && is_end(from)
-                && is_end(to)
-                && STRIP_COST < even;
-            if !is_strip && width < WIDTHS[0] {
-                continue;
-            }
-            let cost = if is_strip { STRIP_COST } else { even };
-            let cost = best[from].0 + cost + cuts[to] + crossed(from, to);
+            };
+            let cost = before + cost + boundaries.cuts[to];
             if cost < best[to].0 {
                 best[to] = (cost, from, is_strip);
             }
@@ -191,7 +219,7 @@ fn divide(
         to = from;
     }
     columns.reverse();
-    mark_strip(&mut columns, &is_end);
+    mark_strip(&mut columns, &|k| boundaries.is_ruled(k));
     Some(Columns {
         columns,
         pitch,

@@ -1,5 +1,6 @@
 //! Finds the characters of a page without labels, on relief and ink together.
 
+mod column_profile;
 mod columns;
 mod direction;
 mod layout;
