@@ -40,12 +40,7 @@ impl BlockPipeline {
             .ok_or_else(rerun)?;
         let read = match &context.inputs.labels {
             Some(file) => read_labels(context, file, &page)?,
-            None => {
-                return Err(context
-                    .inputs
-                    .page
-                    .failed(FailureClass::NoSolution, "it has no labels"));
-            }
+            None => found_on_page(context, face, &page, &map)?,
         };
         let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
         let sure = placed
