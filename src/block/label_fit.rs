@@ -110,7 +110,7 @@ mod tests {
     fn page() -> PageInk {
         let soft = Grid::from_fn(700, 500, |x, y| {
             let inside = |at: usize, first: usize| at >= first && (at - first) % 50 < 38;
-            if inside(x, 67) && inside(y, 55) && x < 640 && y < 460 {
+            if inside(x, 67) && inside(y, 71) && x < 640 && y < 470 {
                 255
             } else {
                 0
