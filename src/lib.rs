@@ -67,6 +67,19 @@
 //! has to leave it out. `catalog/blocks/staleness.rs` compares what each result was made with (settings, hashes of the
 //! files, attributes) with the present, for the start of a run and for `--dry-run`.
 //!
+//! `runner/block_pipeline` reads the files of each stage and calls pure functions of `block`. Read them in this order:
+//!
+//! - `face`: `block/orientation.rs` (the direction of the face), `height_map.rs` (heights of both sides), `face_layer.rs`
+//!   (the face without holder and walls)
+//! - `align`: `relief.rs` and `page_ink.rs` (soft strokes of face and page), `align.rs` (all steps), `coarse.rs` (first
+//!   positions by FFT), `windows.rs` (local shifts), `field.rs` (a smooth field of shifts), `page_map.rs` (the map of the
+//!   face to the page), `agreement.rs` (whether the page belongs to the block)
+//! - `boxes`: `labels/read.rs` and `block/label_fit.rs`, or `block/found_boxes/mod.rs`; then `characters.rs` (the place of
+//!   each character, and how sure it is)
+//! - `cut`: `cut.rs` (meshes and prints), `character_map.rs` (the maps of a character)
+//!
+//! `register` gets the pose that the block expects of a cut pair (`domain/alignment_prior.rs`).
+//!
 //! ## Two databases
 //!
 //! The catalog is a file of SQLite, or in PostgreSQL so that several computers can share it. `db/conn.rs` holds a connection

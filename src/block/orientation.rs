@@ -1,8 +1,8 @@
 //! The direction of the face of a block, from one pass over its triangles.
 //!
-//! Most of the area of a carved block looks along the normal of its face: the face itself, the carved ground, and the
-//! other side. So the eigenvector of the largest eigenvalue of the sum of n n^T, weighted by area, is the face normal,
-//! whatever walls, table or holder were scanned too.
+//! Tops and carved ground of a face lie in a layer a few millimetres thick and look along its normal. The flanks of the
+//! strokes can have a larger area, but they are spread over the whole block. So the normal is the direction along which
+//! one thin layer contains the largest area that looks along it.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -20,9 +20,18 @@ const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
-/// One of so many triangles shows how far the block extends along its axes, with a margin in mm.
-const EXTENT_SAMPLE: usize = 64;
+/// One of so many triangles is kept for the direction of the face and for the extent of the block, unless the mesh has
+/// only a few.
+const SAMPLE_STEP: usize = 32;
+const FEW_TRIANGLES: usize = 1 << 16;
+/// Margin of the extent, mm.
 const EXTENT_MARGIN_MM: f64 = 3.0;
+/// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
+const LAYER_SHARE: f64 = 0.0375;
+/// Area looks along a direction if the cosine is at least this.
+const ALONG: f64 = 0.85;
+/// Steps that refine a direction.
+const REFINEMENTS: usize = 4;
 
 /// The frame of a block: axes along the face, and the unit.
 ///
@@ -51,6 +60,9 @@ struct AreaSums {
     second: Matrix3<f64>,
     normals: Matrix3<f64>,
 }
+
+/// A triangle of the sample: its first corner relative to the origin, and its normal times twice its area.
+type SampledTriangle = [Vector3<f32>; 2];
 
 impl AreaSums {
     const fn empty() -> Self {
@@ -104,7 +116,7 @@ impl Orientation {
         let mut sums = AreaSums::empty();
         let mut count = 0;
         let mut origin = None;
-        let mut sample: Vec<Vector3<f32>> = Vec::new();
+        let mut sample: Vec<SampledTriangle> = Vec::new();
         mesh.pass(&mut |triangles| {
             // Positions relative to the first corner keep their precision far from the origin.
             let origin = *origin.get_or_insert_with(|| Vector3::from(triangles[0][0]));
@@ -115,8 +127,12 @@ impl Orientation {
             for part in &parts {
                 sums.add(part);
             }
-            let corners = triangles.iter().step_by(EXTENT_SAMPLE).flatten();
-            sample.extend(corners.map(|corner| (Vector3::from(*corner) - origin).cast::<f32>()));
+            let is_small = count == 0 && triangles.len() < FEW_TRIANGLES;
+            let step = if is_small { 1 } else { SAMPLE_STEP };
+            sample.extend(triangles.iter().step_by(step).map(|triangle| {
+                let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
+                [a.cast::<f32>(), (b - a).cross(&(c - a)).cast::<f32>()]
+            }));
             count += triangles.len() as u64;
             Ok::<(), MeshReadError>(())
         })?;
@@ -128,16 +144,27 @@ impl Orientation {
 
     fn of_sums(
         sums: &AreaSums,
-        sample: &[Vector3<f32>],
+        sample: &[SampledTriangle],
         origin: Vector3<f64>,
         unit: Option<LengthUnit>,
         triangles: u64,
     ) -> Self {
         let mean = sums.first / sums.area;
         let covariance = sums.second / sums.area - mean * mean.transpose();
+        let spread = SymmetricEigen::new(covariance);
+        let long_side = SIDE_BY_DEVIATION * spread.eigenvalues.max().max(0.0).sqrt();
         let normals = SymmetricEigen::new(sums.normals);
-        let normal = normals.eigenvectors.column(normals.eigenvalues.imax());
-        let n = with_fixed_sign(normal.into_owned());
+        let candidates = normals
+            .eigenvectors
+            .column_iter()
+            .chain(spread.eigenvectors.column_iter());
+        let n = candidates
+            .map(|candidate| refined(candidate.into_owned(), sample))
+            .max_by(|a, b| {
+                let area = |n| layer_area(n, sample, LAYER_SHARE * long_side);
+                area(a).total_cmp(&area(b))
+            })
+            .map_or(Vector3::z(), with_fixed_sign);
         // The largest variance of the area within the plane of the face.
         let flat = Matrix3::identity() - n * n.transpose();
         let within = SymmetricEigen::new(flat * covariance * flat);
@@ -149,7 +176,8 @@ impl Orientation {
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
         let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
         let half_extent_mm = axes.map(|axis| {
-            let distance = |point: &Vector3<f32>| axis.dot(&(point.cast::<f64>() - mean)).abs();
+            let distance =
+                |[corner, _]: &SampledTriangle| axis.dot(&(corner.cast::<f64>() - mean)).abs();
             let farthest = sample.iter().map(distance).fold(0.0, f64::max);
             let farthest = farthest + EXTENT_MARGIN_MM / mm;
             farthest.min(REACH * deviation(&axis).max(long_side / 20.0)) * mm
@@ -180,6 +208,44 @@ impl Orientation {
             ..*self
         }
     }
+}
+
+/// Moves a direction to the mean direction of the area that looks along it.
+fn refined(direction: Vector3<f64>, sample: &[SampledTriangle]) -> Vector3<f64> {
+    let mut n = direction;
+    for _ in 0..REFINEMENTS {
+        let mut sum = Vector3::zeros();
+        for [_, normal] in sample {
+            let normal = normal.cast::<f64>();
+            let along = normal.dot(&n);
+            if along.abs() >= ALONG * normal.norm() {
+                sum += normal * along.signum();
+            }
+        }
+        n = sum.try_normalize(0.0).unwrap_or(n);
+    }
+    n
+}
+
+/// Returns the largest area in a layer of the given thickness that looks along a direction.
+fn layer_area(n: &Vector3<f64>, sample: &[SampledTriangle], thickness: f64) -> f64 {
+    let mut heights: Vec<(f64, f64)> = sample
+        .iter()
+        .map(|[corner, normal]| (corner.cast::<f64>().dot(n), normal.cast::<f64>()))
+        .filter(|(_, normal)| normal.dot(n).abs() >= ALONG * normal.norm())
+        .map(|(height, normal)| (height, normal.norm()))
+        .collect();
+    heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut first, mut area, mut largest) = (0, 0.0, 0.0_f64);
+    for (height, added) in &heights {
+        area += added;
+        while height - heights[first].0 > thickness {
+            area -= heights[first].1;
+            first += 1;
+        }
+        largest = largest.max(area);
+    }
+    largest
 }
 
 /// Returns the unit in which the long side of a block is nearest to a typical one.

@@ -21,7 +21,8 @@ pub struct CutPairTruth {
     pub plane: TopsPlane,
     /// Points on stroke tops, in mesh coordinates.
     pub landmarks: Vec<[f64; 3]>,
-    /// Height of the character's ink, in pixels of the print.
+    /// Height of the character's ink, in pixels of the print; for flat characters, half its width. Errors are measured as
+    /// shares of it.
     pub char_height_px: f64,
 }
 
@@ -46,7 +47,7 @@ impl BlockTruth {
         page_from_print: &Affine2,
     ) -> Option<CutPairTruth> {
         let print_from_page = page_from_print.inverse()?;
-        let [_, top, _, bottom] = character.box_px?;
+        let [left, top, right, bottom] = character.box_px?;
         let mut points = Vec::new();
         let mut values = [const { Vec::new() }; 3];
         for landmark in &character.landmarks {
@@ -82,7 +83,7 @@ impl BlockTruth {
                 .iter()
                 .map(|landmark| landmark.mesh)
                 .collect(),
-            char_height_px: (bottom - top) * print_from_page.scale(),
+            char_height_px: (bottom - top).max((right - left) / 2.0) * print_from_page.scale(),
         })
     }
 }

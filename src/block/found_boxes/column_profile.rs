@@ -1,0 +1,120 @@
+//! The ink of a column line by line, and what is usual on a page.
+
+use super::columns::Column;
+use super::layout::Layout;
+
+/// Pitches of rows that are tried, in pitches of columns.
+const ROW_PITCHES: [f64; 2] = [0.5, 1.2];
+/// Middles that are tried, in widths of the column on both sides.
+const MIDDLE_REACH: f64 = 0.09;
+/// Ink of a line that counts as a stroke, in the usual ink of a line.
+const MIDDLE_LINE: f64 = 0.2;
+
+/// Sums of the cells of a column.
+pub(super) struct ColumnProfile {
+    pub(super) is_strip: bool,
+    pub(super) width: usize,
+    pub(super) top: usize,
+    /// Sum of each line of cells.
+    pub(super) lines: Vec<f64>,
+    /// Sums of all lines before each line, of the left and the right half.
+    pub(super) halves: [Vec<f64>; 2],
+    /// Positions across near the middle, with the sums of all lines before each line.
+    pub(super) middles: Vec<(usize, Vec<f64>)>,
+}
+
+impl ColumnProfile {
+    pub(super) fn of(layout: &Layout, column: &Column) -> Self {
+        let [top, bottom] = [layout.inside[1], layout.inside[3]];
+        let [left, right] = column.across;
+        let middle = usize::midpoint(left, right);
+        let reach = (MIDDLE_REACH * (right - left) as f64).ceil() as usize;
+        let line = |y: usize, from: usize, to: usize| {
+            let cells = &layout.cells.row(y)[from..to];
+            cells.iter().map(|cell| f64::from(*cell)).sum::<f64>()
+        };
+        let before = |from: usize, to: usize| {
+            let mut sums = Vec::with_capacity(bottom - top + 1);
+            let mut sum = 0.0;
+            sums.push(sum);
+            for y in top..bottom {
+                sum += line(y, from, to);
+                sums.push(sum);
+            }
+            sums
+        };
+        Self {
+            is_strip: column.is_strip,
+            width: right - left,
+            top,
+            lines: (top..bottom).map(|y| line(y, left, right)).collect(),
+            halves: [before(left, middle), before(middle, right)],
+            middles: (middle.saturating_sub(reach)..=middle + reach)
+                .filter(|x| *x > left && x + 1 < right)
+                .map(|x| (x, before(x, x + 1)))
+                .collect(),
+        }
+    }
+
+    /// Returns 1 if a line in the middle third of a row is empty, 0 if all have usual ink.
+    pub(super) fn emptiest(&self, from: usize, to: usize, usual: f64) -> f64 {
+        let third = (to - from) / 3;
+        let lines = &self.lines[from + third..to - third];
+        let least = lines.iter().copied().fold(f64::INFINITY, f64::min);
+        (1.0 - least / (MIDDLE_LINE * usual)).max(0.0)
+    }
+
+    /// Returns the position across with the least ink near the middle of a row, and the share of it that is inked.
+    pub(super) fn middle(&self, from: usize, to: usize) -> (usize, f64) {
+        let rows = (to - from) as f64;
+        let mut best = (0, f64::INFINITY);
+        for (x, sums) in &self.middles {
+            let ink = (sums[to] - sums[from]) / rows;
+            if ink < best.1 {
+                best = (*x, ink);
+            }
+        }
+        best
+    }
+}
+
+/// Returns the usual ink of a line.
+pub(super) fn usual_ink(profiles: &[ColumnProfile]) -> f64 {
+    let full = profiles.iter().filter(|profile| !profile.is_strip);
+    let mut lines: Vec<f64> = full
+        .flat_map(|profile| profile.lines.iter().copied())
+        .filter(|line| *line > 1.0)
+        .collect();
+    lines.sort_by(f64::total_cmp);
+    lines.get(lines.len() / 2).copied().unwrap_or(1.0)
+}
+
+/// Returns the lag at which the columns are most like themselves.
+pub(super) fn row_pitch(profiles: &[ColumnProfile], column_pitch: f64) -> f64 {
+    let lags = ROW_PITCHES.map(|share| (share * column_pitch) as usize);
+    let mut sums = vec![0.0; lags[1] + 2];
+    for profile in profiles.iter().filter(|profile| !profile.is_strip) {
+        let lines = &profile.lines;
+        let mean = lines.iter().sum::<f64>() / lines.len().max(1) as f64;
+        let lines: Vec<f64> = lines
+            .iter()
+            .map(|line| line.min(3.0 * mean) - mean)
+            .collect();
+        for (lag, sum) in sums.iter_mut().enumerate().skip(lags[0].saturating_sub(1)) {
+            let pairs = lines.iter().zip(lines.iter().skip(lag));
+            *sum += pairs.map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+    let best = (lags[0]..=lags[1]).max_by(|a, b| sums[*a].total_cmp(&sums[*b]));
+    let Some(best) = best.filter(|best| *best > 0) else {
+        return column_pitch;
+    };
+    let (before, at, after) = (sums[best - 1], sums[best], sums[best + 1]);
+    let curvature = 2.0 * at - before - after;
+    let offset = if curvature > 0.0 {
+        ((after - before) / (2.0 * curvature)).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    };
+    best as f64 + offset
+}

@@ -1,0 +1,210 @@
+//! The strokes of a page without frame and rules, and the part of the page inside the frame.
+
+use super::columns::Column;
+use super::rules::{Rule, find_solid, take_rules};
+use super::text_image::{PIXEL_MM, TextImage, Trust};
+use crate::raster::{Grid, Mask};
+
+/// Pixels per side of a cell.
+pub(super) const CELL: usize = 2;
+/// Side of a cell, mm.
+pub(super) const CELL_MM: f64 = CELL as f64 * PIXEL_MM;
+/// Rules within this distance of the outermost one belong to the frame, mm.
+const FRAME_MM: f64 = 5.0;
+/// Share of the strokes beyond a frame, at most.
+const BEYOND_FRAME: f64 = 0.02;
+/// Marks in the strip that contain a square of this side are ornaments, in widths of the strip.
+const SOLID: f64 = 0.18;
+/// Least value of strokes, of 255.
+const STROKE: u8 = 128;
+
+/// Strokes of a page, by which columns and rows are found.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    /// Share of each cell that is covered by strokes of text, 0..=1.
+    pub(super) cells: Grid<f32>,
+    /// Strokes of text in the pixels of the image.
+    pub(super) text: Mask,
+    /// First column and row of cells inside the frame, and the ones after the last.
+    pub(super) inside: [usize; 4],
+    /// Middles of the rules along y inside the frame, in cells.
+    pub(super) inner_rules: Vec<f64>,
+    /// Lengths of the inner rules along y and along x, mm.
+    pub(super) rule_lengths_mm: [f64; 2],
+}
+
+impl Layout {
+    /// Takes frame, rules and ornaments out of the strokes of an image.
+    pub(super) fn of(image: &TextImage) -> Self {
+        let mut text: Mask = image.strokes().map(|value| *value >= STROKE);
+        let mut erased = Mask::new(text.width(), text.height(), false);
+        let (mut text_across, mut erased_across) = (text.transposed(), erased.transposed());
+        let along_y = take_rules(&mut text, &mut erased);
+        let along_x = take_rules(&mut text_across, &mut erased_across);
+        let erased_across = erased_across.transposed();
+        for ((text, erased), across) in (text.data_mut().iter_mut())
+            .zip(erased.data_mut())
+            .zip(erased_across.data())
+        {
+            *erased |= across;
+            *text &= !across;
+        }
+        let cells = cells(image, &erased);
+        let (left, right) = frame(&along_y, &sums(&cells, false));
+        let (top, bottom) = frame(&along_x, &sums(&cells, true));
+        let inside = [left, top, right, bottom];
+        let within = |rule: &&Rule, low: usize, high: usize| {
+            let at = rule.at / CELL as f64;
+            at > low as f64 + 1.0 && at + 1.0 < high as f64
+        };
+        let inner = |rules: &[Rule], low: usize, high: usize| {
+            let inner: Vec<Rule> = rules
+                .iter()
+                .filter(|r| within(r, low, high))
+                .copied()
+                .collect();
+            inner
+        };
+        let (inner_y, inner_x) = (inner(&along_y, left, right), inner(&along_x, top, bottom));
+        let length = |rules: &[Rule]| {
+            rules
+                .iter()
+                .map(|r| r.length as f64 * PIXEL_MM)
+                .sum::<f64>()
+        };
+        Self {
+            cells,
+            text,
+            inside,
+            inner_rules: inner_y
+                .iter()
+                .map(|rule| (rule.at + 0.5) / CELL as f64)
+                .collect(),
+            rule_lengths_mm: [length(&inner_y), length(&inner_x)],
+        }
+    }
+
+    /// Erases the ornaments of a strip at the fold.
+    pub(super) fn erase_ornaments(&mut self, strip: &Column) {
+        let [left, right] = strip.across.map(|x| x * CELL);
+        let height = self.text.height();
+        let part = Mask::from_fn(right - left, height, |x, y| self.text.at(left + x, y));
+        let solid = find_solid(&part, (SOLID * (right - left) as f64) as usize);
+        for y in 0..height {
+            for x in (left..right).filter(|x| solid.at(x - left, y)) {
+                self.text.set(x, y, false);
+                if y / CELL < self.cells.height() {
+                    self.cells.set(x / CELL, y / CELL, 0.0);
+                }
+            }
+        }
+    }
+
+    /// Returns the mean of the cells at each position across, inside the frame.
+    pub(super) fn profile_across(&self) -> Vec<f64> {
+        let [left, top, right, bottom] = self.inside;
+        let mut sums = vec![0.0_f64; right - left];
+        for y in top..bottom {
+            for (sum, cell) in sums.iter_mut().zip(&self.cells.row(y)[left..right]) {
+                *sum += f64::from(*cell);
+            }
+        }
+        let rows = (bottom - top).max(1) as f64;
+        sums.into_iter().map(|sum| sum / rows).collect()
+    }
+
+    /// Returns the mean of the cells at each position along y, inside the frame.
+    pub(super) fn profile_along(&self) -> Vec<f64> {
+        let [left, top, right, bottom] = self.inside;
+        let mean = |y: usize| {
+            let row = &self.cells.row(y)[left..right];
+            row.iter().map(|cell| f64::from(*cell)).sum::<f64>() / row.len().max(1) as f64
+        };
+        (top..bottom).map(mean).collect()
+    }
+}
+
+/// Returns the means of the strokes that relief and ink show together, apart from what was erased.
+fn cells(image: &TextImage, erased: &Mask) -> Grid<f32> {
+    let (width, height) = (erased.width() / CELL, erased.height() / CELL);
+    let scale = 1.0 / (2 * 255 * CELL * CELL) as f32;
+    Grid::from_fn(width, height, |x, y| {
+        let mut sum = 0_u32;
+        let trust = image.trust_at(x * CELL, y * CELL);
+        for row in y * CELL..(y + 1) * CELL {
+            for column in x * CELL..(x + 1) * CELL {
+                if erased.at(column, row) {
+                    return 0.0;
+                }
+                let relief = u32::from(image.relief.at(column, row));
+                let ink = u32::from(image.ink.at(column, row));
+                sum += match trust {
+                    Trust::Both => relief + ink,
+                    Trust::Relief => 2 * relief,
+                    Trust::Ink => 2 * ink,
+                };
+            }
+        }
+        sum as f32 * scale
+    })
+}
+
+/// Returns the sums of the cells of each column or row.
+fn sums(cells: &Grid<f32>, of_rows: bool) -> Vec<f64> {
+    let mut sums = vec![
+        0.0;
+        if of_rows {
+            cells.height()
+        } else {
+            cells.width()
+        }
+    ];
+    for y in 0..cells.height() {
+        for (x, cell) in cells.row(y).iter().enumerate() {
+            sums[if of_rows { y } else { x }] += f64::from(*cell);
+        }
+    }
+    sums
+}
+
+/// Returns the first cell inside the frame and the one after the last. Without a rule that has nearly all strokes on one
+/// side, the text itself decides.
+fn frame(rules: &[Rule], sums: &[f64]) -> (usize, usize) {
+    let count = sums.len();
+    let all: f64 = sums.iter().sum();
+    let cell = |at: f64| ((at.max(0.0) / CELL as f64) as usize).min(count);
+    let near = FRAME_MM / PIXEL_MM;
+    let beyond = |from: usize, to: usize| sums[from..to].iter().sum::<f64>() <= BEYOND_FRAME * all;
+    let mut low = None;
+    let mut high = None;
+    if let (Some(first), Some(last)) = (rules.first(), rules.last()) {
+        let inner = rules.iter().take_while(|r| r.at <= first.at + near).last();
+        low = inner
+            .map(|rule| cell(rule.edges[1]) + 1)
+            .filter(|low| beyond(0, *low));
+        let inner = rules
+            .iter()
+            .rev()
+            .take_while(|r| r.at >= last.at - near)
+            .last();
+        high = inner
+            .map(|rule| cell(rule.edges[0]))
+            .filter(|high| beyond(*high, count));
+    }
+    let text = |share: f64| {
+        let mut sum = 0.0;
+        sums.iter().position(|value| {
+            sum += value;
+            sum > share * all
+        })
+    };
+    let low = low.or_else(|| text(0.002)).unwrap_or(0);
+    let high = high
+        .or_else(|| text(0.998).map(|at| at + 1))
+        .unwrap_or(count);
+    if low + 1 < high {
+        (low, high)
+    } else {
+        (0, count)
+    }
+}

@@ -1,0 +1,180 @@
+//! Finds the characters of a page without labels, on relief and ink together.
+
+mod column_profile;
+mod columns;
+mod direction;
+mod layout;
+mod places;
+mod rows;
+mod rules;
+mod skew;
+mod text_image;
+
+use serde::{Deserialize, Serialize};
+
+use self::columns::find_columns;
+use self::direction::Upright;
+use self::layout::CELL_MM;
+use self::places::{Half, Place, Strokes, measure, places};
+use self::rows::{RowPitches, find_rows};
+use super::align::Face;
+use super::page_ink::PageInk;
+use super::page_map::PageMap;
+
+/// Least area of a character, mm^2, and least length of its longer side, in pitches.
+const MIN_AREA_MM2: f64 = 0.8;
+const MIN_SIDE: f64 = 0.25;
+/// Least mean relief below the ink of a character.
+const MIN_SUPPORT: f64 = 0.08;
+/// Least share of the relief of a character that is printed.
+const MIN_PRINTED: f64 = 0.5;
+/// Largest share of a character's strokes where the page does not show the block.
+const MAX_UNSEEN: f64 = 0.5;
+
+/// What a character loses in confidence when all of its strokes were divided.
+const DIVIDED_DOUBT: f64 = 0.5;
+
+/// Half of a row of notes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoteHalf {
+    /// The right half, which is read first: `a`.
+    Right,
+    /// The left half: `b`.
+    Left,
+}
+
+/// A character that was found on a page.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FoundBox {
+    /// Left, top, right and bottom edge of its ink on the page, pixels; (0, 0) is the centre of the first pixel.
+    pub page_box: [f64; 4],
+    /// Number of the column from the right, from 1. The strip at the fold is a column.
+    pub column: u32,
+    /// Number of the row in its column from the top, from 1. Blanks do not count; two notes side by side are a row.
+    pub row: u32,
+    /// Half of a row of notes.
+    pub half: Option<NoteHalf>,
+    /// How sure it is that the box holds one whole character, 0..=1.
+    pub confidence: f64,
+}
+
+impl FoundBox {
+    /// Returns the name by column and row, such as `c03-r12` or `c03-r12a`.
+    pub fn name(&self) -> String {
+        let half = match self.half {
+            None => "",
+            Some(NoteHalf::Right) => "a",
+            Some(NoteHalf::Left) => "b",
+        };
+        format!("c{:02}-r{:02}{half}", self.column, self.row)
+    }
+}
+
+/// Finds the characters of a page in reading order: columns from right to left, each from the top.
+pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
+    let mut upright = Upright::of(face, page, map);
+    let Some(columns) = find_columns(&upright.layout) else {
+        return Vec::new();
+    };
+    for strip in columns.columns.iter().filter(|column| column.is_strip) {
+        upright.layout.erase_ornaments(strip);
+    }
+    let (rows, pitches) = find_rows(&upright.layout, &columns);
+    let places = places(&columns, &rows);
+    let strokes = measure(&upright.image, &upright.layout, map, &places);
+    let is_upside_down = upright.is_upside_down(&places, &strokes);
+    numbered(
+        &places,
+        &strokes,
+        &pitches,
+        columns.columns.len(),
+        is_upside_down,
+        page.size(),
+    )
+}
+
+/// Returns whether a place holds a character.
+fn is_character(place: &Place, strokes: &Strokes, pitches: &RowPitches) -> bool {
+    let pitch = if place.half.is_some() {
+        pitches.note
+    } else {
+        pitches.row
+    };
+    let [width, height] = strokes.size_mm();
+    strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
+}
+
+/// Returns the geometric mean of the share of the ink over relief and of the share of the relief that is printed, less if
+/// strokes were divided between this character and its neighbours.
+fn confidence(strokes: &Strokes) -> f64 {
+    let divided = strokes.divided as f64 / strokes.area.max(1) as f64;
+    let agreement = (strokes.support() * strokes.printed).max(0.0).sqrt();
+    (agreement * (1.0 - DIVIDED_DOUBT * divided)).clamp(0.0, 1.0)
+}
+
+/// Returns whether a box lies on the page, with a tolerance of one pixel.
+fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
+    let [left, top, right, bottom] = strokes.page_bounds;
+    left >= -1.5 && top >= -1.5 && right <= width as f64 + 0.5 && bottom <= height as f64 + 0.5
+}
+
+/// Numbers the characters in reading order and leaves out those that the block or the page does not show.
+fn numbered(
+    places: &[Place],
+    strokes: &[Strokes],
+    pitches: &RowPitches,
+    columns: usize,
+    is_upside_down: bool,
+    page_size: [usize; 2],
+) -> Vec<FoundBox> {
+    let mut characters: Vec<(u32, i64, Option<NoteHalf>, &Strokes)> = places
+        .iter()
+        .zip(strokes)
+        .filter(|(place, strokes)| is_character(place, strokes, pitches))
+        .map(|(place, strokes)| {
+            let half = place.half.map(|half| match (half, is_upside_down) {
+                (Half::Right, false) | (Half::Left, true) => NoteHalf::Right,
+                (Half::Left, false) | (Half::Right, true) => NoteHalf::Left,
+            });
+            if is_upside_down {
+                (place.column as u32 + 1, -(place.row as i64), half, strokes)
+            } else {
+                (
+                    (columns - place.column) as u32,
+                    place.row as i64,
+                    half,
+                    strokes,
+                )
+            }
+        })
+        .collect();
+    characters.sort_by_key(|(column, row, half, _)| (*column, *row, *half));
+    let mut boxes = Vec::new();
+    let (mut number, mut before) = (0, None);
+    for (column, row, half, strokes) in characters {
+        if before.is_none_or(|(last, _)| last != column) {
+            number = 0;
+        }
+        if before != Some((column, row)) {
+            number += 1;
+        }
+        before = Some((column, row));
+        let share = |count: usize| count as f64 / strokes.area as f64;
+        if !is_on_page(strokes, page_size)
+            || strokes.printed < MIN_PRINTED
+            || strokes.support() < MIN_SUPPORT
+            || share(strokes.only_relief) > MAX_UNSEEN
+        {
+            continue;
+        }
+        boxes.push(FoundBox {
+            page_box: strokes.page_bounds,
+            column,
+            row: number,
+            half,
+            confidence: confidence(strokes),
+        });
+    }
+    boxes
+}
