@@ -24,18 +24,15 @@ impl AlignmentPrior {
     pub fn is_near(&self, other: &Self, [width, height]: [f64; 2]) -> bool {
         let limit = NEAR_SHARE * width.max(height);
         let places = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5]];
-        let differs = |[u, v]: [f64; 2]| {
+        let is_near = |[u, v]: [f64; 2]| {
             let (x, y) = (u * width, v * height);
-            let Some(point) = self.mesh_point(x, y) else {
-                return true;
-            };
-            let [there_x, there_y, _] = other.print_from_mesh.apply(point);
-            let distance = (there_x - x).hypot(there_y - y);
-            // A distance that is not a number differs.
-            !(distance <= limit)
+            self.mesh_point(x, y).is_some_and(|point| {
+                let [there_x, there_y, _] = other.print_from_mesh.apply(point);
+                (there_x - x).hypot(there_y - y) <= limit
+            })
         };
         (self.confidence - other.confidence).abs() <= NEAR_CONFIDENCE
-            && !places.into_iter().any(differs)
+            && places.into_iter().all(is_near)
     }
 
     /// Returns the point of the mesh at the height 0 that is mapped to a pixel of the print. `None` if the map has no
