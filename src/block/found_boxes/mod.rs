@@ -8,6 +8,8 @@ mod places;
 mod rows;
 mod rules;
 mod skew;
+#[cfg(test)]
+mod tests;
 mod text_image;
 
 use serde::{Deserialize, Serialize};
