@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 
 use super::held::HeldPage;
-use super::outcomes::{AlignOutcome, BoxesOutcome};
 use super::{BlockPipeline, StageContext, output};
-use crate::block::{CharacterBox, PageMap, StoredPageMap, check_label_fit, place_characters};
+use crate::block::{
+    AlignOutcome, BoxesOutcome, CharacterBox, PageMap, StoredPageMap, check_label_fit,
+    place_characters,
+};
 use crate::domain::{BlockStage, FailureClass};
 use crate::labels::{self, PageFile, reading_order};
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
