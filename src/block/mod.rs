@@ -8,6 +8,7 @@ mod coarse;
 mod cut;
 mod error;
 mod face_layer;
+mod face_sampler;
 mod field;
 mod height_map;
 mod label_fit;
