@@ -14,6 +14,8 @@ const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowD
 const MOVE_PX = 80;
 const ZOOM_STEP = 1.4;
 const REGION_WAIT = 120;
+/** Width of the outline of a box on the screen. */
+const STROKE_PX = 2;
 const SVG = "http://www.w3.org/2000/svg";
 
 const language = preferredLanguage();
@@ -58,7 +60,6 @@ class BlockPage {
     new ResizeObserver(() => this.resized()).observe(this.canvas);
     this.show("page");
     this.camera.reset();
-    this.canvas.focus({ preventScroll: true });
   }
 
   /** Creates the controls and the legend. */
@@ -113,8 +114,14 @@ class BlockPage {
     for (const button of this.buttons) button.setAttribute("aria-pressed", button.dataset.layer === layer);
     const entries = layer === "overlay" ? [...OVERLAY_COLOURS, ...STATUSES] : STATUSES;
     const occurs = (key) => !STATUSES.includes(key) || this.block.characters.some((one) => one.status === key);
-    this.legend.replaceChildren(...entries.filter(occurs).map((key) => element("span", { class: `block-mark block-${key}` }, text(key))));
+    this.legend.replaceChildren(...entries.filter(occurs).map((key) => this.mark(key)));
     if (this.camera) this.moved();
+  }
+
+  /** Returns an entry of the legend: an outline for a status, a colour for the overlay. */
+  mark(key) {
+    const kind = STATUSES.includes(key) ? "block-outline" : "block-mark";
+    return element("span", { class: `${kind} block-${key}` }, text(key));
   }
 
   toggleBoxes() {
@@ -139,6 +146,7 @@ class BlockPage {
     const { x, y, zoom } = this.camera;
     this.wholeZoom ??= zoom;
     this.stage.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`;
+    this.stage.style.setProperty("--block-stroke", `${STROKE_PX / zoom}px`);
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => this.loadRegion(), REGION_WAIT);
   }
@@ -203,7 +211,7 @@ class BlockPage {
     const container = element("div", { class: "scan-frame" }, text("loading"));
     const close = element("button", { type: "button" }, text("close"));
     close.addEventListener("click", () => this.dialog.close());
-    const line = element("p", { class: "block-line" }, `${one.pair ?? ""} ${description(one)}`.trim());
+    const line = element("p", { class: "block-line" }, description(one));
     this.tip.hidden = true;
     this.dialog.replaceChildren(element("div", { class: "block-head" }, line, close), container);
     this.dialog.showModal();

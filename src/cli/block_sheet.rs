@@ -5,7 +5,6 @@ use std::path::Path;
 use serde_json::json;
 
 use super::busy::Busy;
-use super::contact_sheet::ContactSheetArgs;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::files;
@@ -18,26 +17,34 @@ use crate::export::block_view::{BlockView, BlockViewError};
 use crate::raster::png_rgb8;
 use crate::store::Project;
 
+/// What to draw of a block, and where to.
+#[derive(Debug)]
+pub(super) struct BlockSheetOptions<'a> {
+    /// The block as the user typed it.
+    pub(super) block: &'a str,
+    /// Whether to draw relief and ink over each other.
+    pub(super) is_overlay: bool,
+    /// The metric whose results are shown.
+    pub(super) metric: ThresholdMetric,
+    /// The file to write.
+    pub(super) output: Option<&'a Path>,
+}
+
 /// Draws a picture of a block and writes it.
 ///
 /// # Errors
 /// Returns an error if the block does not exist or is not aligned, or if the catalog or the disk fails.
 pub(super) async fn write(
-    block: &str,
-    args: &ContactSheetArgs,
+    options: &BlockSheetOptions<'_>,
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
-    let path = args.output.clone();
-    let default = if args.overlay {
-        "overlay.png"
-    } else {
-        "page.png"
-    };
-    let path = path.unwrap_or_else(|| project.dir().join(default));
+    let default = ["page.png", "overlay.png"][usize::from(options.is_overlay)];
+    let given = options.output.map(Path::to_owned);
+    let path = given.unwrap_or_else(|| project.dir().join(default));
     files::refuse_used_file(&path, &project, &catalog).await?;
     let busy = Busy::start(context, "drawing the page");
-    let drawn = draw(block, args, &project, &catalog, context).await;
+    let drawn = draw(options, &project, &catalog, context).await;
     drop(busy);
     let (png, characters) = drawn?;
     catalog.close().await;
@@ -48,14 +55,13 @@ pub(super) async fn write(
 
 /// Reads and draws a block. Returns the PNG and the number of characters.
 async fn draw(
-    block: &str,
-    args: &ContactSheetArgs,
+    options: &BlockSheetOptions<'_>,
     project: &Project,
     catalog: &Catalog,
     context: &Context,
 ) -> anyhow::Result<(Vec<u8>, usize)> {
-    let view = read(block, args.metric, project, catalog, context).await?;
-    let is_overlay = args.overlay;
+    let view = read(options.block, options.metric, project, catalog, context).await?;
+    let is_overlay = options.is_overlay;
     let draw = move || {
         let picture = if is_overlay {
             view.draw_overlay()

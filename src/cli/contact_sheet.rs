@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::json;
 
-use super::block_sheet;
+use super::block_sheet::{self, BlockSheetOptions};
 use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
@@ -68,7 +68,13 @@ pub(super) async fn contact_sheet(
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
     if let Some(block) = &args.block {
-        return block_sheet::write(block, &args, context).await;
+        let options = BlockSheetOptions {
+            block,
+            is_overlay: args.overlay,
+            metric: args.metric,
+            output: args.output.as_deref(),
+        };
+        return block_sheet::write(&options, context).await;
     }
     let (path, sheet) = write(&args, context).await?;
     context

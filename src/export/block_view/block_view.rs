@@ -39,7 +39,7 @@ pub struct BlockView {
 }
 
 /// Outcomes of the stages of a block, and where its heights and its page are.
-struct BlockSources {
+struct BlockViewSources {
     face: FoundFace,
     files: ArtifactSet,
     map: StoredPageMap,
@@ -62,7 +62,7 @@ impl BlockView {
     ) -> Result<Self, BlockViewError> {
         let detail = catalog.block(name).await?;
         let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
-        let sources = BlockSources::new(name, &detail)?;
+        let sources = BlockViewSources::new(name, &detail)?;
         let (mut characters, mut pairs) = (Vec::new(), Vec::new());
         for stored in catalog.block_characters(name).await? {
             if stored.state == BlockCharacterState::Retired {
@@ -116,7 +116,7 @@ impl BlockView {
     }
 }
 
-impl BlockSources {
+impl BlockViewSources {
     /// Collects the outcomes of a block.
     fn new(name: &BlockName, detail: &BlockDetail) -> Result<Self, BlockViewError> {
         let stage = |stage| detail.stages.iter().find(|one| one.stage == stage);

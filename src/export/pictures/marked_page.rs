@@ -20,7 +20,7 @@ const UNDER_NAME: u16 = 1;
 pub(in crate::export) struct MarkedBox {
     /// Edges in pixels of the picture: left, top, right, bottom.
     pub bounds: [f64; 4],
-    /// Texts for its upper left corner. The first one that fits is written; the last one is shortened.
+    /// Texts at its upper left corner. The first one that fits is written; the last one is shortened.
     pub names: Vec<String>,
     /// Colour of the outline.
     pub outline: [u8; 3],
@@ -45,8 +45,13 @@ pub(in crate::export) fn mark(picture: &mut Rgb, boxes: &[MarkedBox]) {
     for one in boxes {
         outline(picture, one);
     }
-    for one in boxes {
-        name(picture, one);
+    for (index, one) in boxes.iter().enumerate() {
+        let others = boxes
+            .iter()
+            .enumerate()
+            .filter(|(other, _)| *other != index);
+        let others: Vec<[f64; 4]> = others.map(|(_, other)| other.bounds).collect();
+        name(picture, one, &others);
     }
 }
 
@@ -79,38 +84,61 @@ fn outline(picture: &mut Rgb, one: &MarkedBox) {
     fill(picture, [right, y], [OUTLINE, height], one.outline);
 }
 
-fn name(picture: &mut Rgb, one: &MarkedBox) {
+/// Writes the name of a box above it, or within it if there is no space above.
+fn name(picture: &mut Rgb, one: &MarkedBox, others: &[[f64; 4]]) {
     let Some(([x, y], [width, _])) = pixels(picture, one.bounds) else {
         return;
     };
     let space = width.saturating_sub(2 * OUTLINE + 2);
-    let sizes = one
-        .names
+    let Some((text, size)) = fitting_name(&one.names, space) else {
+        return;
+    };
+    let tag = [text_width(&text, size) + 2, line_height(size)];
+    let end = x as f64 + tag[0] as f64;
+    let above = y as f64 - tag[1] as f64;
+    let is_free = |other: &[f64; 4]| {
+        let [left, top, right, bottom] = *other;
+        right <= x as f64 || left >= end || bottom <= above || top >= y as f64
+    };
+    let at = if above >= 0.0 && others.iter().all(is_free) {
+        [x, y - tag[1]]
+    } else {
+        [x + OUTLINE, y + OUTLINE]
+    };
+    tint(picture, at, tag, one.tag);
+    write(picture, &text, [at[0] + 1, at[1]], size, TEXT);
+}
+
+/// Returns the first name that fits into a width in pixels at any size, and the size; the last one is shortened. Returns
+/// `None` if there are no names.
+fn fitting_name(names: &[String], space: usize) -> Option<(String, f32)> {
+    let sizes = names
         .iter()
         .flat_map(|text| NAME_FONTS.map(|size| (text, size)));
     let fitting = sizes
         .into_iter()
         .find(|(text, size)| text_width(text, *size) <= space);
+    if let Some((text, size)) = fitting {
+        return Some((text.clone(), size));
+    }
     let smallest = NAME_FONTS[NAME_FONTS.len() - 1];
-    let (text, size) = match (fitting, one.names.last()) {
-        (Some((text, size)), _) => (text.clone(), size),
-        (None, Some(text)) => (cut_in_middle(text, space, smallest), smallest),
-        (None, None) => return,
-    };
-    let (at, height) = ([x + OUTLINE, y + OUTLINE], line_height(size));
-    let tag = [text_width(&text, size) + 2, height];
-    for y in at[1]..(at[1] + tag[1]).min(picture.height()) {
-        for x in at[0]..(at[0] + tag[0]).min(picture.width()) {
+    let last = names.last()?;
+    Some((cut_in_middle(last, space, smallest), smallest))
+}
+
+/// Mixes a colour into a rectangle, clipped.
+fn tint(picture: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
+    for y in at[1]..(at[1] + size[1]).min(picture.height()) {
+        for x in at[0]..(at[0] + size[0]).min(picture.width()) {
             let below = picture.at(x, y);
             let mixed = |k: usize| {
                 let sum =
-                    UNDER_NAME * u16::from(below[k]) + (4 - UNDER_NAME) * u16::from(one.tag[k]);
+                    UNDER_NAME * u16::from(below[k]) + (4 - UNDER_NAME) * u16::from(colour[k]);
                 (sum / 4) as u8
             };
             picture.set(x, y, [0, 1, 2].map(mixed));
         }
     }
-    write(picture, &text, [at[0] + 1, at[1]], size, TEXT);
 }
 
 /// Returns a picture below a legend. The entries of the legend continue on more lines if the picture is narrow.
@@ -176,6 +204,24 @@ mod tests {
         let beyond = (70..200).flat_map(|x| (0..120).map(move |y| (x, y)));
         let narrow_only = beyond.filter(|(x, y)| narrow.at(*x, *y) != [255; 3]);
         assert_eq!(narrow_only.count(), 0, "nothing is written beside the box");
+    }
+
+    #[test]
+    fn a_name_is_above_its_box_unless_another_box_is_there() {
+        let name_within = |second: [f64; 4]| {
+            let mut picture = Rgb::new(200, 200, [255; 3]);
+            let boxes = [[20.0, 100.0, 180.0, 190.0], second].map(|bounds| MarkedBox {
+                bounds,
+                names: vec!["c01-r02".to_owned()],
+                outline: BLUE,
+                tag: [200, 255, 255],
+            });
+            mark(&mut picture, &boxes);
+            picture.at(25, 105) == [213, 255, 255]
+        };
+        assert!(!name_within([20.0, 30.0, 180.0, 60.0]));
+        assert!(name_within([20.0, 30.0, 180.0, 97.0]));
+        assert!(name_within([20.0, 10.0, 180.0, 85.0]));
     }
 
     #[test]
