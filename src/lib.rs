@@ -191,6 +191,13 @@
 //! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
+//! ## Seeing a block
+//!
+//! `src/export/block_view` reads the stored results of a block again: `block_view.rs` the files, `page_layers.rs` draws any
+//! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
+//! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
+//! the same layers, and for the 3D view of a character's pair.
+//!
 //! ## Modules
 //!
 //! `tests/it/layers.rs` checks that a top-level module imports only the modules in its line, that
@@ -216,9 +223,9 @@
 //! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `block`, `labels`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of blocks and of reports | `domain`, `mesh`, `raster`, `block`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
-//! | `view` | the page that shows one scan on its print in 3D | `local_server`, `export` |
+//! | `view` | the pages that show one scan on its print in 3D, or a whole block | `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner`, `platform` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 
 use super::held::HeldPage;
-use super::outcomes::{AlignOutcome, BoxesOutcome};
 use super::{BlockPipeline, StageContext, output};
 use crate::block::{
-    CharacterBox, Face, PageMap, StoredPageMap, check_label_fit, find_boxes, place_characters,
+    AlignOutcome, BoxesOutcome, CharacterBox, Face, PageMap, StoredPageMap, check_label_fit,
+    find_boxes, place_characters,
 };
 use crate::domain::{BlockStage, FailureClass};
 use crate::labels::{self, PageFile, reading_order};

@@ -5,12 +5,11 @@ use std::io;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome};
 use super::scan_stream::ScanStream;
 use super::{BlockPipeline, StageContext, failed, output};
 use crate::block::{
-    BlockError, CharacterMap, CutError, CutPlan, PageMap, PlacedCharacter, PrintCrop, cut_meshes,
-    cut_print,
+    AlignOutcome, BlockError, BoxesOutcome, CharacterMap, CutError, CutOutcome, CutPlan,
+    FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
 use crate::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
 use crate::mesh::write::MeshFormat;
