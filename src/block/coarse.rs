@@ -301,7 +301,7 @@ impl PageTarget {
         fft.inverse(&mut square);
         let scale = 1.0 / (SIZE * SIZE) as f32;
         let [half_x, half_y] = face.half_extent;
-        let half = if turns % 2 == 0 {
+        let half = if turns.is_multiple_of(2) {
             [half_x, half_y]
         } else {
             [half_y, half_x]

@@ -1,8 +1,8 @@
 //! The two pictures of a block: the page with the boxes of its characters, and relief and ink over each other.
 
-use super::block_view::BlockView;
 use super::characters::{CharacterStatus, CharacterView, PositionConfidence};
 use super::page_layers::{BOTH, INK_BESIDE, PageLayer, PageLayers};
+use super::page_view::BlockView;
 use crate::export::pictures::{
     BLUE, LegendEntry, MarkedBox, PictureLegend, Rgb, VERMILLION, mark, with_legend,
 };

@@ -3,11 +3,11 @@
 
 mod block_error;
 mod block_sheets;
-mod block_view;
 mod characters;
 mod page_layers;
+mod page_view;
 
 pub use block_error::BlockViewError;
-pub use block_view::BlockView;
 pub use characters::{CharacterStatus, CharacterView};
 pub use page_layers::{PageLayer, PageLayers, PageRegion};
+pub use page_view::BlockView;
