@@ -4,11 +4,13 @@ use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
 use super::coarse::{self, CoarsePosition, CoarseRange};
 use super::error::BlockError;
 use super::field::ShiftField;
-use super::height_map::{HEIGHT_STEP_MM, HeightMap, StoredHeights};
+use super::height_map::{HEIGHT_STEP_MM, HeightMap};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
-use super::windows::{ShrunkRelief, WindowSizes, match_windows};
+use super::stored_heights::StoredHeights;
+use super::window_images::ShrunkRelief;
+use super::windows::{WindowSizes, match_windows};
 use crate::raster::Grid;
 
 /// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,

@@ -8,7 +8,8 @@ use super::align::Face;
 use super::field::ShiftField;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
-use super::windows::{ShrunkRelief, WarpedInk, Window, WindowMatch, match_window};
+use super::window_images::{ShrunkRelief, WarpedInk, Window};
+use super::windows::{WindowMatch, match_window};
 
 /// Margin around a character's box whose relief and ink are compared, mm.
 const MARGIN_MM: f64 = 0.8;

@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftDirection, FftPlannerAvx};
 
 use super::page_ink::PageInk;
-use super::windows::ShrunkRelief;
+use super::window_images::ShrunkRelief;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::raster::blur::gaussian_blur;

@@ -18,8 +18,11 @@ mod outcomes;
 mod page_ink;
 mod page_map;
 mod relief;
+mod stored_heights;
 #[cfg(test)]
 mod test_world;
+mod window_images;
+mod window_template;
 mod windows;
 
 pub use agreement::{Agreement, Support};
@@ -29,11 +32,12 @@ pub use characters::{CharacterBox, PlacedCharacter, PlacedCharacters, place_char
 pub use cut::{CutError, CutPlan, PrintCrop, cut_meshes, cut_print};
 pub use error::BlockError;
 pub use found_boxes::{FoundBox, NoteHalf, find_boxes};
-pub use height_map::{HEIGHT_STEP_MM, HeightHeader, HeightMap, StoredHeights, draw_height_maps};
+pub use height_map::{HEIGHT_STEP_MM, HeightMap, draw_height_maps};
 pub use label_fit::{LabelFit, check_label_fit};
 pub use orientation::Orientation;
 pub use outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome, FoundFace, heights_role};
 pub use page_ink::{InkSampler, PageInk};
 pub use page_map::{PageMap, StoredPageMap};
 pub use relief::Relief;
+pub use stored_heights::{HeightHeader, StoredHeights};
 pub use windows::WindowMatch;

@@ -4,9 +4,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::align::Face;
-use super::height_map::{HEIGHT_STEP_MM, HeightHeader, StoredHeights};
+use super::height_map::HEIGHT_STEP_MM;
 use super::orientation::Orientation;
 use super::page_ink::PageInk;
+use super::page_map::PageMap;
+use super::stored_heights::{HeightHeader, StoredHeights};
+use super::window_images::ShrunkRelief;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
@@ -120,6 +123,17 @@ impl TestWorld {
         let face_from_page = page_from_face.inverse().expect("an invertible map");
         self.page(size, |page| face_from_page.apply(page))
     }
+}
+
+/// Returns a relief and its page, and a map that is wrong by 0.62 mm and -0.47 mm.
+pub(super) fn shifted_world(shrink: usize) -> (ShrunkRelief, PageInk, PageMap) {
+    let world = TestWorld::new(8);
+    let face = world.face();
+    let truth = Affine2::scale_shift(8.0, [40.0, 40.0]);
+    let page = world.affine_page([1280, 880], &truth);
+    let wrong = Affine2::scale_shift(8.0, [40.0 - 8.0 * 0.62, 40.0 + 8.0 * 0.47]);
+    let map = PageMap::affine(&wrong, [0.0; 2], SIDES_MM);
+    (ShrunkRelief::of(&face.map, &face.relief, shrink), page, map)
 }
 
 /// Returns the frame of a mesh whose coordinates are u, v and n in mm.

@@ -15,7 +15,10 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("toml", &["cli", "config"]),
     ("pulp", &["simd"]),
     ("quick_xml", &["labels"]),
-    ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
+    (
+        "nalgebra",
+        &["block", "stages", "demo", "mesh", "raster", "report"],
+    ),
 ];
 
 /// Modules without files, processes, clocks and async code.
