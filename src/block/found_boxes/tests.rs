@@ -150,6 +150,7 @@ impl Drawing {
                 soft,
                 face,
                 surface: Grid::new(4, 4, 1.0),
+                angle_rad: 0.0,
             },
         }
     }
@@ -305,15 +306,15 @@ fn characters_that_the_block_lost_are_counted_only() {
 #[test]
 fn a_worn_character_is_less_sure() {
     let mut drawing = Drawing::full(|_, _| false);
-    let [left, top, right, _] = cell(1, 1);
-    let middle = f64::midpoint(left, right);
-    // Half of the lower stroke is not carved.
-    drawing.relief.retain(|[u0, v0, u1, _]| {
-        !(*v0 > top + 5.0 && *v0 < top + ROW_MM && u1 - u0 > 5.0 && *u0 >= left - 1.0)
-    });
+    let [left, top, _, bottom] = cell(1, 1);
+    // The lower stroke is printed, but the block has lost it.
+    let is_lower_stroke =
+        |[u0, v0, _, v1]: &Rectangle| *u0 > left && *v0 > top + ROW_MM / 2.0 && *v1 < bottom;
+    drawing.relief.retain(|stroke| !is_lower_stroke(stroke));
+    assert_eq!(drawing.relief.len() + 1, drawing.ink.len());
     let (map, size) = upright();
     let found = drawing.found(&map, size);
-    assert!(middle > 0.0 && found[0].name() == "c01-r01");
+    assert_eq!(found[0].name(), "c01-r01");
     assert!(found[0].confidence < found[1].confidence - 0.1);
     assert!(found[1].confidence > 0.9);
 }
@@ -336,8 +337,9 @@ fn the_angle_of_the_text_is_found() {
     for degrees in [-3.0_f64, 0.0, 2.4] {
         let face = drawing.face(degrees.to_radians());
         let found = text_angle(&face, 0.0).to_degrees();
+        // 0.3 degrees are one pixel of the last round over the height of this small page.
         assert!(
-            (found - degrees).abs() < 0.1,
+            (found - degrees).abs() < 0.3,
             "{degrees} is found as {found}"
         );
     }

@@ -86,9 +86,7 @@ pub(super) struct TextImage {
     pub(super) relief: Grid<u8>,
     /// Soft ink, 0..=255; 0 outside the page.
     pub(super) ink: Grid<u8>,
-    /// Whether a pixel is on the page, in cells of [`TRUST_CELL`] pixels.
-    pub(super) on_page: Grid<bool>,
-    /// Which of the two images shows the text, in the same cells.
+    /// Which of the two images shows the text, in cells of [`TRUST_CELL`] pixels.
     pub(super) trust: Grid<Trust>,
 }
 
@@ -134,7 +132,6 @@ impl TextImage {
             frame,
             relief,
             ink,
-            on_page,
             trust,
         }
     }
