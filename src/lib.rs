@@ -55,6 +55,31 @@
 //! text of a cell).
 //! `src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
+//! ## Whole blocks
+//!
+//! A whole **block** is the scan of a carved face with the image of its page. Its job has the stages `face`, `align`,
+//! `boxes` and `cut`, and rows of its own in the catalog (`catalog/blocks`). A process works on one block at a time, and on
+//! pairs only while it has no block: `block_slot.rs` in `runner` leases it, `block_task.rs` reads the versions of its
+//! files and computes a stage on a thread, and `block_checkpoint.rs` stores the result before the next stage begins. The
+//! stages are called through the trait in `block_stages.rs`. `catalog/blocks/cut.rs` stores the last stage and its pairs in
+//! one transaction: it adds new pairs, sends changed ones back to the first stage, and retires those whose boxes are gone.
+//! A retired pair has no row in `job`, only one in `retired_pair` (`catalog/blocks/retired.rs`), so that no other statement
+//! has to leave it out. `catalog/blocks/staleness.rs` compares what each result was made with (settings, hashes of the
+//! files, attributes) with the present, for the start of a run and for `--dry-run`.
+//!
+//! `runner/block_pipeline` reads the files of each stage and calls pure functions of `block`. Read them in this order:
+//!
+//! - `face`: `block/orientation.rs` (the direction of the face), `height_map.rs` (heights of both sides), `face_layer.rs`
+//!   (the face without holder and walls)
+//! - `align`: `relief.rs` and `page_ink.rs` (soft strokes of face and page), `align.rs` (all steps), `coarse.rs` (first
+//!   positions by FFT), `windows.rs` (local shifts), `field.rs` (a smooth field of shifts), `page_map.rs` (the map of the
+//!   face to the page), `agreement.rs` (whether the page belongs to the block)
+//! - `boxes`: `labels/read.rs` and `block/label_fit.rs`, or `block/found_boxes/mod.rs`; then `characters.rs` (the place of
+//!   each character, and how sure it is)
+//! - `cut`: `cut.rs` (meshes and prints), `character_map.rs` (the maps of a character)
+//!
+//! `register` gets the pose that the block expects of a cut pair (`domain/alignment_prior.rs`).
+//!
 //! ## Two databases
 //!
 //! The catalog is a file of SQLite, or in PostgreSQL so that several computers can share it. `db/conn.rs` holds a connection
@@ -166,6 +191,13 @@
 //! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
+//! ## Seeing a block
+//!
+//! `src/export/block_view` reads the stored results of a block again: `block_view.rs` the files, `page_layers.rs` draws any
+//! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
+//! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
+//! the same layers, and for the 3D view of a character's pair.
+//!
 //! ## Modules
 //!
 //! `tests/it/layers.rs` checks that a top-level module imports only the modules in its line, that
@@ -191,9 +223,9 @@
 //! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `block`, `labels`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `mesh`, `raster`, `store`, `catalog`, `report` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of blocks and of reports | `domain`, `mesh`, `raster`, `block`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
-//! | `view` | the page that shows one scan on its print in 3D | `local_server`, `export` |
+//! | `view` | the pages that show one scan on its print in 3D, or a whole block | `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner`, `platform` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |

@@ -80,7 +80,7 @@ fn align(
         .map_err(StageError::from)?;
     let registered = times
         .book(Part::Register, || {
-            pipeline::register(&depth, &normalized, settings)
+            pipeline::register(&depth, &normalized, None, settings)
         })
         .map_err(StageError::from)?;
     let aligned = AlignedPair {

@@ -97,7 +97,7 @@ impl Worker {
         let normalized = pipeline::normalize(&depth, &print, settings)?;
         let masks = normalized.prints.iter().map(encode);
         writes.push(self.write(masks.map(|grey| raster::png_grey8(&grey)).collect()));
-        let registered = pipeline::register(&depth, &normalized, settings)?;
+        let registered = pipeline::register(&depth, &normalized, None, settings)?;
         let canvases = [&registered.canvas_print].into_iter();
         let canvases = canvases.chain(&registered.canvas_depths);
         let mut files: Vec<Vec<u8>> = canvases.map(raster::png_mask).collect();

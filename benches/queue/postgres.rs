@@ -126,5 +126,6 @@ fn row(number: usize) -> anyhow::Result<ImportRow> {
         character: None,
         block: None,
         meta: serde_json::Map::new(),
+        prior: None,
     })
 }

@@ -56,6 +56,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
         drop(register::register(
             &aligned.depth,
             &aligned.normalized,
+            None,
             &settings.register,
         ));
     });

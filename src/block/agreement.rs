@@ -16,6 +16,8 @@ const AGREEMENT_NCC: f64 = 0.5;
 /// most 0.54 and 0.49.
 pub(super) const MIN_AGREEMENT: f64 = 0.68;
 const MIN_MEDIAN_NCC: f64 = 0.6;
+/// Fewer windows prove nothing: about 30 cm2 of text.
+const MIN_WINDOWS: usize = 60;
 /// A part of the face is accepted alone if it has at least this share of the windows.
 const MIN_PART: f64 = 0.25;
 /// Spacing of [`Support`], and the distance over which windows are counted, mm.
@@ -93,8 +95,10 @@ impl Agreement {
     /// Returns whether the page belongs to the block, or at least to a large part of it.
     pub(super) fn is_sure(&self) -> bool {
         let enough = |share: f64, ncc: f64| share >= MIN_AGREEMENT && ncc >= MIN_MEDIAN_NCC;
-        enough(self.share, self.median_ncc)
-            || self.part >= MIN_PART && enough(self.part_share, self.part_ncc)
+        (self.windows >= MIN_WINDOWS && enough(self.share, self.median_ncc))
+            || (self.windows as f64 * self.part >= MIN_WINDOWS as f64
+                && self.part >= MIN_PART
+                && enough(self.part_share, self.part_ncc))
     }
 
     /// Returns a number that orders alignments.
@@ -171,4 +175,56 @@ pub(super) fn mean_near(windows: &[WindowMatch], field: &ShiftField, reach_mm: f
         .map(|window| window.ncc)
         .sum();
     sum / windows.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Agreement, ShiftField};
+    use crate::block::WindowMatch;
+
+    /// Windows every 6 mm; those with u below `right_until` agree.
+    fn agreement(right_until: f64) -> (Agreement, super::Support) {
+        let places = (0..50).flat_map(|x| (0..34).map(move |y| [x, y]));
+        let windows: Vec<WindowMatch> = places
+            .map(|[x, y]| {
+                let at = [f64::from(x) * 6.0, f64::from(y) * 6.0];
+                let is_right = at[0] < right_until;
+                let scatter = [(x * 7 + y * 3) % 11, (x * 5 + y * 7) % 13];
+                WindowMatch {
+                    at,
+                    shift: if is_right {
+                        [0.2, -0.1]
+                    } else {
+                        [
+                            f64::from(scatter[0]) / 3.0 - 1.8,
+                            f64::from(scatter[1]) / 3.0 - 2.0,
+                        ]
+                    },
+                    ncc: if is_right { 0.85 } else { 0.45 },
+                    curvature: [0.2, 0.2, 0.0],
+                }
+            })
+            .collect();
+        let field = ShiftField::fit(&windows, 45.0, Some(12.0)).unwrap();
+        Agreement::of(&windows, &field)
+    }
+
+    #[test]
+    fn pages_that_agree_everywhere_or_in_a_large_part_are_accepted() {
+        let (whole, _) = agreement(1_000.0);
+        assert!(whole.is_sure() && whole.share > 0.99, "{whole:?}");
+        let (part, support) = agreement(150.0);
+        assert!(part.is_sure(), "{part:?}");
+        assert!(support.at([60.0, 100.0]) > 0.9);
+        assert!(support.at([260.0, 100.0]) < 0.4);
+        assert_eq!(support.at([900.0, 100.0]), 0.0);
+    }
+
+    #[test]
+    fn pages_that_agree_nowhere_or_in_a_corner_are_refused() {
+        for right_until in [-1.0, 30.0] {
+            let (agreement, _) = agreement(right_until);
+            assert!(!agreement.is_sure(), "{agreement:?}");
+        }
+    }
 }

@@ -22,7 +22,7 @@ const ANGLE_STEP_DEG: f64 = 1.5;
 const SCALE_RATIOS: [f64; 9] = [0.88, 0.91, 0.94, 0.97, 1.0, 1.03, 1.06, 1.09, 1.12];
 /// Scales of the second search, page pixels per mm, and the ratio of two neighbours.
 const WIDE_SCALES: [f64; 2] = [4.0, 30.0];
-const WIDE_RATIO: f64 = 1.03;
+const WIDE_RATIO: f64 = 1.035;
 /// Positions of each side that are compared by windows.
 const CANDIDATES: usize = 5;
 /// Windows that compare positions, and the distance over which their shifts are smooth, mm.
@@ -111,6 +111,7 @@ impl SearchRange {
                 .unwrap_or_default()
         };
         CoarseRange {
+            angle_rad: side.relief.angle_rad,
             angles: (-steps..=steps).map(angle).collect(),
             scales,
             min_overlap: if self == Self::AllScales { 0.3 } else { 0.6 },
@@ -259,4 +260,98 @@ fn extent(weights: &Grid<f32>) -> Option<f64> {
     let (x, y) = (x1 / all, y1 / all);
     let determinant = (xx / all - x * x) * (yy / all - y * y) - (xy / all - x * y).powi(2);
     (determinant > 0.0).then(|| determinant.powf(0.25))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_world::{SIDES_MM, TestWorld};
+    use super::{Alignment, Face, align};
+    use crate::block::{BlockError, PageInk};
+    use crate::domain::Affine2;
+
+    fn aligned(world: &TestWorld, page: &PageInk) -> Result<Alignment, BlockError> {
+        let face: Face = world.face();
+        align(&[&face], page)
+    }
+
+    /// Returns the largest error of a map at points of the face, mm.
+    fn error_mm(found: &Alignment, page_from_face: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
+        let points = (1..10).flat_map(|x| (1..10).map(move |y| [x, y]));
+        points
+            .map(|[x, y]| {
+                let face = [
+                    f64::from(x) / 10.0 * SIDES_MM[0],
+                    f64::from(y) / 10.0 * SIDES_MM[1],
+                ];
+                let (a, b) = (found.map.page_from_face(face), page_from_face(face));
+                (a[0] - b[0]).hypot(a[1] - b[1]) / found.map.scale()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_turned_page_is_aligned_to_a_tenth_of_a_millimetre() {
+        let world = TestWorld::new(1);
+        for (quarter, size) in [(0, [1300, 900]), (1, [900, 1300]), (2, [1300, 900])] {
+            let angle = f64::from(quarter) * std::f64::consts::FRAC_PI_2 + 0.05;
+            let rotation = Affine2::similarity(7.6, angle, [0.0; 2]);
+            let middle = rotation.apply(SIDES_MM.map(|side| side / 2.0));
+            let shift = [0, 1].map(|k: usize| size[k] as f64 / 2.0 + 12.0 - middle[k]);
+            let map = Affine2::similarity(7.6, angle, shift);
+            let found = aligned(&world, &world.affine_page(size, &map)).unwrap();
+            let error = error_mm(&found, |face| map.apply(face));
+            assert!(error < 0.1, "{error} mm after {quarter} quarter turns");
+            assert_eq!(found.map.quarter_turns(), quarter as u8);
+        }
+    }
+
+    #[test]
+    fn a_warped_page_is_followed() {
+        let world = TestWorld::new(2);
+        let warp = |[u, v]: [f64; 2]| {
+            [
+                8.0 * (u + 0.8 * (v / 20.0).sin()) + 40.0,
+                8.0 * (v + 0.6 * (u / 25.0).cos()) + 30.0,
+            ]
+        };
+        let page = world.page([1290, 880], |[x, y]| {
+            let mut face = [(x - 40.0) / 8.0, (y - 30.0) / 8.0];
+            for _ in 0..8 {
+                let at = warp(face);
+                face = [face[0] + (x - at[0]) / 8.0, face[1] + (y - at[1]) / 8.0];
+            }
+            face
+        });
+        let found = aligned(&world, &page).unwrap();
+        let error = error_mm(&found, warp);
+        assert!(error < 0.15, "{error} mm");
+    }
+
+    #[test]
+    fn a_page_that_shows_half_of_the_face_is_aligned() {
+        let world = TestWorld::new(3);
+        let map = Affine2::scale_shift(9.0, [20.0, 20.0]);
+        let half = world.affine_page([20 + 9 * 75, 940], &map);
+        let found = aligned(&world, &half).unwrap();
+        let at = [40.0, 50.0];
+        let (a, b) = (found.map.page_from_face(at), map.apply(at));
+        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1.0);
+        assert!(found.support.at(at) > 0.9);
+    }
+
+    #[test]
+    fn the_page_of_another_block_is_refused() {
+        let map = Affine2::scale_shift(8.0, [40.0, 40.0]);
+        let page = TestWorld::new(5).affine_page([1280, 880], &map);
+        let refused = aligned(&TestWorld::new(4), &page);
+        assert!(matches!(refused, Err(BlockError::Refused { .. })));
+    }
+
+    #[test]
+    fn a_mirrored_page_is_refused() {
+        let world = TestWorld::new(6);
+        let map = Affine2([[-8.0, 0.0, 1240.0], [0.0, 8.0, 40.0]]);
+        let refused = aligned(&world, &world.affine_page([1280, 880], &map));
+        assert!(matches!(refused, Err(BlockError::Refused { .. })));
+    }
 }

@@ -4,14 +4,14 @@ use super::align::Face;
 use super::characters::PlacedCharacter;
 use super::page_map::PageMap;
 use super::relief::surface_height;
-use crate::domain::Affine2;
+use crate::domain::{Affine2, PrintFromMesh};
 
 /// The affine map at the middle of a character.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CharacterMap {
     /// Row 1 and 2 give the pixel of the page of a point `[x, y, z, 1]` of the mesh, row 3 its height over the tops of the
     /// strokes in mesh units.
-    pub page_from_mesh: [[f64; 4]; 3],
+    pub page_from_mesh: PrintFromMesh,
 }
 
 impl CharacterMap {
@@ -42,20 +42,66 @@ impl CharacterMap {
             rows[2][3] -= frame.axes[2][axis] * frame.centre[axis];
         }
         Self {
-            page_from_mesh: rows,
+            page_from_mesh: PrintFromMesh(rows),
         }
     }
 
     /// Returns the same map to the pixels of a crop of the page; `None` if the crop has no inverse.
-    pub fn print_from_mesh(&self, page_from_crop: &Affine2) -> Option<[[f64; 4]; 3]> {
+    pub fn print_from_mesh(&self, page_from_crop: &Affine2) -> Option<PrintFromMesh> {
         let crop_from_page = page_from_crop.inverse()?.0;
-        let mut rows = self.page_from_mesh;
+        let page = self.page_from_mesh.0;
+        let mut rows = page;
         for (row, [a, b, c]) in rows.iter_mut().zip(crop_from_page) {
             for axis in 0..4 {
-                row[axis] = a * self.page_from_mesh[0][axis] + b * self.page_from_mesh[1][axis];
+                row[axis] = a * page[0][axis] + b * page[1][axis];
             }
             row[3] += c;
         }
-        Some(rows)
+        Some(PrintFromMesh(rows))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_world::{SIDES_MM, TestWorld};
+    use super::CharacterMap;
+    use crate::block::{CharacterBox, PageMap, Support, place_characters};
+    use crate::domain::Affine2;
+
+    #[test]
+    fn mesh_points_near_the_character_get_the_page_pixels_of_the_map() {
+        let world = TestWorld::new(21);
+        let face = world.face();
+        let affine = Affine2::similarity(8.0, 0.03, [60.0, 30.0]);
+        let page = world.affine_page([1300, 900], &affine);
+        let map = PageMap::affine(&affine, [0.0; 2], SIDES_MM);
+        let [x, y] = affine.apply([68.75, 43.75]);
+        let label = CharacterBox {
+            name: "a".to_owned(),
+            text: None,
+            page_box: [x - 45.0, y - 45.0, x + 45.0, y + 45.0],
+        };
+        let support = Support {
+            origin_mm: [0.0; 2],
+            columns: 16,
+            percent: vec![100; 16 * 11],
+        };
+        let placed = place_characters(&face, &page, (&map, &support), &[label]);
+        let character = &placed.characters[0];
+        assert!(character.confidence > 0.9, "{character:?}");
+        let local = CharacterMap::of(&face, &map, character);
+        // The frame of the mesh is that of the face.
+        let tops = super::surface_height(&face.map, &face.relief.surface, [68.75, 43.75]);
+        let [px, py, height] = local
+            .page_from_mesh
+            .apply([70.0, 42.0, f64::from(tops) - 1.5]);
+        let expected = affine.apply([70.0, 42.0]);
+        assert!((px - expected[0]).abs() < 0.01 && (py - expected[1]).abs() < 0.01);
+        assert!((height + 1.5).abs() < 0.02, "{height}");
+        let crop = Affine2([[0.0, -1.0, 900.0], [1.0, 0.0, 40.0]]);
+        let in_crop = local.print_from_mesh(&crop).unwrap();
+        let [cx, cy, _] = in_crop.apply([70.0, 42.0, 0.0]);
+        let [bx, by] = crop.apply([cx, cy]);
+        assert!((bx - px).abs() < 1e-6 && (by - py).abs() < 1e-6);
     }
 }

@@ -32,6 +32,8 @@ pub(super) struct CoarsePosition {
 /// The rotations and scales to search.
 #[derive(Debug, Clone)]
 pub(super) struct CoarseRange {
+    /// Rotation of the outline of the face, from u to v, radians.
+    pub(super) angle_rad: f64,
     /// Rotations apart from quarter turns, radians.
     pub(super) angles: Vec<f64>,
     /// Scales, page pixels per mm.
@@ -48,7 +50,7 @@ pub(super) fn search(
     page: &PageInk,
     range: &CoarseRange,
 ) -> Vec<CoarsePosition> {
-    let Some(template) = FaceTemplate::of(face) else {
+    let Some(template) = FaceTemplate::of(face, range.angle_rad) else {
         return Vec::new();
     };
     let fft = Fft2::new();
@@ -117,20 +119,24 @@ struct FaceTemplate {
     face: Grid<bool>,
     origin_mm: [f64; 2],
     pixel_mm: f64,
-    /// Middle of the face, mm.
+    /// Middle of the face and half of its width and height along its outline, mm.
     middle_mm: [f64; 2],
+    half_extent_mm: [f64; 2],
 }
 
 /// Spectra of a rotated face, of its mask, and the area of the mask.
 struct FaceSpectra {
     values: Vec<Complex32>,
     mask: Vec<Complex32>,
+    /// Pixels of the face, and the sum of their squares.
     area: f32,
     energy: f32,
+    /// Half of its width and height, pixels.
+    half_extent: [f64; 2],
 }
 
 impl FaceTemplate {
-    fn of(face: &ShrunkRelief) -> Option<Self> {
+    fn of(face: &ShrunkRelief, angle_rad: f64) -> Option<Self> {
         let [left, top, right, bottom] = face.face_bounds()?;
         let weights = face.face.map(|inside| f32::from(u8::from(*inside)));
         let values = difference_of_gaussians(&face.soft, &weights, face.pixel_mm);
@@ -144,6 +150,7 @@ impl FaceTemplate {
                 face.origin_mm[0] + middle(left, right),
                 face.origin_mm[1] + middle(top, bottom),
             ],
+            half_extent_mm: half_extent(face, angle_rad),
         })
     }
 
@@ -189,6 +196,7 @@ impl FaceTemplate {
             mask,
             area,
             energy,
+            half_extent: self.half_extent_mm.map(|half| half / pixel_mm),
         }
     }
 
@@ -213,10 +221,11 @@ impl FaceTemplate {
 
 /// The ink of a page at one scale, transformed.
 struct PageTarget {
-    /// Spectra of the ink and of its squares, and of the page itself.
+    /// Spectra of the ink and of its squares.
     ink: Vec<Complex32>,
     squares: Vec<Complex32>,
-    page: Vec<Complex32>,
+    /// First and last column, and first and last row of the page.
+    bounds: [[f64; 2]; 2],
     /// Pixel of the square at which the page's pixel (0, 0) lies.
     offset: [f64; 2],
 }
@@ -251,9 +260,23 @@ impl PageTarget {
         Self {
             ink: spectrum(&mut values.data().iter().copied()),
             squares: spectrum(&mut values.data().iter().map(|v| v * v)),
-            page: spectrum(&mut weights.data().iter().copied()),
+            bounds: [0, 1].map(|k: usize| {
+                let half = size[k] as f64 / 2.0;
+                [(SIZE / 2) as f64 - half, (SIZE / 2) as f64 + half]
+            }),
             offset,
         }
+    }
+
+    /// Returns the share of a face on the page along an axis, for each position of its middle.
+    fn overlaps(&self, axis: usize, half: f64) -> Vec<f32> {
+        let [first, last] = self.bounds[axis];
+        let share = |at: usize| {
+            let at = at as f64;
+            let common = (at + half).min(last) - (at - half).max(first);
+            (common / (2.0 * half)).clamp(0.0, 1.0) as f32
+        };
+        (0..SIZE).map(share).collect()
     }
 
     /// Returns the highest normalized correlation of a face, turned by quarter turns, and the pixel of its middle.
@@ -264,8 +287,7 @@ impl PageTarget {
         min_overlap: f32,
         fft: &Fft2,
     ) -> (f32, [f64; 2]) {
-        let mut first = vec![Complex32::default(); SIZE * SIZE];
-        let mut second = vec![Complex32::default(); SIZE * SIZE];
+        let mut square = vec![Complex32::default(); SIZE * SIZE];
         let i = Complex32::new(0.0, 1.0);
         for u in 0..SIZE {
             for v in 0..SIZE {
@@ -273,26 +295,31 @@ impl PageTarget {
                 let (values, mask) = (face.values[from].conj(), face.mask[from].conj());
                 let at = u * SIZE + v;
                 // Two real correlations in one inverse transform.
-                first[at] = values * self.ink[at] + i * mask * self.squares[at];
-                second[at] = mask * self.page[at];
+                square[at] = values * self.ink[at] + i * mask * self.squares[at];
             }
         }
-        fft.inverse(&mut first);
-        fft.inverse(&mut second);
+        fft.inverse(&mut square);
         let scale = 1.0 / (SIZE * SIZE) as f32;
-        let least = min_overlap * face.area;
+        let [half_x, half_y] = face.half_extent;
+        let half = if turns % 2 == 0 {
+            [half_x, half_y]
+        } else {
+            [half_y, half_x]
+        };
+        let overlaps = [0, 1].map(|k: usize| self.overlaps(k, half[k]));
+        // Ink below this mean square is noise.
+        let floor = 1e-3 / 255.0 * face.area;
         let (mut best, mut best_at) = (f32::NEG_INFINITY, 0);
-        for (at, (both, page)) in first.iter().zip(&second).enumerate() {
-            let overlap = page.re * scale;
-            if overlap < least {
-                continue;
-            }
-            // The relief beyond the page does not count, so its energy is reduced by the share of the overlap.
-            let share = (overlap / face.area).min(1.0);
-            let energy = (both.im * scale).max(1e-3 * overlap / 255.0) * face.energy * share;
-            let score = both.re * scale / energy.sqrt() * share.sqrt();
-            if score > best {
-                (best, best_at) = (score, at);
+        for (y, row) in square.chunks_exact(SIZE).enumerate() {
+            for (x, both) in row.iter().enumerate() {
+                if overlaps[0][x] * overlaps[1][y] < min_overlap {
+                    continue;
+                }
+                let energy = (both.im * scale).max(floor) * face.energy;
+                let score = both.re * scale / energy.sqrt();
+                if score > best {
+                    (best, best_at) = (score, y * SIZE + x);
+                }
             }
         }
         // Spectra are transposed twice, so the result is in row-major order.
@@ -310,6 +337,29 @@ const fn quarter_turned(u: usize, v: usize, turns: usize) -> usize {
         2 => u_back * SIZE + v_back,
         _ => v_back * SIZE + u,
     }
+}
+
+/// Returns half of the width and height of a face, whose outline is rotated by an angle, mm.
+fn half_extent(face: &ShrunkRelief, angle_rad: f64) -> [f64; 2] {
+    let (sin, cos) = angle_rad.sin_cos();
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for y in 0..face.face.height() {
+        let row = face.face.row(y);
+        let ends = [
+            row.iter().position(|set| *set),
+            row.iter().rposition(|set| *set),
+        ];
+        for x in ends.into_iter().flatten() {
+            let (x, y) = (x as f64, y as f64);
+            for (bounds, at) in bounds
+                .iter_mut()
+                .zip([cos * x + sin * y, cos * y - sin * x])
+            {
+                *bounds = [bounds[0].min(at), bounds[1].max(at)];
+            }
+        }
+    }
+    bounds.map(|[low, high]| (high - low + 1.0).max(1.0) / 2.0 * face.pixel_mm)
 }
 
 /// Returns the difference of two blurs of the values, where `weights` are set; 0 elsewhere.

@@ -19,7 +19,7 @@ const ABOVE_MM: f64 = 2.0;
 /// Cells of the grid that finds the characters of a point, mm.
 const CELL_MM: f64 = 0.5;
 /// Triangles in memory before they are written to the spill file.
-const MAX_BUFFERED: usize = 1 << 20;
+const MAX_BUFFERED: usize = 1 << 19;
 /// Triangles that one task assigns.
 const TASK: usize = 8192;
 /// Bytes of a triangle in the spill file.
@@ -174,7 +174,8 @@ impl<F: Read + Write + Seek> Spill<'_, F> {
             self.file.write_all(&bytes)?;
             parts.push((self.end, triangles.len()));
             self.end += bytes.len() as u64;
-            triangles.clear();
+            // Scans are in spatial order: a character that is filled now gets few triangles later.
+            *triangles = Vec::new();
         }
         self.count = 0;
         Ok(())
@@ -313,4 +314,122 @@ pub fn cut_print(
         rgb: Grid::from_fn(size[0], size[1], pixel),
         page_from_crop,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::super::test_world::TestWorld;
+    use super::{CutPlan, MARGIN_MM, cut_meshes, cut_print};
+    use crate::block::{CharacterBox, PlacedCharacter};
+    use crate::mesh::Mesh;
+    use crate::raster::{Grid, PrintImage};
+
+    fn character(face_box: [f64; 4]) -> PlacedCharacter {
+        PlacedCharacter {
+            label: CharacterBox {
+                name: String::new(),
+                text: None,
+                page_box: [0.0; 4],
+            },
+            face_box,
+            is_on_face: true,
+            ncc: 1.0,
+            shift_mm: [0.0; 2],
+            support: 1.0,
+            confidence: 1.0,
+        }
+    }
+
+    /// A sheet of triangles every half millimetre over the face of a world, and the same sheet 18 mm below.
+    fn sheets(tops: f64) -> Mesh {
+        let (columns, rows) = (301, 201);
+        let level = |height: f64| {
+            (0..columns * rows).map(move |k| {
+                [
+                    f64::from(k % columns) * 0.5,
+                    f64::from(k / columns) * 0.5,
+                    height,
+                ]
+            })
+        };
+        let below = (columns * rows) as u32;
+        let cells =
+            (0..rows - 1).flat_map(|y| (0..columns - 1).map(move |x| (y * columns + x) as u32));
+        let next = columns as u32;
+        let triangles = cells.flat_map(|k| {
+            [0, below].into_iter().flat_map(move |from| {
+                let k = k + from;
+                [[k, k + 1, k + next], [k + 1, k + next + 1, k + next]]
+            })
+        });
+        Mesh {
+            vertices: level(tops).chain(level(tops - 18.0)).collect(),
+            triangles: triangles.collect(),
+        }
+    }
+
+    #[test]
+    fn each_character_gets_the_triangles_of_its_box_on_the_face() {
+        let face = TestWorld::new(31).face();
+        let tops = f64::from(super::surface_height(
+            &face.map,
+            &face.relief.surface,
+            [75.0, 50.0],
+        ));
+        let mesh = sheets(tops);
+        // The first two overlap with their margins; the third lies outside the scan.
+        let boxes = [
+            [60.0, 40.0, 70.0, 50.0],
+            [71.0, 40.0, 81.0, 50.0],
+            [400.0, 40.0, 410.0, 50.0],
+        ];
+        let characters = boxes.map(character);
+        let plan = CutPlan::of(&face, &characters);
+        let mut spill = Cursor::new(Vec::new());
+        let mut found = Vec::new();
+        cut_meshes(&mut &mesh, &plan, &mut spill, |number, mesh| {
+            found.push((number, mesh));
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(
+            found.iter().map(|(number, _)| *number).collect::<Vec<_>>(),
+            [0, 1, 2]
+        );
+        assert!(found[2].1.triangles.is_empty());
+        for ((_, mesh), [u0, v0, u1, v1]) in found.iter().zip(boxes).take(2) {
+            let side = 10.0 + 2.0 * MARGIN_MM;
+            let expected = 2.0 * (side / 0.5).powi(2);
+            let count = mesh.triangles.len() as f64;
+            assert!(
+                (count - expected).abs() < 0.06 * expected,
+                "{count} {expected}"
+            );
+            for vertex in mesh.vertices.iter() {
+                let reach = MARGIN_MM + 0.5;
+                assert!(vertex[0] > u0 - reach && vertex[0] < u1 + reach);
+                assert!(vertex[1] > v0 - reach && vertex[1] < v1 + reach);
+                assert_eq!(vertex[2], tops);
+            }
+        }
+    }
+
+    #[test]
+    fn prints_are_turned_upright_and_keep_their_place() {
+        let rgb = Grid::from_fn(90, 70, |x, y| [(x as u16) << 8, (y as u16) << 8, 0]);
+        let page = PrintImage::from(rgb);
+        for turns in 0..4 {
+            let crop = cut_print(&page, [20.0, 30.0, 49.0, 39.0], 2.0, turns).unwrap();
+            let upright = turns % 2 == 0;
+            let size = [crop.rgb.width(), crop.rgb.height()];
+            assert_eq!(size, if upright { [34, 14] } else { [14, 34] });
+            for (x, y) in [(0, 0), (5, 3), (size[0] - 1, size[1] - 1)] {
+                let [px, py] = crop.page_from_crop.apply([x as f64, y as f64]);
+                assert_eq!(crop.rgb.at(x, y), [px as u8, py as u8, 0], "{turns} turns");
+            }
+        }
+        assert!(cut_print(&page, [200.0, 30.0, 230.0, 39.0], 2.0, 0).is_none());
+    }
 }

@@ -157,3 +157,81 @@ pub(super) fn face_angle(face: &Mask) -> f64 {
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0.0, |(angle, _)| angle)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_world::frame;
+    use super::{FACE_CELL, face_angle, find_face};
+    use crate::block::HeightMap;
+    use crate::raster::Grid;
+
+    /// A face of 600 x 400 pixels, rotated by an angle, in 1,000 x 800 pixels.
+    fn map(angle: f64, other: impl Fn(f64, f64) -> f32) -> HeightMap {
+        let (sin, cos) = angle.sin_cos();
+        let heights = Grid::from_fn(1_000, 800, |x, y| {
+            let (dx, dy) = (x as f64 - 500.0, y as f64 - 400.0);
+            let (u, v) = (cos * dx + sin * dy, cos * dy - sin * dx);
+            if u.abs() < 300.0 && v.abs() < 200.0 {
+                if x % 9 < 4 { 0.0 } else { -2.0 }
+            } else {
+                other(dx, dy)
+            }
+        });
+        HeightMap {
+            frame: frame(),
+            origin_mm: [0.0; 2],
+            heights,
+        }
+    }
+
+    /// Returns the number of cells of the face.
+    fn area(map: &HeightMap) -> usize {
+        find_face(map).unwrap().count()
+    }
+
+    const FACE: usize = 600 * 400 / (FACE_CELL * FACE_CELL);
+
+    #[test]
+    fn a_large_turntable_below_the_face_is_left_out() {
+        let turntable = |dx: f64, dy: f64| {
+            if dx.hypot(dy) < 390.0 {
+                -20.0
+            } else {
+                f32::NEG_INFINITY
+            }
+        };
+        let found = area(&map(0.0, turntable));
+        assert!(found.abs_diff(FACE) < FACE / 50, "{found} {FACE}");
+    }
+
+    #[test]
+    fn clamps_above_the_face_are_left_out() {
+        let clamps = |dx: f64, dy: f64| {
+            if dx.abs() > 300.0 && dx.abs() < 370.0 && dy.abs() < 100.0 {
+                15.0
+            } else {
+                f32::NEG_INFINITY
+            }
+        };
+        let found = area(&map(0.0, clamps));
+        assert!(found.abs_diff(FACE) < FACE / 50, "{found} {FACE}");
+    }
+
+    #[test]
+    fn the_angle_of_the_outline_is_found() {
+        for angle in [-0.6, -0.1, 0.0, 0.35] {
+            let face = find_face(&map(angle, |_, _| f32::NEG_INFINITY)).unwrap();
+            let found = face_angle(&face);
+            assert!((found - angle).abs() < 0.01, "{found} {angle}");
+        }
+    }
+
+    #[test]
+    fn a_map_without_heights_has_no_face() {
+        let empty = HeightMap {
+            heights: Grid::new(50, 50, f32::NEG_INFINITY),
+            ..map(0.0, |_, _| 0.0)
+        };
+        assert!(find_face(&empty).is_none());
+    }
+}

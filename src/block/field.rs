@@ -205,3 +205,90 @@ fn certainty(curvature: [f64; 3], typical: f64) -> [f64; 3] {
         spread * pxy,
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::ShiftField;
+    use crate::block::WindowMatch;
+
+    /// Windows every 10 mm over 150 x 100 mm.
+    fn windows(shift: impl Fn([f64; 2]) -> [f64; 2]) -> Vec<WindowMatch> {
+        let places = (0..16).flat_map(|x| (0..11).map(move |y| [x, y]));
+        places
+            .map(|[x, y]| {
+                let at = [f64::from(x) * 10.0, f64::from(y) * 10.0];
+                WindowMatch {
+                    at,
+                    shift: shift(at),
+                    ncc: 0.9,
+                    curvature: [0.2, 0.2, 0.0],
+                }
+            })
+            .collect()
+    }
+
+    fn linear([u, v]: [f64; 2]) -> [f64; 2] {
+        [0.5 + 0.004 * u - 0.002 * v, -0.3 + 0.001 * u + 0.005 * v]
+    }
+
+    fn error(field: &ShiftField, at: [f64; 2], truth: [f64; 2]) -> f64 {
+        let found = field.at(at);
+        (found[0] - truth[0]).hypot(found[1] - truth[1])
+    }
+
+    #[test]
+    fn a_linear_field_is_reproduced() {
+        let field = ShiftField::fit(&windows(linear), 45.0, None).unwrap();
+        for at in [[0.0, 0.0], [75.0, 50.0], [150.0, 100.0]] {
+            assert!(error(&field, at, linear(at)) < 0.06, "{at:?}");
+        }
+    }
+
+    #[test]
+    fn a_third_of_wrong_windows_does_not_matter() {
+        let mut windows = windows(linear);
+        for (k, window) in windows.iter_mut().enumerate() {
+            if k % 3 == 0 {
+                window.shift = [
+                    ((k * 7) % 11) as f64 / 2.0 - 2.5,
+                    ((k * 5) % 13) as f64 / 2.0 - 3.0,
+                ];
+            }
+        }
+        let field = ShiftField::fit(&windows, 45.0, None).unwrap();
+        for at in [[20.0, 30.0], [75.0, 50.0], [130.0, 80.0]] {
+            assert!(
+                error(&field, at, linear(at)) < 0.12,
+                "{at:?} {:?}",
+                field.at(at)
+            );
+        }
+    }
+
+    #[test]
+    fn a_rule_decides_only_across_its_direction() {
+        let mut windows = windows(|_| [0.4, 0.2]);
+        for window in windows.iter_mut().filter(|window| window.at[0] == 70.0) {
+            window.shift = [0.4, 1.9];
+            window.curvature = [0.2, 0.0005, 0.0];
+        }
+        let field = ShiftField::fit(&windows, 15.0, None).unwrap();
+        assert!(error(&field, [70.0, 50.0], [0.4, 0.2]) < 0.1);
+    }
+
+    #[test]
+    fn details_are_added_by_the_finer_field() {
+        let wave = |[u, v]: [f64; 2]| [0.3 * (u / 12.0).sin(), 0.3 * (v / 12.0).cos()];
+        let [coarse, fine] = [None, Some(10.0)].map(|fine| {
+            let field = ShiftField::fit(&windows(wave), 45.0, fine).unwrap();
+            error(&field, [70.0, 50.0], wave([70.0, 50.0]))
+        });
+        assert!(fine < coarse / 2.0, "{fine} {coarse}");
+    }
+
+    #[test]
+    fn two_windows_are_too_few() {
+        let few = &windows(linear)[..2];
+        assert!(ShiftField::fit(few, 45.0, None).is_none());
+    }
+}

@@ -282,3 +282,107 @@ pub fn draw_height_maps(
     }
     Ok([front, back])
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::super::test_world::frame;
+    use super::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT, draw_height_maps};
+    use crate::block::Orientation;
+    use crate::mesh::{Mesh, Triangle};
+
+    /// Triangles of any size and direction within 24 x 16 x 6 mm.
+    fn triangles(seed: u64) -> Vec<Triangle> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..400)
+            .map(|_| {
+                let size = rng.random_range(0.05..4.0);
+                let middle = [12.0, 8.0, 3.0].map(|half: f64| rng.random_range(-half..half));
+                let mut corner = || middle.map(|m| m + rng.random_range(-size..size));
+                [corner(), corner(), corner()]
+            })
+            .collect()
+    }
+
+    fn maps(triangles: &[Triangle]) -> [HeightMap; 2] {
+        let frame = Orientation {
+            half_extent_mm: [12.0, 8.0, 5.0],
+            ..frame()
+        };
+        let mesh = Mesh {
+            vertices: triangles.iter().flatten().copied().collect(),
+            triangles: (0..triangles.len() as u32)
+                .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+                .collect(),
+        };
+        draw_height_maps(&mut &mesh, &frame).unwrap()
+    }
+
+    /// Returns the height of a triangle at a point, and how far inside the point is.
+    fn height_at([a, b, c]: &Triangle, [u, v]: [f64; 2]) -> (f64, f64) {
+        let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+        let minus = |p: &[f64; 3], q: &[f64; 3]| [p[0] - q[0], p[1] - q[1]];
+        let (ab, ac, ap) = (minus(b, a), minus(c, a), [u - a[0], v - a[1]]);
+        let area = cross(ab, ac);
+        let (s, t) = (cross(ap, ac) / area, cross(ab, ap) / area);
+        (
+            a[2] + s * (b[2] - a[2]) + t * (c[2] - a[2]),
+            s.min(t).min(1.0 - s - t),
+        )
+    }
+
+    #[test]
+    fn each_pixel_has_the_height_of_the_highest_triangle() {
+        let triangles = triangles(1);
+        let [front, _] = maps(&triangles);
+        let mut covered = 0;
+        for y in 0..front.heights.height() {
+            for x in 0..front.heights.width() {
+                let at = [x, y].map(|k| k as f64 * HEIGHT_STEP_MM);
+                let at = [0, 1].map(|k: usize| at[k] + front.origin_mm[k]);
+                // Points on an edge may count or not.
+                let hits = triangles.iter().map(|t| height_at(t, at));
+                let (mut surely, mut maybe) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+                for (height, inside) in hits.filter(|(_, inside)| *inside > -2e-3) {
+                    maybe = maybe.max(height);
+                    if inside > 2e-3 {
+                        surely = surely.max(height);
+                    }
+                }
+                let found = front.heights.at(x, y);
+                if found == NO_HEIGHT {
+                    assert_eq!(surely, f64::NEG_INFINITY);
+                } else {
+                    covered += 1;
+                    let found = f64::from(found);
+                    assert!(
+                        found > surely - 0.01 && found < maybe + 0.01,
+                        "{found} {surely} {maybe}"
+                    );
+                }
+            }
+        }
+        assert!(covered > 5_000);
+    }
+
+    #[test]
+    fn the_back_shows_the_lowest_triangles_with_v_reversed() {
+        let triangles = triangles(2);
+        let reversed: Vec<Triangle> = triangles
+            .iter()
+            .map(|t| t.map(|[x, y, z]| [x, -y, -z]))
+            .collect();
+        let ([_, back], [front, _]) = (maps(&triangles), maps(&reversed));
+        assert_eq!(back.heights.width(), front.heights.width());
+        let same = back.heights.data().iter().zip(front.heights.data());
+        let different = same
+            .filter(|(a, b)| a != b && (*a - *b).abs() > 1e-3)
+            .count();
+        // Rounding of a point on an edge.
+        assert!(different < 20, "{different}");
+        let point = [3.0, -4.0, 1.0];
+        assert_eq!(back.frame.face_from_mesh(point), [3.0, 4.0, -1.0]);
+    }
+}

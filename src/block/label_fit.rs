@@ -96,3 +96,65 @@ fn share_on_ink(
     }
     ink / count.max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LabelFit, check_label_fit};
+    use crate::block::{CharacterBox, PageInk};
+    use crate::raster::Grid;
+
+    const WIDTH: f64 = 700.0;
+    const HEIGHT: f64 = 500.0;
+
+    /// A character every 50 pixels in both directions, with wider gaps at the left and at the top.
+    fn page() -> PageInk {
+        let soft = Grid::from_fn(700, 500, |x, y| {
+            let inside = |at: usize, first: usize| at >= first && (at - first) % 50 < 38;
+            if inside(x, 67) && inside(y, 71) && x < 640 && y < 470 {
+                255
+            } else {
+                0
+            }
+        });
+        PageInk::of_soft(soft)
+    }
+
+    fn boxes(change: impl Fn([f64; 4]) -> [f64; 4]) -> Vec<CharacterBox> {
+        let places = (0..11).flat_map(|x| (0..8).map(move |y| [x, y]));
+        places
+            .map(|[x, y]| {
+                let (left, top) = (64.0 + 50.0 * f64::from(x), 68.0 + 50.0 * f64::from(y));
+                CharacterBox {
+                    name: format!("{x}-{y}"),
+                    text: None,
+                    page_box: change([left, top, left + 43.0, top + 43.0]),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn labels_between_the_strokes_fit() {
+        assert_eq!(check_label_fit(&page(), &boxes(|b| b)), Ok(()));
+    }
+
+    #[test]
+    fn mirrored_turned_and_other_labels_are_told_apart() {
+        let (w, h) = (WIDTH - 1.0, HEIGHT - 1.0);
+        let mirrored = boxes(|[l, t, r, b]| [w - r, t, w - l, b]);
+        assert!(matches!(
+            check_label_fit(&page(), &mirrored),
+            Err(LabelFit::Mirrored { .. })
+        ));
+        let turned = boxes(|[l, t, r, b]| [w - r, h - b, w - l, h - t]);
+        assert!(matches!(
+            check_label_fit(&page(), &turned),
+            Err(LabelFit::Turned { .. })
+        ));
+        let other = boxes(|[l, t, r, b]| [l + 22.0, t + 24.0, r + 22.0, b + 24.0]);
+        assert!(matches!(
+            check_label_fit(&page(), &other),
+            Err(LabelFit::OtherPage { .. })
+        ));
+    }
+}

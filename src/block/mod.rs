@@ -8,14 +8,18 @@ mod coarse;
 mod cut;
 mod error;
 mod face_layer;
+mod face_sampler;
 mod field;
 mod found_boxes;
 mod height_map;
 mod label_fit;
 mod orientation;
+mod outcomes;
 mod page_ink;
 mod page_map;
 mod relief;
+#[cfg(test)]
+mod test_world;
 mod windows;
 
 pub use agreement::{Agreement, Support};
@@ -28,6 +32,7 @@ pub use found_boxes::{FoundBox, NoteHalf, find_boxes};
 pub use height_map::{HEIGHT_STEP_MM, HeightHeader, HeightMap, StoredHeights, draw_height_maps};
 pub use label_fit::{LabelFit, check_label_fit};
 pub use orientation::Orientation;
+pub use outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome, FoundFace, heights_role};
 pub use page_ink::{InkSampler, PageInk};
 pub use page_map::{PageMap, StoredPageMap};
 pub use relief::Relief;

@@ -1,8 +1,8 @@
 //! The direction of the face of a block, from one pass over its triangles.
 //!
-//! Most of the area of a carved block looks along the normal of its face: the face itself, the carved ground, and the
-//! other side. So the eigenvector of the largest eigenvalue of the sum of n n^T, weighted by area, is the face normal,
-//! whatever walls, table or holder were scanned too.
+//! Tops and carved ground of a face lie in a layer a few millimetres thick and look along its normal. The flanks of the
+//! strokes can have a larger area, but they are spread over the whole block. So the normal is the direction along which
+//! one thin layer contains the largest area that looks along it.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
@@ -20,6 +20,18 @@ const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
+/// One of so many triangles is kept for the direction of the face and for the extent of the block, unless the mesh has
+/// only a few.
+const SAMPLE_STEP: usize = 32;
+const FEW_TRIANGLES: usize = 1 << 16;
+/// Margin of the extent, mm.
+const EXTENT_MARGIN_MM: f64 = 3.0;
+/// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
+const LAYER_SHARE: f64 = 0.0375;
+/// Area looks along a direction if the cosine is at least this.
+const ALONG: f64 = 0.85;
+/// Steps that refine a direction.
+const REFINEMENTS: usize = 4;
 
 /// The frame of a block: axes along the face, and the unit.
 ///
@@ -47,8 +59,10 @@ struct AreaSums {
     first: Vector3<f64>,
     second: Matrix3<f64>,
     normals: Matrix3<f64>,
-    bounds: [Vector3<f64>; 2],
 }
+
+/// A triangle of the sample: its first corner relative to the origin, and its normal times twice its area.
+type SampledTriangle = [Vector3<f32>; 2];
 
 impl AreaSums {
     const fn empty() -> Self {
@@ -57,10 +71,6 @@ impl AreaSums {
             first: Vector3::new(0.0, 0.0, 0.0),
             second: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
             normals: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            bounds: [
-                Vector3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
-                Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
-            ],
         }
     }
 
@@ -71,15 +81,15 @@ impl AreaSums {
             let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
             let normal = (b - a).cross(&(c - a));
             let area = normal.norm();
-            sums.bounds[0] = sums.bounds[0].inf(&a).inf(&b).inf(&c);
-            sums.bounds[1] = sums.bounds[1].sup(&a).sup(&b).sup(&c);
             if area <= 0.0 {
                 continue;
             }
             let middle = (a + b + c) / 3.0;
             sums.area += area;
             sums.first += middle * area;
-            sums.second += middle * middle.transpose() * area;
+            // Exact for a triangle of any size.
+            let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            sums.second += (corners + middle * middle.transpose() * 9.0) * (area / 12.0);
             sums.normals += normal * normal.transpose() / area;
         }
         sums
@@ -90,8 +100,6 @@ impl AreaSums {
         self.first += other.first;
         self.second += other.second;
         self.normals += other.normals;
-        self.bounds[0] = self.bounds[0].inf(&other.bounds[0]);
-        self.bounds[1] = self.bounds[1].sup(&other.bounds[1]);
     }
 }
 
@@ -108,6 +116,7 @@ impl Orientation {
         let mut sums = AreaSums::empty();
         let mut count = 0;
         let mut origin = None;
+        let mut sample: Vec<SampledTriangle> = Vec::new();
         mesh.pass(&mut |triangles| {
             // Positions relative to the first corner keep their precision far from the origin.
             let origin = *origin.get_or_insert_with(|| Vector3::from(triangles[0][0]));
@@ -118,26 +127,44 @@ impl Orientation {
             for part in &parts {
                 sums.add(part);
             }
+            let is_small = count == 0 && triangles.len() < FEW_TRIANGLES;
+            let step = if is_small { 1 } else { SAMPLE_STEP };
+            sample.extend(triangles.iter().step_by(step).map(|triangle| {
+                let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
+                [a.cast::<f32>(), (b - a).cross(&(c - a)).cast::<f32>()]
+            }));
             count += triangles.len() as u64;
             Ok::<(), MeshReadError>(())
         })?;
         let Some(origin) = origin.filter(|_| sums.area > 0.0) else {
             return Err(BlockError::NoArea { triangles: count });
         };
-        Ok(Self::of_sums(&sums, origin, unit, count))
+        Ok(Self::of_sums(&sums, &sample, origin, unit, count))
     }
 
     fn of_sums(
         sums: &AreaSums,
+        sample: &[SampledTriangle],
         origin: Vector3<f64>,
         unit: Option<LengthUnit>,
         triangles: u64,
     ) -> Self {
         let mean = sums.first / sums.area;
         let covariance = sums.second / sums.area - mean * mean.transpose();
+        let spread = SymmetricEigen::new(covariance);
+        let long_side = SIDE_BY_DEVIATION * spread.eigenvalues.max().max(0.0).sqrt();
         let normals = SymmetricEigen::new(sums.normals);
-        let normal = normals.eigenvectors.column(normals.eigenvalues.imax());
-        let n = with_fixed_sign(normal.into_owned());
+        let candidates = normals
+            .eigenvectors
+            .column_iter()
+            .chain(spread.eigenvectors.column_iter());
+        let n = candidates
+            .map(|candidate| refined(candidate.into_owned(), sample))
+            .max_by(|a, b| {
+                let area = |n| layer_area(n, sample, LAYER_SHARE * long_side);
+                area(a).total_cmp(&area(b))
+            })
+            .map_or(Vector3::z(), with_fixed_sign);
         // The largest variance of the area within the plane of the face.
         let flat = Matrix3::identity() - n * n.transpose();
         let within = SymmetricEigen::new(flat * covariance * flat);
@@ -149,13 +176,10 @@ impl Orientation {
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
         let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
         let half_extent_mm = axes.map(|axis| {
-            let corner = |k: usize| {
-                let bound = |axis: usize| sums.bounds[k >> axis & 1][axis];
-                Vector3::new(bound(0), bound(1), bound(2)) - mean
-            };
-            let farthest = (0..8)
-                .map(|k| axis.dot(&corner(k)).abs())
-                .fold(0.0, f64::max);
+            let distance =
+                |[corner, _]: &SampledTriangle| axis.dot(&(corner.cast::<f64>() - mean)).abs();
+            let farthest = sample.iter().map(distance).fold(0.0, f64::max);
+            let farthest = farthest + EXTENT_MARGIN_MM / mm;
             farthest.min(REACH * deviation(&axis).max(long_side / 20.0)) * mm
         });
         Self {
@@ -186,6 +210,44 @@ impl Orientation {
     }
 }
 
+/// Moves a direction to the mean direction of the area that looks along it.
+fn refined(direction: Vector3<f64>, sample: &[SampledTriangle]) -> Vector3<f64> {
+    let mut n = direction;
+    for _ in 0..REFINEMENTS {
+        let mut sum = Vector3::zeros();
+        for [_, normal] in sample {
+            let normal = normal.cast::<f64>();
+            let along = normal.dot(&n);
+            if along.abs() >= ALONG * normal.norm() {
+                sum += normal * along.signum();
+            }
+        }
+        n = sum.try_normalize(0.0).unwrap_or(n);
+    }
+    n
+}
+
+/// Returns the largest area in a layer of the given thickness that looks along a direction.
+fn layer_area(n: &Vector3<f64>, sample: &[SampledTriangle], thickness: f64) -> f64 {
+    let mut heights: Vec<(f64, f64)> = sample
+        .iter()
+        .map(|[corner, normal]| (corner.cast::<f64>().dot(n), normal.cast::<f64>()))
+        .filter(|(_, normal)| normal.dot(n).abs() >= ALONG * normal.norm())
+        .map(|(height, normal)| (height, normal.norm()))
+        .collect();
+    heights.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut first, mut area, mut largest) = (0, 0.0, 0.0_f64);
+    for (height, added) in &heights {
+        area += added;
+        while height - heights[first].0 > thickness {
+            area -= heights[first].1;
+            first += 1;
+        }
+        largest = largest.max(area);
+    }
+    largest
+}
+
 /// Returns the unit in which the long side of a block is nearest to a typical one.
 fn nearest_unit(long_side: f64) -> LengthUnit {
     let distance = |unit: &LengthUnit| (long_side * unit.mm() / TYPICAL_LONG_SIDE_MM).ln().abs();
@@ -201,5 +263,78 @@ fn with_fixed_sign(axis: Vector3<f64>) -> Vector3<f64> {
         -axis
     } else {
         axis
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Rotation3, Vector3};
+
+    use super::Orientation;
+    use crate::block::BlockError;
+    use crate::domain::LengthUnit;
+    use crate::mesh::{Mesh, Vertices};
+
+    /// A plate of 320 x 200 x 20 mm in any pose, in a unit of `mm` millimetres.
+    fn plate(mm: f64) -> (Mesh, Rotation3<f64>) {
+        let rotation = Rotation3::from_euler_angles(0.7, -0.4, 1.9);
+        let corner = |k: usize| {
+            let half = [160.0, 100.0, 10.0];
+            let sign = |axis: usize| if k >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            Vector3::new(sign(0) * half[0], sign(1) * half[1], sign(2) * half[2])
+        };
+        let place = |k: usize| (rotation * corner(k) + Vector3::new(900.0, -50.0, 30.0)) / mm;
+        let vertices: Vertices = (0..8).map(|k| place(k).into()).collect();
+        let quads = [
+            [0, 1, 3, 2],
+            [4, 6, 7, 5],
+            [0, 4, 5, 1],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 5, 7, 3],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+            .collect();
+        (
+            Mesh {
+                vertices,
+                triangles,
+            },
+            rotation,
+        )
+    }
+
+    #[test]
+    fn axes_and_unit_of_a_plate_are_found() {
+        for unit in LengthUnit::ALL {
+            let (mesh, rotation) = plate(unit.mm());
+            let found = Orientation::find(&mut &mesh, None).unwrap();
+            assert_eq!(found.mm, unit.mm());
+            let normal = Vector3::from(found.axes[2]).dot(&(rotation * Vector3::z()));
+            let long = Vector3::from(found.axes[0]).dot(&(rotation * Vector3::x()));
+            assert!(normal.abs() > 0.9999 && long.abs() > 0.9999);
+            let [u, v, n] = found.axes.map(Vector3::from);
+            assert!((u.cross(&v) - n).norm() < 1e-9);
+            assert!((found.half_extent_mm[0] - 163.0).abs() < 1.0, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_given_unit_is_used() {
+        let (mesh, _) = plate(1.0);
+        let found = Orientation::find(&mut &mesh, Some(LengthUnit::Cm)).unwrap();
+        assert_eq!(found.mm, 10.0);
+    }
+
+    #[test]
+    fn a_mesh_without_area_is_refused() {
+        let mesh = Mesh {
+            vertices: [[0.0; 3]; 3].into_iter().collect(),
+            triangles: [[0, 1, 2]].into_iter().collect(),
+        };
+        let refused = Orientation::find(&mut &mesh, None);
+        assert!(matches!(refused, Err(BlockError::NoArea { triangles: 1 })));
     }
 }

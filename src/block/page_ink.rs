@@ -284,3 +284,72 @@ fn halved(ink: &Grid<u8>) -> Grid<u8> {
     });
     Grid::from_vec(width, height, half).expect("one value for each pixel")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::PageInk;
+    use crate::block::BlockError;
+    use crate::raster::{Grid, PrintImage};
+
+    /// Strokes every 20 pixels on a sheet that is darker at the right, on a scanner's bed of 60 pixels.
+    fn page(ink: u16, bed: u16) -> PrintImage {
+        let rgb = Grid::from_fn(800, 600, |x, y| {
+            let is_bed = x < 60 || y < 60;
+            let sheet = 220 - (x / 20) as u16;
+            let is_stroke = is_ink(x, y);
+            let grey = if is_bed {
+                bed
+            } else if is_stroke {
+                sheet * ink / 100
+            } else {
+                sheet
+            };
+            [grey * 257; 3]
+        });
+        rgb.into()
+    }
+
+    fn is_ink(x: usize, y: usize) -> bool {
+        x > 100 && y > 100 && x % 20 < 5 && y % 50 < 40
+    }
+
+    #[test]
+    fn ink_is_found_on_uneven_sheets_and_not_on_the_bed() {
+        for bed in [10, 230] {
+            let ink = PageInk::of(&page(30, bed)).unwrap();
+            for (x, y) in [
+                (30, 300),
+                (400, 30),
+                (110, 300),
+                (700, 500),
+                (123, 310),
+                (763, 510),
+            ] {
+                let soft = ink.soft().at(x, y);
+                let expected = is_ink(x, y);
+                assert_eq!(soft > 127, expected, "{x} {y}: {soft}, bed {bed}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_page_has_no_ink() {
+        let empty = PageInk::of(&page(100, 215));
+        assert!(matches!(empty, Err(BlockError::NoInk { .. })));
+    }
+
+    #[test]
+    fn samples_are_means_over_the_footprint() {
+        let ink = PageInk::of_soft(Grid::from_fn(
+            256,
+            256,
+            |x, _| if x < 128 { 255 } else { 0 },
+        ));
+        for footprint in [1.0, 4.0] {
+            let sampler = ink.sampler(footprint);
+            assert_eq!(sampler.at([60.0, 60.0]), Some(1.0));
+            assert_eq!(sampler.at([127.5, 60.0]), Some(0.5));
+            assert_eq!(sampler.at([-3.0, 60.0]), None);
+        }
+    }
+}

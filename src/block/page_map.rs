@@ -227,3 +227,79 @@ impl PageMap {
         [0, 1].map(|k: usize| self.origin_mm[k] + (sides[k] as f64 - 1.0) / 2.0 * NODE_STEP_MM)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{PageMap, StoredPageMap};
+    use crate::domain::Affine2;
+
+    const LOW: [f64; 2] = [-20.0, 5.0];
+    const HIGH: [f64; 2] = [95.0, 71.0];
+
+    fn affine() -> (Affine2, PageMap) {
+        let affine = Affine2([[9.0, 0.7, 100.0], [-0.6, 9.2, 50.0]]);
+        (affine, PageMap::affine(&affine, LOW, HIGH))
+    }
+
+    fn warped() -> PageMap {
+        let (_, map) = affine();
+        let shifts: Vec<[f64; 2]> = map
+            .node_positions()
+            .iter()
+            .map(|[u, v]| [(v / 20.0).sin(), 0.5 * (u / 30.0).cos()])
+            .collect();
+        map.shifted(&shifts)
+    }
+
+    fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    }
+
+    #[test]
+    fn an_affine_map_is_kept_inside_and_outside_the_nodes() {
+        let (affine, map) = affine();
+        for face in [[0.0, 10.0], [37.3, 44.4], [95.0, 71.0], [-60.0, 140.0]] {
+            assert!(distance(map.page_from_face(face), affine.apply(face)) < 1e-9);
+        }
+        let [[a, b], [c, d]] = map.derivative([20.0, 30.0]);
+        assert!((a - 9.0).abs() < 1e-9 && (b - 0.7).abs() < 1e-9);
+        assert!((c + 0.6).abs() < 1e-9 && (d - 9.2).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_inverse_leads_back() {
+        let map = warped();
+        for face in [LOW, HIGH, [3.0, 70.0], [60.5, 22.2]] {
+            let back = map.face_from_page(map.page_from_face(face));
+            assert!(distance(back, face) < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_row_is_interpolated_to_a_hundredth_of_a_pixel() {
+        let map = warped();
+        let row = map.row([-20.0, 33.0], 0.3, 380);
+        for (k, point) in row.iter().enumerate() {
+            let exact = map.page_from_face([-20.0 + k as f64 * 0.3, 33.0]);
+            assert!(distance(*point, exact) < 0.05, "{k}");
+        }
+    }
+
+    #[test]
+    fn a_stored_map_is_the_same_map() {
+        let map = warped();
+        let text = serde_json::to_string(&StoredPageMap::from(&map)).unwrap();
+        let stored: StoredPageMap = serde_json::from_str(&text).unwrap();
+        assert_eq!(PageMap::try_from(stored), Ok(map));
+    }
+
+    #[test]
+    fn a_stored_map_without_a_grid_is_refused() {
+        let stored = StoredPageMap {
+            origin_mm: [0.0; 2],
+            columns: 5,
+            nodes_px: vec![[0.0; 2]; 21],
+        };
+        assert!(PageMap::try_from(stored).is_err());
+    }
+}

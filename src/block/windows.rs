@@ -424,3 +424,121 @@ fn weighted_sums(
     }
     [products, sums, squares]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_world::{SIDES_MM, TestWorld};
+    use super::{
+        ShrunkRelief, SumTable, Template, WarpedInk, Window, WindowSizes, match_window,
+        match_windows,
+    };
+    use crate::block::PageMap;
+    use crate::domain::Affine2;
+
+    const SIZES: WindowSizes = WindowSizes {
+        shrink: 2,
+        side_mm: 18.0,
+        step_mm: 20.0,
+        reach_mm: 1.5,
+    };
+
+    /// A world and its page, and a map that is wrong by 0.62 mm and -0.47 mm.
+    fn shifted() -> (ShrunkRelief, super::PageInk, PageMap) {
+        let world = TestWorld::new(8);
+        let face = world.face();
+        let truth = Affine2::scale_shift(8.0, [40.0, 40.0]);
+        let page = world.affine_page([1280, 880], &truth);
+        let wrong = Affine2::scale_shift(8.0, [40.0 - 8.0 * 0.62, 40.0 + 8.0 * 0.47]);
+        let map = PageMap::affine(&wrong, [0.0; 2], SIDES_MM);
+        (
+            ShrunkRelief::of(&face.map, &face.relief, SIZES.shrink),
+            page,
+            map,
+        )
+    }
+
+    #[test]
+    fn windows_find_the_shift_to_a_tenth_of_a_pixel() {
+        let (relief, page, map) = shifted();
+        let windows = match_windows(&relief, &page, &map, &SIZES);
+        assert!(windows.len() > 30);
+        for window in windows {
+            let [dx, dy] = [window.shift[0] - 0.62, window.shift[1] + 0.47];
+            assert!(dx.hypot(dy) < 0.06, "{window:?}");
+            assert!(window.ncc > 0.8, "{window:?}");
+        }
+    }
+
+    #[test]
+    fn scores_are_those_of_the_definition() {
+        let (relief, page, map) = shifted();
+        let reach = 5;
+        let warped = WarpedInk::of(&relief, &page, &map, WarpedInk::border_for(reach));
+        // The second window hangs over the edge of the face.
+        for first in [[100, 80], [0, 0]] {
+            let window = Window {
+                first,
+                size: [41, 37],
+            };
+            let template = Template::of(&relief, &warped, window).unwrap();
+            let scores = template.scores(&warped, window, reach);
+            for (dx, dy) in [(0, 0), (5, 5), (10, 3), (7, 10)] {
+                let mut sums = [0.0_f64; 6];
+                for y in 0..37 {
+                    for x in 0..41 {
+                        let (column, row) = (first[0] + x, first[1] + y);
+                        let border = warped.border;
+                        if !relief.face.at(column, row)
+                            || !warped.on_page.at(column + border, row + border)
+                        {
+                            continue;
+                        }
+                        let t = f64::from(relief.soft.at(column, row));
+                        let i = f64::from(
+                            warped
+                                .ink
+                                .at(column + border + dx - reach, row + border + dy - reach),
+                        );
+                        for (sum, value) in sums.iter_mut().zip([1.0, t, i, t * t, i * i, t * i]) {
+                            *sum += value;
+                        }
+                    }
+                }
+                let [n, t, i, tt, ii, ti] = sums;
+                let expected = (ti - t * i / n) / ((tt - t * t / n) * (ii - i * i / n)).sqrt();
+                let found = f64::from(scores[dy * 11 + dx]);
+                assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_without_relief_has_no_match() {
+        let (relief, page, map) = shifted();
+        let empty = ShrunkRelief {
+            soft: relief.soft.map(|_| 0.0),
+            ..relief
+        };
+        let warped = WarpedInk::of(&empty, &page, &map, WarpedInk::border_for(3));
+        let window = Window {
+            first: [50, 50],
+            size: [40, 40],
+        };
+        assert!(match_window(&empty, &warped, window, 3).is_none());
+    }
+
+    #[test]
+    fn sums_of_rectangles_come_from_the_table() {
+        let ink: Vec<f32> = (0..400).map(|k| (k % 7) as f32 / 7.0).collect();
+        let table = SumTable::of(&ink, 20, [6, 5], 8);
+        let mut expected = [0.0; 2];
+        for y in 3..8 {
+            for x in 2..8 {
+                let value = ink[y * 20 + x];
+                expected = [expected[0] + value, expected[1] + value * value];
+            }
+        }
+        let found = table.sums(2, 3);
+        assert!((found[0] - expected[0]).abs() < 1e-4 && (found[1] - expected[1]).abs() < 1e-4);
+    }
+}

@@ -34,7 +34,7 @@ pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
 pub use blocks::claim::OutstandingBlocks;
-pub use blocks::cut::{CutOutcome, CutSummary};
+pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{

@@ -209,7 +209,7 @@ async fn check_blocks(
         back.extend(check.from.map(|stage| (check.block, stage)));
     }
     if options.repair && !back.is_empty() {
-        summary.repaired.requeued += back.len() as u64;
+        summary.repaired.requeued_blocks += back.len() as u64;
         catalog.reset_blocks(back).await?;
     }
     Ok(())

@@ -70,8 +70,10 @@ pub struct Unreferenced {
 /// Repairs made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Repaired {
-    /// Number of pairs and blocks sent back to an earlier stage.
+    /// Number of pairs sent back to an earlier stage.
     pub requeued: u64,
+    /// Number of blocks sent back to an earlier stage.
+    pub requeued_blocks: u64,
     /// Number of damaged pairs that were not sent back, because an input is missing.
     pub not_requeued: u64,
     /// Whether the counters were rebuilt.

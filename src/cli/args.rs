@@ -64,7 +64,7 @@ pub(super) enum Command {
     Verdict(verdict::VerdictCommand),
     /// Judge results in the browser with the keyboard, and align pairs manually
     Review(review::ReviewArgs),
-    /// Show a scan in 3D with its print on it, in the browser
+    /// Show a scan in 3D with its print on it, or the page of a block, in the browser
     View(view::ViewArgs),
     /// Measure how far reviewers agree with each other and with themselves, and which planted errors they catch
     Agreement,
@@ -72,7 +72,7 @@ pub(super) enum Command {
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools
     Export(export::ExportArgs),
-    /// Draw many overlays on one PNG, worst first
+    /// Draw many overlays on one PNG, worst first, or the page of a block
     #[command(visible_alias = "sheet")]
     ContactSheet(contact_sheet::ContactSheetArgs),
     /// Show the settings in effect

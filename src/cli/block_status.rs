@@ -1,5 +1,7 @@
 //! The blocks of a project in `status` and after `run`: how many are done, and why the others failed.
 
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 
 use super::screen::{Palette, Tone};
@@ -118,7 +120,8 @@ impl BlockStatus {
         let mut text = columns(rows, "<<<");
         let more = self.failed().count().saturating_sub(self.name_limit);
         if more > 0 {
-            text.push_str(&format!("  and {more} more; `status --failed` lists all\n"));
+            // Formatting into memory does not fail.
+            let _ = writeln!(text, "  and {more} more; `status --failed` lists all");
         }
         text
     }

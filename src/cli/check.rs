@@ -146,7 +146,7 @@ fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<
 
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
     let is_repairable = |kind: &Kind| *kind != Kind::Database && *kind != Kind::Reference;
-    if summary.repaired.requeued > 0 {
+    if summary.repaired.requeued + summary.repaired.requeued_blocks > 0 {
         vec!["run"]
     } else if !repaired && summary.damage.keys().any(is_repairable) {
         vec!["check --repair"]
@@ -245,10 +245,13 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
             "{pairs} not queued again, because a mesh or print is missing: put it back, then run `check --repair`"
         ));
     }
-    if repaired && done.requeued > 0 {
-        let pairs = count(done.requeued, "pair");
+    let requeued = [(done.requeued, "pair"), (done.requeued_blocks, "block")].into_iter();
+    let requeued = requeued.filter(|(number, _)| *number > 0);
+    let requeued: Vec<String> = requeued.map(|(number, what)| count(number, what)).collect();
+    if repaired && !requeued.is_empty() {
         lines.push(format!(
-            "{pairs} will run again from the stage listed above"
+            "{} will run again from the stage listed above",
+            requeued.join(" and ")
         ));
     }
     lines

@@ -1,10 +1,11 @@
-//! `contact-sheet`: draws many pairs on one PNG, worst first.
+//! `contact-sheet`: draws many pairs, or a whole block, on one PNG.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
 
+use super::block_sheet::{self, BlockSheetOptions};
 use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
@@ -20,7 +21,13 @@ use crate::raster::png_rgb8;
 pub(super) struct ContactSheetArgs {
     /// Only these pairs [default: all]
     pub(super) pairs: Vec<String>,
-    /// The PNG to write [default: sheet.png in the project]
+    /// Draw the page of this block with the boxes of its characters instead
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["pairs", "order", "limit", "columns"])]
+    pub(super) block: Option<String>,
+    /// With `--block`: draw relief and ink over each other, to see where the registration is off
+    #[arg(long, requires = "block")]
+    pub(super) overlay: bool,
+    /// The PNG to write [default: in the project, sheet.png, or for a block, page.png or overlay.png]
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief
@@ -44,6 +51,8 @@ impl Default for ContactSheetArgs {
     fn default() -> Self {
         Self {
             pairs: Vec::new(),
+            block: None,
+            overlay: false,
             output: None,
             metric: ThresholdMetric::DEFAULT,
             order: ContactSheetOrder::Worst,
@@ -58,6 +67,15 @@ pub(super) async fn contact_sheet(
     args: ContactSheetArgs,
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
+    if let Some(block) = &args.block {
+        let options = BlockSheetOptions {
+            block,
+            is_overlay: args.overlay,
+            metric: args.metric,
+            output: args.output.as_deref(),
+        };
+        return block_sheet::write(&options, context).await;
+    }
     let (path, sheet) = write(&args, context).await?;
     context
         .print_json(&json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}))?;

@@ -1,5 +1,6 @@
-//! `demo`: creates the built-in dataset, imports it, runs it and prints the report.
+//! `demo`: creates the built-in dataset or a whole block, imports it, runs it and prints the report.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -8,20 +9,26 @@ use clap::Args;
 use super::busy::Busy;
 use super::config::{ConfigShowArgs, as_toml};
 use super::contact_sheet::{self, ContactSheetArgs};
-use super::context::{Context, shell_quoted};
-use super::exit::{ExitCode, Refusal};
+use super::context::Context;
+use super::demo_block;
+use super::demo_folder::{DemoContent, STOPPED, check_directory, replace_data};
+use super::exit::ExitCode;
 use super::files;
 use super::import::{self, ImportArgs};
+use super::import_blocks::{self, BlockSource};
 use super::report;
 use super::run::{self, drive};
 use super::screen::Palette;
-use super::signals;
 use super::table::count;
 use crate::config::{Origin, Tree};
-use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
+use crate::demo::block::{BlockKind, BlockOptions};
+use crate::demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
 use crate::domain::JobStatus;
 use crate::runner::{Stop, StopLevel};
-use crate::store::{CATALOG_FILE, ReplacementFolder, SETTINGS_FILE, TargetLock, write_atomic};
+use crate::store::{SETTINGS_FILE, TargetLock, write_atomic};
+
+/// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.
+const SPACING_MM: RangeInclusive<f64> = 0.05..=2.0;
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
@@ -37,6 +44,15 @@ pub(super) struct DemoArgs {
     /// Kind of pairs: upright, pose, hard, real, all, or another of docs/guides/demo.md
     #[arg(long, default_value = "upright")]
     pub(super) tier: Tier,
+    /// Create a whole block with its page instead of pairs; a kind of docs/guides/demo.md, or mixed
+    #[arg(long, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "mixed", conflicts_with_all = ["pairs", "tier"])]
+    pub(super) block: Option<BlockKind>,
+    /// Let the characters of the block be found without their boxes
+    #[arg(long, requires = "block")]
+    pub(super) no_labels: bool,
+    /// Distance between the vertices of the block's mesh, mm
+    #[arg(long, value_name = "MM", default_value = "0.2", requires = "block", value_parser = spacing)]
+    pub(super) spacing: f64,
     /// Create and import the dataset without running it
     #[arg(long)]
     pub(super) no_run: bool,
@@ -45,15 +61,21 @@ pub(super) struct DemoArgs {
 pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let dir = demo_dir(&args, context);
     let context = &save_settings(&dir, &context.at(&dir))?;
+    if let Some(kind) = args.block {
+        let options = BlockOptions {
+            kind,
+            seed: args.seed,
+            spacing_mm: args.spacing,
+        };
+        return block_demo(&dir, options, &args, context).await;
+    }
     let options = DemoOptions {
         pairs: args.pairs,
         seed: args.seed,
         tier: args.tier,
     };
     let Some(files) = create_dataset(&dir, options, context).await? else {
-        context.info(
-            "stopped while the files were being written; nothing was imported, and the same command starts again",
-        );
+        context.info(STOPPED);
         return Ok(ExitCode::Stopped);
     };
     let manifest = ImportArgs {
@@ -67,11 +89,41 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         context.next("run");
         return Ok(ExitCode::Done);
     }
-    align(&dir, context).await
+    align(&dir, None, context).await
 }
 
-/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are.
-async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
+/// Creates a whole block, imports and runs it.
+async fn block_demo(
+    dir: &Path,
+    options: BlockOptions,
+    args: &DemoArgs,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    let Some(files) = demo_block::create_files(dir, options, context).await? else {
+        context.info(STOPPED);
+        return Ok(ExitCode::Stopped);
+    };
+    let import = demo_block::import_args(&files, !args.no_labels);
+    let source = BlockSource::One {
+        args: &import,
+        unit: None,
+    };
+    let outcome = import_blocks::import_blocks(&source, false, context).await?;
+    import_blocks::print_outcome(&outcome, context);
+    if args.no_run {
+        context.next("run");
+        return Ok(ExitCode::Done);
+    }
+    align(dir, Some(&files.truth), context).await
+}
+
+/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are. `block_truth` is the file
+/// with the true alignment of a whole block.
+async fn align(
+    dir: &Path,
+    block_truth: Option<&Path>,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
     let (project, catalog) = context.open().await?;
     let options = run::from_config(&config);
@@ -84,6 +136,13 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
         }
         return Ok(run::code(&summary));
     }
+    if let Some(file) = block_truth {
+        let (_, catalog) = context.open().await?;
+        let stored = demo_block::store_truths(file, &catalog).await;
+        catalog.close().await;
+        let stored = count(stored?, "true alignment");
+        context.info(&format!("{stored} of the cut pairs stored"));
+    }
     report::print(context).await?;
     let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
     let (data, picture) = (dir.join("data"), picture.display());
@@ -92,6 +151,13 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
     context.next("status");
     context.next("export -o export");
     Ok(run::code(&summary))
+}
+
+/// Parses the distance of a block's vertices.
+fn spacing(text: &str) -> Result<f64, String> {
+    let range = SPACING_MM;
+    let spacing = text.parse().ok().filter(|spacing| range.contains(spacing));
+    spacing.ok_or_else(|| format!("not a number from {} to {} mm", range.start(), range.end()))
 }
 
 fn demo_dir(args: &DemoArgs, context: &Context) -> PathBuf {
@@ -108,7 +174,7 @@ async fn create_dataset(
     context: &Context,
 ) -> anyhow::Result<Option<DatasetFiles>> {
     let data = dir.join("data");
-    check_directory(dir, &data, &options)?;
+    check_directory(dir, &data, &DemoContent::Pairs(options))?;
     let files = match find_dataset(&data, &options) {
         Some(files) => files,
         None => match replace_dataset(&data, options, context).await? {
@@ -126,100 +192,27 @@ async fn create_dataset(
     Ok(Some(files))
 }
 
-/// Writes the dataset next to `data` and then replaces `data`, so that a project never sees half of it. Returns `None`
-/// if a signal stopped the command.
+/// Writes the dataset next to `data` and then replaces `data`. Returns `None` if a signal stopped the command.
 async fn replace_dataset(
     data: &Path,
     options: DemoOptions,
     context: &Context,
 ) -> anyhow::Result<Option<DatasetFiles>> {
-    let folder = ReplacementFolder::begin(data)?;
-    let note = folder.path().join(NOTE);
-    std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
-    let Some(mut files) = write_or_stop(folder.path().to_owned(), options, context).await? else {
+    let busy = Busy::of_pairs(context, "creating demo data", options.pairs);
+    let write = move |folder: &Path, stop: &Stop| {
+        let is_stopped = || {
+            busy.begin_pair();
+            stop.level() != StopLevel::Go
+        };
+        write_dataset(folder, &options, &is_stopped)
+    };
+    let Some(mut files) = replace_data(data, context, write).await? else {
         return Ok(None);
     };
-    if let Some((path, error)) = folder.finish()? {
-        context.warn(&format!(
-            "the earlier data could not be removed from {}: {error}; the next demo that writes data removes them",
-            path.display()
-        ));
-    }
     for file in [&mut files.manifest, &mut files.truth] {
         *file = data.join(file.file_name().unwrap_or_default());
     }
     Ok(Some(files))
-}
-
-/// Writes the dataset on another thread and watches for signals. Returns `None` if a signal stopped the writing.
-async fn write_or_stop(
-    data: PathBuf,
-    options: DemoOptions,
-    context: &Context,
-) -> anyhow::Result<Option<DatasetFiles>> {
-    let stop = Stop::default();
-    let signals = signals::watch(&stop)?;
-    let busy = Busy::of_pairs(context, "creating demo data", options.pairs);
-    let is_stopped = move || {
-        busy.begin_pair();
-        stop.level() != StopLevel::Go
-    };
-    let writing = tokio::task::spawn_blocking(move || write_dataset(&data, &options, &is_stopped));
-    let written = writing.await?;
-    signals.abort();
-    match written {
-        Err(DatasetError::Stopped) => Ok(None),
-        written => Ok(Some(written?)),
-    }
-}
-
-const NOTE: &str = "README.txt";
-const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their prints, with the true \
-alignments.\nCreated by `mocban demo`, which creates it again if it is incomplete; do not put your own files here.\n";
-
-/// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
-fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> anyhow::Result<()> {
-    let refuse = |reason: &str| {
-        let shown = dir.display();
-        let text = format!("{shown} {reason}; name another directory for this demo");
-        Err(Refusal::Usage(text).into())
-    };
-    let exists = |path: &Path| {
-        let found = path.try_exists();
-        found.with_context(|| format!("cannot read {}", path.display()))
-    };
-    let (is_project, has_data) = (exists(&dir.join(CATALOG_FILE))?, exists(data)?);
-    let continue_hint = || {
-        if !is_project {
-            return String::new();
-        }
-        let dir = shell_quoted(&dir.to_string_lossy());
-        format!("; `mocban -C {dir} run` continues it")
-    };
-    let stamp = files::small(&data.join("dataset.json"))?;
-    let found = stamp.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
-    match found {
-        Some(found) if found.tier != options.tier || found.seed != options.seed => {
-            let DemoOptions { tier, seed, .. } = found;
-            let hint = continue_hint();
-            refuse(&format!(
-                "holds the demo of tier {tier} and seed {seed}{hint}"
-            ))
-        }
-        Some(DemoOptions { pairs, .. }) if pairs > options.pairs => {
-            let hint = continue_hint();
-            refuse(&format!("already holds a demo of {pairs} pairs{hint}"))
-        }
-        None if has_data && !has_note(data)? => refuse("has a data directory that no demo created"),
-        None if is_project && !has_data => refuse("is another project"),
-        Some(_) | None => Ok(()),
-    }
-}
-
-/// Returns whether a directory has the note of a demo. Compares the text, because any project may have a `README.txt`.
-fn has_note(data: &Path) -> anyhow::Result<bool> {
-    let note = files::small(&data.join(NOTE))?;
-    Ok(note.is_some_and(|text| text == NOTE_TEXT.as_bytes()))
 }
 
 /// Saves the settings of `--config` and `--set` in the project's settings file, for later commands.
@@ -270,41 +263,8 @@ fn changed_settings(tree: &Tree) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{NOTE, NOTE_TEXT, changed_settings, check_directory};
+    use super::changed_settings;
     use crate::config::{BaseLayer, Preset, Sources, load};
-    use crate::demo::{DemoOptions, Tier};
-
-    const OPTIONS: DemoOptions = DemoOptions {
-        pairs: 4,
-        seed: 1,
-        tier: Tier::Pose,
-    };
-
-    #[test]
-    fn directory_with_other_files_is_refused() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let data = dir.path().join("data");
-        let check = |options| check_directory(dir.path(), &data, options).is_ok();
-        assert!(check(&OPTIONS));
-        std::fs::create_dir(&data).expect("a folder");
-        assert!(!check(&OPTIONS));
-        std::fs::write(data.join(NOTE), "my scans").expect("a small file");
-        assert!(!check(&OPTIONS));
-        std::fs::write(data.join(NOTE), NOTE_TEXT).expect("a small file");
-        assert!(check(&OPTIONS));
-        let stamp = serde_json::to_vec(&OPTIONS).expect("plain values");
-        std::fs::write(data.join("dataset.json"), stamp).expect("a small file");
-        assert!(check(&OPTIONS));
-        assert!(check(&DemoOptions {
-            pairs: 9,
-            ..OPTIONS
-        }));
-        assert!(!check(&DemoOptions {
-            pairs: 3,
-            ..OPTIONS
-        }));
-        assert!(!check(&DemoOptions { seed: 2, ..OPTIONS }));
-    }
 
     #[test]
     fn saved_settings_are_those_of_preset_and_flags() {

@@ -6,7 +6,7 @@ use clap::Command;
 const EXAMPLES: [(&str, &str); 28] = [
     (
         "demo",
-        "mocban demo\nmocban demo trial --tier hard --pairs 100",
+        "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
     ),
     (
         "import",
@@ -72,10 +72,13 @@ const EXAMPLES: [(&str, &str); 28] = [
         "export",
         "mocban -C blocks export -o out\nmocban -C blocks export --to csv,webdataset --split 80/10/10 -o dataset",
     ),
-    ("view", "mocban -C blocks view b01-0117"),
+    (
+        "view",
+        "mocban -C blocks view b01-0117\nmocban -C blocks view notes-1",
+    ),
     (
         "contact-sheet",
-        "mocban -C blocks contact-sheet --order confidence -o worst.png",
+        "mocban -C blocks contact-sheet --order confidence -o worst.png\nmocban -C blocks contact-sheet --block notes-1 --overlay -o overlay.png",
     ),
     ("config", "mocban -C blocks config show"),
     ("completions", "mocban completions bash"),

@@ -12,13 +12,14 @@ use super::busy::Busy;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::files;
-use super::import_blocks;
+use super::import_blocks::{self, BlockArgs, BlockSource};
 use super::manifest_file::Listing;
 use super::missing_files::MissingFiles;
+use super::new_project::import_with;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
-use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary, NewCatalog};
-use crate::domain::{BlockSide, LengthUnit, PairName};
+use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
+use crate::domain::{LengthUnit, PairName};
 use crate::manifest::{ManifestRow, RowIds};
 use crate::store::Project;
 
@@ -45,27 +46,8 @@ pub(super) struct ImportArgs {
     /// A directory of prints
     #[arg(long, value_name = "DIR", requires = "meshes")]
     pub(super) prints: Option<PathBuf>,
-    /// The scan of a whole block, from which `run` cuts the characters as pairs
-    #[arg(
-        long,
-        value_name = "MESH",
-        requires = "page",
-        conflicts_with = "meshes"
-    )]
-    pub(super) block: Option<PathBuf>,
-    /// The image of the printed page of --block
-    #[arg(long, value_name = "IMAGE", requires = "block")]
-    pub(super) page: Option<PathBuf>,
-    /// Boxes of the characters on --page, such as a project of the VGG Image Annotator [default: found by `run`]
-    #[arg(long, value_name = "FILE", requires = "block")]
-    pub(super) labels: Option<PathBuf>,
-    /// The side of --block that the page shows: front (towards the positive direction of the nearest axis of the mesh)
-    /// or back [default: found by `run`]
-    #[arg(long, requires = "block")]
-    pub(super) side: Option<BlockSide>,
-    /// Id of --block [default: the file name of the mesh without extension]
-    #[arg(long, requires = "block")]
-    pub(super) name: Option<String>,
+    #[command(flatten)]
+    pub(super) block: BlockArgs,
     /// Unit of the meshes in --meshes or of --block: mm, cm, m or in
     #[arg(long, conflicts_with = "file")]
     pub(super) unit: Option<LengthUnit>,
@@ -78,9 +60,10 @@ pub(super) struct ImportArgs {
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    if import_blocks::are_blocks(&args)? {
+    if let Some(source) = BlockSource::of(args.file.as_deref(), &args.block, args.unit)? {
+        refuse_truths(&args)?;
         let busy = Busy::start(context, "importing");
-        let outcome = import_blocks::import_blocks(&args, context).await;
+        let outcome = import_blocks::import_blocks(&source, args.allow_missing, context).await;
         drop(busy);
         let outcome = outcome?;
         context.print_json(&import_blocks::as_json(&outcome))?;
@@ -96,6 +79,15 @@ pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
     print_outcome(&outcome, context);
     context.next("run");
     Ok(ExitCode::Done)
+}
+
+/// Refuses true alignments of pairs in an import of blocks.
+fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
+    if args.truth.is_none() {
+        return Ok(());
+    }
+    let text = "--truth holds true alignments of pairs, but blocks are imported";
+    Err(Refusal::Usage(text.to_owned()).into())
 }
 
 /// What an import changed.
@@ -149,79 +141,6 @@ struct ImportList {
 
 /// The summary of an import, the number of stored true alignments, and the missing files.
 type StoredList = (ImportSummary, u64, MissingFiles);
-
-/// Returns the missing directories of a path, the deepest first.
-fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
-    let missing = dir.ancestors().take_while(|dir| !dir.exists());
-    missing
-        .filter(|dir| !dir.as_os_str().is_empty())
-        .map(ToOwned::to_owned)
-        .collect()
-}
-
-/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded.
-///
-/// # Errors
-/// Returns the error of `import`, or an error if the catalog or the disk fails.
-pub(super) async fn import_with<T>(
-    project: &Project,
-    url: Option<&str>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    let missing_dirs = missing_dirs(project.dir());
-    let stored = store(project, url, import).await;
-    if stored.is_err() {
-        // Fails, as it should, if another process put something there.
-        let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
-    }
-    stored
-}
-
-async fn store<T>(
-    project: &Project,
-    url: Option<&str>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    if let Some(url) = url {
-        Project::create(project.dir())?;
-        let catalog = Catalog::connect(url, true).await?;
-        let stored = import(&catalog).await;
-        catalog.close().await;
-        return stored;
-    }
-    while let Some(new) = begin(project).await? {
-        let stored = import(new.catalog()).await;
-        if stored.is_err() {
-            new.discard().await;
-            return stored;
-        }
-        if new.place().await? {
-            return stored;
-        }
-        // Another process created the project meanwhile, so the list is imported into that project.
-    }
-    let catalog = Catalog::create(&project.catalog_path()).await?;
-    let stored = import(&catalog).await;
-    catalog.close().await;
-    stored
-}
-
-/// Begins a catalog if the project has none. Tries again if a failing import removes the project directory meanwhile.
-async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
-    const ATTEMPTS: usize = 20;
-    for _ in 1..ATTEMPTS {
-        let begun = try_begin(project).await;
-        if begun.is_ok() || project.dir().exists() {
-            return begun;
-        }
-    }
-    try_begin(project).await
-}
-
-async fn try_begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
-    Project::create(project.dir())?;
-    Ok(NewCatalog::begin(&project.catalog_path()).await?)
-}
 
 /// Imports the list into a catalog.
 async fn store_in(

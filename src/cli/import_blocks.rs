@@ -2,18 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use serde_json::{Value, json};
 
 use super::context::{Context, now};
 use super::exit::Refusal;
 use super::files;
-use super::import::{ImportArgs, import_with};
 use super::input_paths::on_disk;
 use super::manifest_file::{missing_file, refuse};
 use super::missing_files::MissingFiles;
+use super::new_project::import_with;
 use super::table::count;
 use crate::catalog::{BlockAttributes, BlockImportSummary};
-use crate::domain::BlockName;
+use crate::domain::{BlockName, BlockSide, LengthUnit};
 use crate::manifest::{BlockRow, is_block_list, parse_blocks};
 use crate::store::Project;
 
@@ -31,20 +32,65 @@ struct BlockListing {
     label: String,
 }
 
-/// Returns whether the arguments name blocks, not pairs.
-///
-/// # Errors
-/// Returns an error if the list cannot be read.
-pub(super) fn are_blocks(args: &ImportArgs) -> anyhow::Result<bool> {
-    if args.block.is_some() {
-        return Ok(true);
-    }
-    match &args.file {
-        Some(file) if !file.is_dir() => {
-            let bytes = files::read(file)?;
-            Ok(!files::is_jsonl(file, &bytes) && is_block_list(&bytes))
+/// Arguments of an import of one block.
+#[derive(Debug, Default, Args)]
+pub(super) struct BlockArgs {
+    /// The scan of a whole block, from which `run` cuts the characters as pairs
+    #[arg(
+        long,
+        value_name = "MESH",
+        requires = "page",
+        conflicts_with = "meshes"
+    )]
+    pub(super) block: Option<PathBuf>,
+    /// The image of the printed page of --block
+    #[arg(long, value_name = "IMAGE", requires = "block")]
+    pub(super) page: Option<PathBuf>,
+    /// Boxes of the characters on --page, such as a project of the VGG Image Annotator [default: found by `run`]
+    #[arg(long, value_name = "FILE", requires = "block")]
+    pub(super) labels: Option<PathBuf>,
+    /// The side of --block that the page shows: front (towards the positive direction of the nearest axis of the mesh)
+    /// or back [default: found by `run`]
+    #[arg(long, requires = "block")]
+    pub(super) side: Option<BlockSide>,
+    /// Id of --block [default: the file name of the mesh without extension]
+    #[arg(long, requires = "block")]
+    pub(super) name: Option<String>,
+}
+
+/// Where the blocks of an import are named.
+#[derive(Debug)]
+pub(super) enum BlockSource<'a> {
+    /// On the command line.
+    One {
+        /// The arguments.
+        args: &'a BlockArgs,
+        /// Unit of the mesh.
+        unit: Option<LengthUnit>,
+    },
+    /// In a list.
+    List(&'a Path),
+}
+
+impl<'a> BlockSource<'a> {
+    /// Returns where blocks are named, or `None` if the arguments name pairs.
+    ///
+    /// # Errors
+    /// Returns an error if the list cannot be read.
+    pub(super) fn of(
+        file: Option<&'a Path>,
+        args: &'a BlockArgs,
+        unit: Option<LengthUnit>,
+    ) -> anyhow::Result<Option<Self>> {
+        if args.block.is_some() {
+            return Ok(Some(Self::One { args, unit }));
         }
-        _ => Ok(false),
+        let Some(file) = file.filter(|file| !file.is_dir()) else {
+            return Ok(None);
+        };
+        let bytes = files::read(file)?;
+        let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
+        Ok(is_list.then_some(Self::List(file)))
     }
 }
 
@@ -53,14 +99,11 @@ pub(super) fn are_blocks(args: &ImportArgs) -> anyhow::Result<bool> {
 /// # Errors
 /// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub(super) async fn import_blocks(
-    args: &ImportArgs,
+    source: &BlockSource<'_>,
+    allow_missing: bool,
     context: &Context,
 ) -> anyhow::Result<BlockImportOutcome> {
-    if args.truth.is_some() {
-        let text = "--truth holds true alignments of pairs, but blocks are imported";
-        return Err(Refusal::Usage(text.to_owned()).into());
-    }
-    let mut listing = listing(args)?;
+    let mut listing = listing(source)?;
     let (storage, url) = context.data_locations()?;
     let project = Project::at(&context.dir()).with_storage(storage);
     if project.has_packs() {
@@ -72,7 +115,7 @@ pub(super) async fn import_blocks(
     for row in &mut listing.rows {
         locate(row, &listing.label, &project, &mut missing);
     }
-    if missing.count > 0 && !args.allow_missing {
+    if missing.count > 0 && !allow_missing {
         return Err(missing.refusal().into());
     }
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
@@ -86,23 +129,26 @@ pub(super) async fn import_blocks(
     })
 }
 
-fn listing(args: &ImportArgs) -> anyhow::Result<BlockListing> {
-    if let (Some(mesh), Some(page)) = (&args.block, &args.page) {
-        return Ok(BlockListing {
-            rows: vec![BlockRow {
-                line: 1,
-                name: name(args.name.as_deref(), mesh)?,
-                mesh: mesh.clone(),
-                page: page.clone(),
-                labels: args.labels.clone(),
-                unit: args.unit,
-                side: args.side,
-            }],
-            label: "block".to_owned(),
-        });
-    }
-    let Some(file) = &args.file else {
-        anyhow::bail!("give a list of blocks, or --block and --page");
+fn listing(source: &BlockSource<'_>) -> anyhow::Result<BlockListing> {
+    let file = match source {
+        BlockSource::List(file) => file,
+        BlockSource::One { args, unit } => {
+            let (Some(mesh), Some(page)) = (&args.block, &args.page) else {
+                anyhow::bail!("give --block and --page");
+            };
+            return Ok(BlockListing {
+                rows: vec![BlockRow {
+                    line: 1,
+                    name: name(args.name.as_deref(), mesh)?,
+                    mesh: mesh.clone(),
+                    page: page.clone(),
+                    labels: args.labels.clone(),
+                    unit: *unit,
+                    side: args.side,
+                }],
+                label: "block".to_owned(),
+            });
+        }
     };
     let mut rows = parse_blocks(&files::read(file)?).map_err(|problems| refuse(file, &problems))?;
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -138,8 +184,9 @@ fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut Miss
         if !is_below_root && let Some(found) = on_disk(path) {
             *path = found;
         }
-        let found = missing_file(label, line, (kind, path), &name, project);
-        found.into_iter().for_each(|line| missing.add(line));
+        if let Some(line) = missing_file(label, line, (kind, path), &name, project) {
+            missing.add(line);
+        }
     }
 }
 

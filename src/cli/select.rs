@@ -61,6 +61,25 @@ pub(super) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Opti
     Ok(catalog.block_names().await?.contains(&name).then_some(name))
 }
 
+/// Looks up one block.
+///
+/// # Errors
+/// Returns an error if the block does not exist. The message suggests similar ids.
+pub(super) async fn existing_block(catalog: &Catalog, typed: &str) -> anyhow::Result<BlockName> {
+    let all = catalog.block_names().await?;
+    let name = typed.parse::<BlockName>().ok();
+    if let Some(name) = name.filter(|name| all.contains(name)) {
+        return Ok(name);
+    }
+    let similar = nearest(typed, all.iter().map(BlockName::as_str), 3);
+    let hint = if similar.is_empty() {
+        String::new()
+    } else {
+        format!("; similar ids: {}", similar.join(", "))
+    };
+    Err(Refusal::NothingSelected(format!("there is no block {typed}{hint}")).into())
+}
+
 fn no_such_pair(typed: &str, all: &[PairName]) -> String {
     let similar = nearest(typed, all.iter().map(PairName::as_str), 3);
     if similar.is_empty() {

@@ -1,5 +1,7 @@
 //! `show BLOCK`: prints files, stages, characters and failures of a whole block.
 
+use std::fmt::Write as _;
+
 use serde_json::{Value, json};
 
 use super::context::{Context, shell_quoted};
@@ -155,7 +157,8 @@ fn characters_text(
         (state.retired, "retired"),
     ] {
         if number > 0 {
-            text.push_str(&format!(" · {number} {what}"));
+            // Formatting into memory does not fail.
+            let _ = write!(text, " · {number} {what}");
         }
     }
     text.push('\n');

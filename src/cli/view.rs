@@ -1,10 +1,11 @@
-//! `view PAIR`: shows a scan on its print in the browser.
+//! `view PAIR` shows a scan on its print in the browser, `view BLOCK` a whole page.
 
 use std::net::{Ipv4Addr, SocketAddr};
 
 use clap::Args;
 use serde_json::json;
 
+use super::block_sheet;
 use super::browser::open;
 use super::context::{Context, shell_quoted};
 use super::exit::{ExitCode, Refusal};
@@ -15,17 +16,17 @@ use crate::domain::ThresholdMetric;
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
 use crate::runner::{Stop, StopLevel};
-use crate::view;
+use crate::view::{self, ViewServer};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
 pub(super) struct ViewArgs {
-    /// The pair
+    /// The pair, or a block
     pair: String,
     /// The metric whose result is shown [default: ensemble, or else the first that the pair has]
     #[arg(long)]
     metric: Option<ThresholdMetric>,
-    /// Port on this machine; 0 chooses the same port each time for a pair, or any free port
+    /// Port on this machine; 0 chooses the same port each time for a name, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
     /// Print the address without opening a browser
@@ -34,12 +35,20 @@ pub(super) struct ViewArgs {
 }
 
 pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.open_read_only().await?;
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    if select::block(&catalog, &args.pair).await?.is_some() {
+        let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
+        let block = block_sheet::read(&args.pair, metric, &project, &catalog, context).await;
+        catalog.close().await;
+        let page = view::bind_block(address, block?).await?;
+        return serve(page, &args, context).await;
+    }
     let limits = context.settings()?.config.limits;
     let limits = InputFileLimits {
         mesh: limits.mesh,
         image: limits.image,
     };
-    let (project, catalog) = context.open_read_only().await?;
     let name = select::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;
@@ -62,11 +71,15 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
-    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     let page = view::bind(address, name.as_str(), &scan).await?;
+    serve(page, &args, context).await
+}
+
+/// Announces a page and serves it until the user ends it.
+async fn serve(page: ViewServer, args: &ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
-    let _file = announce(&page.url(), &args, context)?;
+    let _file = announce(&page.url(), args, context)?;
     let drain = stop.clone();
     tokio::select! {
         () = page.serve(async move { drain.reached(StopLevel::Drain).await }) => {}

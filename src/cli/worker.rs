@@ -61,9 +61,20 @@ pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     watch.abort();
     catalog.close().await;
     let planned = planned?;
-    context.print_json(&json!({"schema": 1, "pairs": planned.left, "status": planned.status}))?;
-    context.info(&format!("{} to run", count(planned.left, "pair")));
-    if planned.left > 0 {
+    let blocks = planned.blocks.left;
+    context.print_json(&json!({
+        "schema": 1, "pairs": planned.left, "blocks": blocks, "status": planned.status,
+    }))?;
+    let numbers = match blocks {
+        0 => count(planned.left, "pair"),
+        blocks => format!(
+            "{} and {}",
+            count(blocks, "block"),
+            count(planned.left, "pair")
+        ),
+    };
+    context.info(&format!("{numbers} to run"));
+    if planned.left + blocks > 0 {
         context.next("worker");
     }
     Ok(ExitCode::Done)

@@ -148,7 +148,11 @@ fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
 
 /// Returns the signed distance to the outline as a knife would cut it. The outline is moved outwards by about
 /// `weight_mm`, and has rounded corners and a slightly irregular edge.
-fn knife_outline(distance: &ScalarField, weight_mm: f64, rng: &mut ChaCha8Rng) -> ScalarField {
+pub(super) fn knife_outline(
+    distance: &ScalarField,
+    weight_mm: f64,
+    rng: &mut ChaCha8Rng,
+) -> ScalarField {
     let (coarse, fine) = (Noise::draw(rng), Noise::draw(rng));
     let (coarse_mm, fine_mm) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));
     let round = distance.blurred(rng.random_range(0.05..0.09));
@@ -161,7 +165,7 @@ fn knife_outline(distance: &ScalarField, weight_mm: f64, rng: &mut ChaCha8Rng) -
 }
 
 /// Removes small chips along the stroke outline.
-fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
+pub(super) fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
     for _ in 0..rng.random_range(2..9_u32) {
         let Some([u, v]) = random_boundary_point(strokes, rng) else {
             return;

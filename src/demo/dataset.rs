@@ -232,7 +232,7 @@ fn clear_folder(path: &Path) -> Result<(), DatasetError> {
 }
 
 /// Adds a path to an error.
-fn at<E: Into<std::io::Error>>(path: &Path) -> impl FnOnce(E) -> DatasetError {
+pub(super) fn at<E: Into<std::io::Error>>(path: &Path) -> impl FnOnce(E) -> DatasetError {
     |error| DatasetError::Io {
         path: path.to_owned(),
         source: error.into(),

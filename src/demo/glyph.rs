@@ -16,6 +16,15 @@ pub(super) struct Glyphs {
     characters: Vec<char>,
 }
 
+/// Position of a character's ink in its em square. Lengths are shares of the em.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GlyphExtent {
+    /// Longest side of the ink's bounding box.
+    pub longest: f64,
+    /// Middle of the bounding box relative to the middle of the em square, right and down.
+    pub middle: [f64; 2],
+}
+
 impl Glyphs {
     /// Parses the embedded font.
     pub(super) fn embedded() -> Self {
@@ -32,6 +41,37 @@ impl Glyphs {
     /// Returns the usable characters, sorted by code point.
     pub(super) fn characters(&self) -> &[char] {
         &self.characters
+    }
+
+    /// Returns all characters that have ink, also the flat ones, sorted by code point.
+    pub(super) fn with_flat_characters(&self) -> Vec<char> {
+        let mut characters: Vec<char> = self
+            .font
+            .codepoint_ids()
+            .filter(|(_, character)| !character.is_ascii() && self.extent(*character).is_some())
+            .map(|(_, character)| character)
+            .collect();
+        characters.sort_unstable();
+        characters
+    }
+
+    /// Returns the position of a character's ink in its em square, or `None` if it has no ink.
+    pub(super) fn extent(&self, character: char) -> Option<GlyphExtent> {
+        let id = self.font.glyph_id(character);
+        let bounds = outlined(&self.font, id, 1000.0, [0.0, 0.0])?.px_bounds();
+        let units_per_px = f64::from(self.font.height_unscaled()) / 1000.0;
+        let units_per_em = f64::from(self.font.units_per_em().unwrap_or(1000.0));
+        let em = |px: f32| f64::from(px) * units_per_px / units_per_em;
+        let middle_u = f64::from(self.font.h_advance_unscaled(id)) / units_per_em / 2.0;
+        let ascent = f64::from(self.font.ascent_unscaled()) / units_per_em;
+        let longest = em(bounds.width().max(bounds.height()));
+        (longest > 0.0).then(|| GlyphExtent {
+            longest,
+            middle: [
+                em(bounds.min.x + bounds.max.x) / 2.0 - middle_u,
+                em(bounds.min.y + bounds.max.y) / 2.0 + ascent - 0.5,
+            ],
+        })
     }
 
     /// Draws a character into `coverage`, which holds the inked share, 0..=1, of each sample's cell. The character's

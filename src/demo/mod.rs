@@ -7,6 +7,7 @@
 //! in memory, from a seed, and `dataset` writes them to disk.
 
 mod artwork;
+pub mod block;
 mod block_body;
 mod calligraphy;
 mod carved_block;

@@ -113,7 +113,7 @@ fn draw_unit(tier: Tier, rng: &mut ChaCha8Rng) -> (Option<LengthUnit>, f64) {
 }
 
 /// Draws a uniformly distributed rotation: a quaternion of four normal draws, divided by its length (Muller 1959).
-fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
+pub(super) fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     let raw = [0; 4].map(|_: i32| normal(rng));
     let length = raw.iter().map(|c| c * c).sum::<f64>().sqrt();
     let [w, x, y, z] = raw.map(|c| c / length);

@@ -1,5 +1,6 @@
 //! Domain types: small values that do not use files, SQL, async code or image buffers.
 
+mod alignment_prior;
 mod artifact;
 pub mod artifact_role;
 mod attention_check;
@@ -27,6 +28,7 @@ mod unit;
 mod verdict;
 mod worker_metrics;
 
+pub use alignment_prior::AlignmentPrior;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
 pub use block::{BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord};

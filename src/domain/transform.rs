@@ -191,6 +191,26 @@ impl PrintFromMesh {
         Self([row(a), row(b), m[2]])
     }
 
+    /// Returns the map from depth-map pixels to print pixels that agrees with this map on the character plane. `None` if
+    /// the depth map has no inverse.
+    pub fn print_from_depth(
+        &self,
+        depth_from_plane: &Affine2,
+        plane_from_mesh: &Rigid3,
+    ) -> Option<Affine2> {
+        let plane_from_depth = depth_from_plane.inverse()?;
+        let mesh_from_plane = plane_from_mesh.inverse();
+        let print = |depth: [f64; 2]| {
+            let [x, y] = plane_from_depth.apply(depth);
+            let [x, y, _] = self.apply(mesh_from_plane.apply([x, y, 0.0]));
+            [x, y]
+        };
+        let origin = print([0.0, 0.0]);
+        let [right, down] = [print([1.0, 0.0]), print([0.0, 1.0])];
+        let row = |k: usize| [right[k] - origin[k], down[k] - origin[k], origin[k]];
+        Some(Affine2([row(0), row(1)]))
+    }
+
     /// Maps a mesh point to `[x, y, height]`: x and y in print pixels, the height over the plane in mesh units.
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let dot = |r: [f64; 4]| r[0] * x + r[1] * y + r[2] * z + r[3];
@@ -201,6 +221,23 @@ impl PrintFromMesh {
 #[cfg(test)]
 mod tests {
     use super::{Affine2, PrintFromMesh, Rigid3};
+
+    #[test]
+    fn an_alignment_and_the_maps_to_the_plane_give_the_pose_back() {
+        let print_from_depth = Affine2::similarity(0.7, 0.4, [12.0, -3.0]);
+        let depth_from_plane = Affine2([[-20.0, 0.0, 256.0], [0.0, -20.0, 250.0]]);
+        let (sin, cos) = 0.6_f64.sin_cos();
+        let axes = [[cos, sin, 0.0], [0.0, 0.0, 1.0], [sin, -cos, 0.0]];
+        let plane_from_mesh = Rigid3::to_frame(axes, [5.0, -7.0, 2.0]);
+        let print_from_mesh =
+            PrintFromMesh::new(&print_from_depth, &depth_from_plane, &plane_from_mesh);
+        let pose = print_from_mesh
+            .print_from_depth(&depth_from_plane, &plane_from_mesh)
+            .unwrap();
+        for (row, expected) in pose.0.iter().zip(&print_from_depth.0) {
+            assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9));
+        }
+    }
 
     fn close(a: &[f64], b: &[f64]) -> bool {
         a.iter().zip(b).all(|(p, q)| (p - q).abs() < 1e-12)

@@ -1,6 +1,7 @@
 //! Exports results for other tools, and images for people.
 
 mod annotations;
+pub mod block_view;
 mod contact_sheet;
 mod export_folder;
 mod export_logs;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::csv::{missing_column, similar_column};
+use super::column_names::{missing_column, similar_column};
 use super::error::{ManifestError, at_line, of_list};
 use super::text::{LineCounter, as_utf8, delimiter};
 use crate::domain::{BlockName, BlockSide, LengthUnit};

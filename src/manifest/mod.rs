@@ -2,6 +2,7 @@
 //! and read no files. All problems of a list are reported together.
 
 mod block_list;
+mod column_names;
 mod csv;
 mod draft;
 mod error;

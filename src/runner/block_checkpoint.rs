@@ -12,8 +12,8 @@ use super::policy;
 use super::run_context::RunContext;
 use super::stage_output::result_hash;
 use crate::catalog::{
-    BlockCheckpoint, BlockFailure, BlockFailureAction, CutOutcome, CutPair, CutSummary,
-    InputVersion, MadeWith, NewCharacter,
+    BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
+    MadeWith, NewCharacter,
 };
 use crate::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
@@ -36,7 +36,7 @@ pub(super) use while_unavailable;
 /// Stores a computed stage. Fails the block instead if the output is not valid.
 pub(super) async fn store_stage(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     stage: BlockStage,
     computed: ComputedBlockStage,
 ) -> Result<AfterStage, RunError> {
@@ -70,7 +70,7 @@ pub(super) async fn store_stage(
         inputs: block.inputs.clone(),
         ms,
         at: context.clock.now(),
-        next_deadline: context.deadline(),
+        next_deadline: context.block_deadline(),
         alive_since: context.alive_since(),
     };
     let after = match stage.next() {
@@ -93,7 +93,7 @@ pub(super) async fn store_stage(
 
 async fn advance(
     context: &RunContext,
-    mut block: BlockInProgress,
+    mut block: Box<BlockInProgress>,
     record: BlockStageRecord,
     checkpoint: BlockCheckpoint,
     next: BlockStage,
@@ -115,7 +115,7 @@ async fn advance(
 
 async fn finish_cut(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     checkpoint: BlockCheckpoint,
     characters: Vec<NewCharacter>,
 ) -> Result<AfterStage, RunError> {
@@ -125,9 +125,9 @@ async fn finish_cut(
         catalog.finish_cut(lease.clone(), checkpoint.clone(), characters.clone())
     );
     let summary = match stored? {
-        CutOutcome::Stored(summary) => summary,
-        CutOutcome::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
-        CutOutcome::NameTaken(taken) => {
+        CutReply::Stored(summary) => summary,
+        CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
+        CutReply::NameTaken(taken) => {
             let text = format!(
                 "there is a pair {taken} that was not cut from this block; import the block with another --name"
             );
@@ -156,7 +156,7 @@ async fn finish_cut(
 /// Stores a failure of a stage.
 pub(super) async fn store_failure(
     context: &RunContext,
-    block: BlockInProgress,
+    block: Box<BlockInProgress>,
     stage: BlockStage,
     error: BlockStageError,
     ms: Option<u64>,

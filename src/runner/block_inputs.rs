@@ -207,7 +207,7 @@ pub(super) fn outdated(
     .find_map(|(first, differs)| (differs && first < stage).then_some(first))
 }
 
-/// Returns the failure of a stage as it is stored.
+/// Converts an error of a stage to the failure that is stored. Also returns whether a retry may succeed.
 pub(super) fn as_failure(error: BlockStageError) -> (Failure, bool) {
     match error {
         BlockStageError::Failed {

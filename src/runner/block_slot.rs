@@ -56,22 +56,18 @@ impl BlockSlot {
             return Ok(false);
         }
         let context = &self.context;
-        let (deadline, alive_since) = (context.deadline(), context.alive_since());
+        let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
         let catalog = &context.catalog;
         let claimed = catalog.retry_while_unavailable(async || {
             catalog.claim_block(worker, deadline, alive_since).await
         });
-        match claimed.await? {
-            Some((lease, work)) => {
-                let task = process_block(Arc::clone(context), lease, work);
-                self.task.spawn(task);
-                Ok(true)
-            }
-            None => {
-                self.may_find_one = false;
-                Ok(false)
-            }
-        }
+        let Some((lease, work)) = claimed.await? else {
+            self.may_find_one = false;
+            return Ok(false);
+        };
+        let task = process_block(Arc::clone(context), lease, work);
+        self.task.spawn(task);
+        Ok(true)
     }
 
     /// Waits for the end of the block in progress. Returns `None` at once if there is none.

@@ -182,7 +182,7 @@ pub struct CharacterOutput {
     pub cut: Result<CutFiles, String>,
 }
 
-/// The files of a character, and what its pair is told.
+/// The files of a character, and attributes of its pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutFiles {
     /// The mesh, in the frame and unit of the block's scan, as written with [`BlockArtifacts::write`].

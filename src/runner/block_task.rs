@@ -45,12 +45,12 @@ pub(super) async fn process_block(
     let sources = BlockSources::new(&context.project, &work.attributes, context.block_limits);
     let inputs = work.inputs.clone();
     let (mut stage, mut reruns) = (lease.cursor(), 0);
-    let mut block = BlockInProgress {
+    let mut block = Box::new(BlockInProgress {
         lease,
         work,
         sources,
         inputs,
-    };
+    });
     loop {
         if context.is_draining() {
             let end = release(&context, block.lease).await;
@@ -181,7 +181,7 @@ async fn compute(
     }
 }
 
-/// Runs blocking work on a thread of its own, with a flag that tells it to stop. Waits for at most as long as one stage
+/// Runs blocking work on a thread of its own, with a flag that requests a stop. Waits for at most as long as one stage
 /// may take; then, and after an immediate stop of the run, sets the flag and abandons the thread.
 async fn on_thread<T: Send + 'static>(
     context: &RunContext,

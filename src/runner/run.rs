@@ -7,25 +7,23 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use super::block_inputs;
 use super::block_pipeline::BlockPipeline;
+use super::block_plan;
 use super::block_stages::BlockStages;
 use super::error::RunError;
-use super::events::{BlockSummary, RunEvent, RunSummary};
+use super::events::{RunEvent, RunSummary};
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
+use super::run_end::{RunEnd, block_limits, outstanding_blocks};
 use super::run_guard::RunGuard;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
-use crate::catalog::{
-    BlockPlanEntry, BlockSettings, Catalog, DeadWorker, Fingerprints, OutstandingBlocks,
-    PairSelection, Plan, StatusCounts, WorkLeft,
-};
+use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection};
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
@@ -37,46 +35,6 @@ const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
     Fingerprints::new(|stage| settings.fingerprint_fields(stage))
-}
-
-/// What a run would do.
-#[derive(Debug, Clone)]
-pub struct RunPlan {
-    /// The pairs. Pairs that are yet to be cut from blocks are not included.
-    pub pairs: Plan,
-    /// The blocks. None if only named pairs would run.
-    pub blocks: Vec<BlockPlanEntry>,
-}
-
-/// Returns what [`run`] would do, for `--dry-run`. Stores in the catalog which input files have changed.
-///
-/// # Errors
-/// Returns an error if a named pair does not exist, or the catalog or the files cannot be used.
-pub async fn plan(
-    project: &Project,
-    catalog: &Catalog,
-    settings: &Settings,
-    options: &RunOptions,
-) -> Result<RunPlan, RunError> {
-    let selection = selection(catalog, options).await?;
-    let limits = read_limits(options, &Stop::new());
-    input_changes::store_changes(project, catalog, selection.as_ref(), &limits).await?;
-    let names = options.pairs.as_deref();
-    let pairs = catalog
-        .plan(&fingerprints(settings), names, options.rerun)
-        .await?;
-    let mut blocks = Vec::new();
-    if selection.is_none() {
-        block_inputs::store_changes(project, catalog, &limits).await?;
-        let settings = block_settings(&BlockPipeline::new(options));
-        blocks = catalog.plan_blocks(&settings, options.rerun).await?;
-    }
-    Ok(RunPlan { pairs, blocks })
-}
-
-/// Returns the settings of the stages of blocks.
-fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
-    BlockSettings::new(|stage| stages.settings(stage))
 }
 
 /// What computes the stages of a run.
@@ -158,7 +116,7 @@ pub(super) async fn run_with(
         let ended = RunEnd {
             counts: RunCounts::default(),
             left,
-            blocks: catalog.outstanding_blocks().await?,
+            blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
             status,
             compute_time: Duration::ZERO,
         };
@@ -207,7 +165,7 @@ pub(super) async fn run_with(
     let ended = RunEnd {
         counts,
         left,
-        blocks: catalog.outstanding_blocks().await?,
+        blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
         status,
         compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
     };
@@ -277,25 +235,9 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
-        self.plan_blocks(&limits).await
-    }
-
-    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
-    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
-        if self.selection.is_some() {
-            return Ok(());
+        if self.selection.is_none() {
+            block_plan::requeue(self.project, catalog, self.blocks, options, &limits, now).await?;
         }
-        let (catalog, policy) = (self.catalog, self.options.rerun);
-        block_inputs::store_changes(self.project, catalog, limits).await?;
-        let settings = block_settings(self.blocks);
-        let requeued = catalog.retry_while_unavailable(async || {
-            catalog.requeue_stale_blocks(&settings, policy).await
-        });
-        requeued.await?;
-        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        let ended = catalog
-            .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await);
-        ended.await?;
         Ok(())
     }
 
@@ -319,7 +261,7 @@ impl RunStart<'_> {
 
 /// Returns the limits for reads that take place before the first stage. Any stop request ends these reads, because no
 /// stage is in progress.
-fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
+pub(super) fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
     ReadLimits {
         timeout: options.stage_timeout,
         stop: stop.clone(),
@@ -327,7 +269,8 @@ fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
     }
 }
 
-async fn selection(
+/// Returns the named pairs, or `None` for all.
+pub(super) async fn selection(
     catalog: &Catalog,
     options: &RunOptions,
 ) -> Result<Option<PairSelection>, RunError> {
@@ -339,51 +282,4 @@ async fn selection(
         return Err(RunError::NoSuchPair(unknown));
     }
     Ok(Some(catalog.select(names).await?))
-}
-
-/// Returns the largest mesh and the largest other file of a block, with the names of the settings.
-const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
-    [
-        (options.mesh_limits.max_bytes, "limits.mesh.max_bytes"),
-        (options.image_limits.max_bytes, "limits.image.max_bytes"),
-    ]
-}
-
-/// What is known when a run has ended.
-struct RunEnd {
-    counts: RunCounts,
-    left: WorkLeft,
-    blocks: OutstandingBlocks,
-    status: StatusCounts,
-    compute_time: Duration,
-}
-
-impl RunEnd {
-    fn summary(self, stop: &Stop, clock: Clock) -> RunSummary {
-        let Self {
-            counts,
-            left,
-            blocks,
-            ..
-        } = self;
-        let is_left = left.pairs > 0 || blocks.left() > 0;
-        RunSummary {
-            done: counts.done,
-            failed: counts.failed,
-            stages: counts.stages,
-            left: left.pairs,
-            failed_in_all: left.quarantined,
-            blocks: BlockSummary {
-                done: counts.blocks.done,
-                failed: counts.blocks.failed,
-                left: blocks.left(),
-                failed_in_all: blocks.quarantined,
-            },
-            stopped: is_left && stop.level() > StopLevel::Go,
-            too_many_failures: counts.too_many_failures,
-            compute_time: self.compute_time,
-            elapsed_ms: clock.elapsed_ms(),
-            status: self.status,
-        }
-    }
 }

@@ -84,6 +84,12 @@ impl RunContext {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }
 
+    /// Returns when a stage of a block that begins now has to be finished. Reading its files may take as long as computing
+    /// it.
+    pub(super) fn block_deadline(&self) -> UnixMillis {
+        self.deadline() + self.stage_timeout.as_millis() as i64
+    }
+
     /// Returns the time one lease length ago. A worker's leases are valid if its last heartbeat is not older than this.
     pub(super) fn alive_since(&self) -> UnixMillis {
         self.clock.now() - self.timing.lease_ms()

@@ -168,10 +168,10 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
+        // Blocks first: the cut of a block that another process works on may add pairs.
+        let blocks = self.block.outstanding().await?.left();
         let left = self.outstanding().await?;
-        let pairs = left.ready + left.leased + left.backoff;
-        // The cut of a block that another process works on may add pairs.
-        Ok(pairs == 0 && self.block.outstanding().await?.left() == 0)
+        Ok(blocks == 0 && left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
     /// Starts leased pairs while slots and memory are free and fewer than `max_storing` pairs are being stored.

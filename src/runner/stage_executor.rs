@@ -11,7 +11,7 @@ use super::stage_output::{self, ExecutionError, StageOutput, png};
 use crate::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
-use crate::domain::{FailureClass, Stage};
+use crate::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
 use crate::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::{NormalizeError, Normalized, PrintMasks};
 use crate::stages::register::RegisterError;
@@ -118,8 +118,9 @@ impl PipelineExecutor {
     fn register(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.inputs.depth_map(pair)?;
         let normalized = self.inputs.normalized(pair)?;
-        let registered =
-            pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
+        let expected = expected_pose(pair, &depth)?;
+        let registered = pipeline::register(&depth, &normalized, expected.as_ref(), &self.settings)
+            .map_err(|error| {
                 // Name the print if the characters do not match. For other errors, the mesh is the likelier cause.
                 let path = match error {
                     RegisterError::NoMatch { .. } | RegisterError::OtherCharacter { .. } => {
@@ -149,6 +150,25 @@ impl PipelineExecutor {
             metrics: outcome.metrics,
         })
     }
+}
+
+/// Returns the pose that the registration of the block expects; `None` for a pair that was not cut from one.
+fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>, ExecutionError> {
+    let Some(prior) = &pair.attributes.prior else {
+        return Ok(None);
+    };
+    let fit = StageInputs::fit(pair)?;
+    let prior: AlignmentPrior = serde_json::from_str(prior).map_err(|error| {
+        let text = format!(
+            "the expected alignment of {}: {error}",
+            pair.attributes.name
+        );
+        ExecutionError::failed(FailureClass::Bug, text)
+    })?;
+    let scale = &depth.scale.depth_from_plane;
+    Ok(prior
+        .print_from_mesh
+        .print_from_depth(scale, &fit.plane_from_mesh))
 }
 
 fn in_file(path: &str, error: &StageError) -> ExecutionError {

@@ -1,5 +1,6 @@
 //! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
 
+mod block_kills;
 mod blocks;
 mod fake_blocks;
 mod fake_executor;
@@ -81,23 +82,6 @@ impl RunFixture {
             stop: Stop::new(),
             events: Mutex::default(),
             _dir: Some(dir),
-        }
-    }
-
-    /// A project that exists already. It is not removed.
-    async fn existing(dir: &std::path::Path) -> Self {
-        let project = Project::open(dir).expect("a project");
-        let catalog = Catalog::open(&project.catalog_path()).await;
-        let executor = FakeExecutor::default();
-        let _ = executor.project.set(project.clone());
-        Self {
-            project,
-            catalog: catalog.expect("a catalog"),
-            executor: Arc::new(executor),
-            blocks: Arc::default(),
-            stop: Stop::new(),
-            events: Mutex::default(),
-            _dir: None,
         }
     }
 

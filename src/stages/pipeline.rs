@@ -17,7 +17,9 @@ use super::print::Print;
 use super::register::{self, RegisterError, Registered};
 use super::scan::Scan;
 use super::settings::{AlignmentMethod, Settings};
-use crate::domain::{FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric};
+use crate::domain::{
+    Affine2, FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric,
+};
 use crate::raster::DepthMap;
 
 /// Why a stage found no result.
@@ -91,17 +93,21 @@ pub fn normalize(
     Ok(normalized)
 }
 
-/// Aligns the depth map with the print and scores each metric's masks.
+/// Aligns the depth map with the print and scores each metric's masks. `expected` is the pose that is expected from the
+/// registration of a whole block; the method of the paper does not use it.
 ///
 /// # Errors
 /// Returns an error if no pose is found or trusted, or a threshold leaves no strokes.
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
+    expected: Option<&Affine2>,
     settings: &Settings,
 ) -> Result<Registered, RegisterError> {
     match settings.pipeline.method {
-        AlignmentMethod::Default => register::register(depth, normalized, &settings.register),
+        AlignmentMethod::Default => {
+            register::register(depth, normalized, expected, &settings.register)
+        }
         AlignmentMethod::Paper => {
             paper_method::register::register(depth, normalized, &settings.register)
         }
@@ -157,7 +163,7 @@ impl AlignedPair {
             Some(outline) => normalize(&depth, &print.clone().within(Some(outline)), settings),
             None => normalize(&depth, print, settings),
         }?;
-        let registered = register(&depth, &normalized, settings)?;
+        let registered = register(&depth, &normalized, None, settings)?;
         Ok(Self {
             fit,
             depth,

@@ -26,9 +26,27 @@ pub(super) fn view(pair: &str) -> String {
     document(LANGUAGE, pair, &head, &body).into_string()
 }
 
+/// Returns the page of a block. Its script loads the data and creates the controls.
+pub(super) fn block(name: &str) -> String {
+    let head = html! {
+        link rel="stylesheet" href="/assets/scan-viewer.css";
+        link rel="stylesheet" href="/assets/block-view.css";
+        link rel="icon" href="data:,";
+        script type="module" src="/assets/block-view.js" {}
+    };
+    let body = html! {
+        body.scan-page {
+            main #block-view {}
+            dialog #scan .scan-dialog {}
+            noscript { p { "This page needs JavaScript. All of it is served by your own computer." } }
+        }
+    };
+    document(LANGUAGE, name, &head, &body).into_string()
+}
+
 /// Returns the page at the start address. It sends the browser on to the view.
 pub(super) fn forward() -> String {
-    forward_page(LANGUAGE, "mocban", "3D view").into_string()
+    forward_page(LANGUAGE, "mocban", "view").into_string()
 }
 
 /// Returns the page for a one-time token that was used before.
@@ -38,11 +56,11 @@ pub(super) fn token_used() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{forward, token_used, view};
+    use super::{block, forward, token_used, view};
 
     #[test]
     fn pages_load_only_from_this_server() {
-        for page in [view("a<b"), forward(), token_used()] {
+        for page in [view("a<b"), block("a<b"), forward(), token_used()] {
             assert!(!page.contains("//"), "{page}");
         }
         assert!(view("a<b").contains("<title>a&lt;b</title>"));

@@ -34,19 +34,19 @@ pub enum ViewError {
     Token(std::io::Error),
 }
 
-/// What the page shows, and who may see it.
-#[derive(Debug)]
-struct ShownScan {
-    access: Arc<AccessControl>,
-    pair: String,
-    data: Bytes,
-}
-
 /// A server that is bound and ready to serve.
 #[derive(Debug)]
 pub struct ViewServer {
     listener: TcpListener,
-    shown: Arc<ShownScan>,
+    access: Arc<AccessControl>,
+    pages: Router,
+}
+
+/// The scan of a page.
+#[derive(Debug)]
+struct ShownScan {
+    pair: String,
+    data: Bytes,
 }
 
 /// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free.
@@ -58,43 +58,58 @@ pub async fn bind(
     pair: &str,
     view: &ScanView,
 ) -> Result<ViewServer, ViewError> {
-    let failed = |source| ViewError::Listen { address, source };
-    let listener = listen(address, pair).await.map_err(failed)?;
-    let bound = listener.local_addr().map_err(failed)?;
-    let access = AccessControl::new("view", bound).map_err(ViewError::Token)?;
-    Ok(ViewServer {
-        listener,
-        shown: Arc::new(ShownScan {
-            access: Arc::new(access),
-            pair: pair.to_owned(),
-            data: view.to_bytes().into(),
-        }),
-    })
+    let shown = ShownScan {
+        pair: pair.to_owned(),
+        data: view.to_bytes().into(),
+    };
+    let pages = Router::new()
+        .route("/", get(index))
+        .route("/assets/{name}", get(asset))
+        .route("/scan", get(scan))
+        .with_state(Arc::new(shown));
+    ViewServer::open(address, pair, pages).await
 }
 
 impl ViewServer {
+    /// Binds the address for pages without a start address. Port 0 chooses the same port for equal names, if it is free.
+    ///
+    /// # Errors
+    /// Returns an error if the address cannot be bound or the system provides no randomness.
+    pub(super) async fn open(
+        address: SocketAddr,
+        name: &str,
+        pages: Router,
+    ) -> Result<Self, ViewError> {
+        let failed = |source| ViewError::Listen { address, source };
+        let listener = listen(address, name).await.map_err(failed)?;
+        let bound = listener.local_addr().map_err(failed)?;
+        let access = AccessControl::new("view", bound).map_err(ViewError::Token)?;
+        Ok(Self {
+            listener,
+            access: Arc::new(access),
+            pages,
+        })
+    }
+
     /// Returns the start URL with the one-time token.
     pub fn url(&self) -> String {
-        self.shown.access.url()
+        self.access.url()
     }
 
     /// Serves requests until `stop` completes, and then at most two seconds longer.
     pub async fn serve(self, stop: impl Future<Output = ()>) {
-        let access = Arc::clone(&self.shown.access);
+        let access = Arc::clone(&self.access);
         let router = Router::new()
             .route(START, get(start))
-            .route("/", get(index))
-            .route("/assets/{name}", get(asset))
-            .route("/scan", get(scan))
-            .layer(middleware::from_fn_with_state(access, guard))
-            .with_state(self.shown);
+            .with_state(self.access)
+            .merge(self.pages)
+            .layer(middleware::from_fn_with_state(access, guard));
         serve(self.listener, router, ConnectionLimits::system(), stop).await;
     }
 }
 
-async fn start(State(shown): State<Arc<ShownScan>>, RawQuery(query): RawQuery) -> Response {
-    let query = query.as_deref();
-    shown.access.start(query, page::forward, page::token_used)
+async fn start(State(access): State<Arc<AccessControl>>, RawQuery(query): RawQuery) -> Response {
+    access.start(query.as_deref(), page::forward, page::token_used)
 }
 
 async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {

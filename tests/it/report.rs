@@ -86,6 +86,7 @@ impl FinishedRun {
             character: None,
             block: None,
             meta: serde_json::Map::new(),
+            prior: None,
         });
         let (sender, chunks) = tokio::sync::mpsc::channel(2);
         for chunk in [ImportChunk::Rows(rows.collect()), ImportChunk::End] {

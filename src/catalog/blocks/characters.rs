@@ -8,7 +8,7 @@ use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockCharacterState, BlockId, BlockName, PairId};
+use crate::domain::{BlockCharacterState, BlockId, BlockName, PairId, PairName};
 
 const UPSERT: &str = "
 INSERT INTO block_character (block, label, place, character, box, confidence, state, reason, maps, pair)
@@ -17,7 +17,7 @@ ON CONFLICT (block, label) DO UPDATE SET place = excluded.place, character = exc
     confidence = excluded.confidence, state = excluded.state, reason = excluded.reason, maps = excluded.maps,
     pair = coalesce(excluded.pair, block_character.pair)";
 
-/// Marks the characters that are not among the labels `?2` as retired, and removes those that never had a pair.
+/// Marks the characters that are not among the labels `?2` as retired. Removes characters that never had a pair.
 const GONE: [&str; 2] = [
     "UPDATE block_character SET state = 'retired', reason = NULL
     WHERE block = ?1 AND label NOT IN (SELECT atom FROM json_each(?2))",
@@ -88,7 +88,7 @@ pub(crate) async fn store(
             .bind(state.name())
             .bind(one.cut.as_ref().err())
             .bind(one.maps.as_ref().map(Value::to_string))
-            .bind(pair.as_ref().map(|pair| pair.as_str()))
+            .bind(pair.as_ref().map(PairName::as_str))
             .execute(&mut *conn)
             .await?;
     }

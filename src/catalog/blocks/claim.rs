@@ -104,7 +104,7 @@ impl Catalog {
         .await
     }
 
-    /// Counts the blocks that are ready, leased or backing off, and those that failed.
+    /// Counts the blocks that are ready, leased or backing off, and the failed ones.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

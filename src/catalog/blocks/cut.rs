@@ -1,20 +1,22 @@
 //! Stores the last stage of a block: its result, its characters, and the pairs that were cut, in one transaction.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::catalog::blocks::checkpoint::{self, Stored};
 use crate::catalog::blocks::model::{BlockCheckpoint, BlockLease, CutPair, NewCharacter};
 use crate::catalog::blocks::{characters, retired};
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query_as, query_scalar};
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::names_json;
 use crate::catalog::db::script::Script;
 use crate::catalog::queue::checkpoint::add_inputs;
 use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::lease::InputVersions;
-use crate::catalog::records::import::{ImportRow, ImportSummary, import_chunk};
+use crate::catalog::records::import::{ImportRow, ImportSummary, SELECT, import_chunk};
+use crate::catalog::records::model::PairAttributes;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{BlockName, PairId, PairName};
+use crate::domain::{AlignmentPrior, BlockName, PairId, PairName};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -31,7 +33,7 @@ pub struct CutSummary {
 
 /// What became of the checkpoint of a cut.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum CutOutcome {
+pub enum CutReply {
     /// It was stored.
     Stored(CutSummary),
     /// The lease was lost; nothing was stored.
@@ -65,7 +67,7 @@ impl Catalog {
         lease: BlockLease,
         stage: BlockCheckpoint,
         characters: Vec<NewCharacter>,
-    ) -> Result<CutOutcome> {
+    ) -> Result<CutReply> {
         self.in_transaction(move |conn| {
             Box::pin(async move { finish(conn, &lease, &stage, &characters).await })
         })
@@ -78,22 +80,23 @@ async fn finish(
     lease: &BlockLease,
     stage: &BlockCheckpoint,
     found: &[NewCharacter],
-) -> Result<CutOutcome> {
+) -> Result<CutReply> {
     let name = query_scalar(NAME).bind(lease.block.0);
     let name: BlockName = name.fetch_one(&mut *conn).await?;
-    let rows = pair_rows(&name, found)?;
-    let names: Vec<PairName> = rows.iter().map(|(row, _)| row.name.clone()).collect();
+    let mut rows = pair_rows(&name, found)?;
+    let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
     let taken = query_scalar(TAKEN).bind(lease.block.0);
     let taken: Option<PairName> = taken
         .bind(names_json(&names))
         .fetch_optional(&mut *conn)
         .await?;
     if let Some(taken) = taken {
-        return Ok(CutOutcome::NameTaken(taken));
+        return Ok(CutReply::NameTaken(taken));
     }
+    keep_near_priors(conn, &mut rows, &names).await?;
     match checkpoint::store(conn, lease, stage).await? {
-        Stored::LeaseLost => return Ok(CutOutcome::LeaseLost),
-        Stored::Before => return Ok(CutOutcome::Stored(CutSummary::default())),
+        Stored::LeaseLost => return Ok(CutReply::LeaseLost),
+        Stored::Before => return Ok(CutReply::Stored(CutSummary::default())),
         Stored::Now => {}
     }
     let mut deltas = Deltas::default();
@@ -101,14 +104,54 @@ async fn finish(
     let gone = characters::store(conn, lease.block, &name, found).await?;
     let retired = retired::retire(conn, &gone, stage.at, &mut deltas).await?;
     deltas.apply(conn).await?;
-    Ok(CutOutcome::Stored(CutSummary { retired, ..summary }))
+    Ok(CutReply::Stored(CutSummary { retired, ..summary }))
+}
+
+/// A pair to import with the character that was cut.
+struct CutRow<'c> {
+    row: ImportRow,
+    cut: &'c CutPair,
+    /// About the size of the print in pixels: width and height.
+    size: [f64; 2],
+}
+
+/// Keeps the stored priors of pairs with the same files, if the new ones are near. When one box changes, the positions of
+/// all other characters change by a small fraction of a pixel, which is no reason to align them again.
+async fn keep_near_priors(
+    conn: &mut Conn,
+    rows: &mut [CutRow<'_>],
+    names: &[PairName],
+) -> Result<()> {
+    let stored = query(SELECT).bind(names_json(names));
+    let mut by_name = BTreeMap::new();
+    for row in &stored.fetch_all(conn).await? {
+        // The import replaces a row with an invalid value.
+        if let Ok(pair) = PairAttributes::from_row(row) {
+            by_name.insert(pair.name.clone(), pair);
+        }
+    }
+    for CutRow { row, size, .. } in rows {
+        let Some(old) = by_name.remove(&row.name) else {
+            continue;
+        };
+        let is_same = old.mesh_path == row.mesh_path
+            && old.print_path == row.print_path
+            && old.unit == row.unit
+            && old.scanned_face_down == row.scanned_face_down;
+        let parse = |prior: &Option<String>| -> Option<AlignmentPrior> {
+            serde_json::from_str(prior.as_deref()?).ok()
+        };
+        if let (true, Some(before), Some(now)) = (is_same, parse(&old.prior), parse(&row.prior))
+            && before.is_near(&now, *size)
+        {
+            row.prior = old.prior;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the pairs to import, each with its files.
-fn pair_rows<'c>(
-    block: &BlockName,
-    found: &'c [NewCharacter],
-) -> Result<Vec<(ImportRow, &'c CutPair)>> {
+fn pair_rows<'c>(block: &BlockName, found: &'c [NewCharacter]) -> Result<Vec<CutRow<'c>>> {
     let cut = found.iter();
     let cut = cut.filter_map(|one| Some((one, one.cut.as_ref().ok()?)));
     cut.map(|(one, cut)| {
@@ -125,7 +168,12 @@ fn pair_rows<'c>(
             meta: serde_json::Map::new(),
             prior: cut.prior.clone(),
         };
-        Ok((row, cut))
+        let [left, top, right, bottom] = one.bounds;
+        Ok(CutRow {
+            row,
+            cut,
+            size: [right - left, bottom - top],
+        })
     })
     .collect()
 }
@@ -133,11 +181,11 @@ fn pair_rows<'c>(
 /// Adds and updates pairs. Sends those whose files or attributes changed back to the first stage.
 async fn store_pairs(
     conn: &mut Conn,
-    rows: &[(ImportRow, &CutPair)],
+    rows: &[CutRow<'_>],
     now: i64,
     deltas: &mut Deltas,
 ) -> Result<CutSummary> {
-    let imported: Vec<ImportRow> = rows.iter().map(|(row, _)| row.clone()).collect();
+    let imported: Vec<ImportRow> = rows.iter().map(|cut| cut.row.clone()).collect();
     let mut summary = ImportSummary::default();
     import_chunk(conn, &imported, now, &mut summary, deltas).await?;
     let names: Vec<PairName> = imported.into_iter().map(|row| row.name).collect();
@@ -146,10 +194,10 @@ async fn store_pairs(
     let versions: Vec<(PairId, InputVersions)> = stored
         .iter()
         .filter_map(|(id, name)| {
-            let (_, cut) = rows.iter().find(|(row, _)| row.name == *name)?;
+            let found = rows.iter().find(|cut| cut.row.name == *name)?;
             let versions = InputVersions {
-                mesh: Some(cut.mesh.clone()),
-                print: Some(cut.print.clone()),
+                mesh: Some(found.cut.mesh.clone()),
+                print: Some(found.cut.print.clone()),
             };
             Some((*id, versions))
         })

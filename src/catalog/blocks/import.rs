@@ -6,7 +6,7 @@ use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockName, UnixMillis};
+use crate::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
 /// Counts of an import of blocks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -93,8 +93,8 @@ async fn import_block(
         .bind(&row.mesh_path)
         .bind(&row.page_path)
         .bind(&row.labels_path)
-        .bind(row.unit.map(|unit| unit.name()))
-        .bind(row.side.map(|side| side.name()))
+        .bind(row.unit.map(LengthUnit::name))
+        .bind(row.side.map(BlockSide::name))
         .bind(row.of_results().to_string())
         .bind(now)
         .fetch_one(&mut *conn)

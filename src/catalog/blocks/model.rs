@@ -146,7 +146,7 @@ pub struct BlockCheckpoint {
     pub record: BlockStageRecord,
     /// Settings, inputs and attributes that it was computed from.
     pub made_with: MadeWith,
-    /// Versions of the input files that are known, also of those that only earlier stages read.
+    /// Versions of all input files that are known, including files that only earlier stages read.
     pub inputs: BlockInputVersions,
     /// Computing time in milliseconds.
     pub ms: u64,
@@ -208,7 +208,7 @@ pub struct NewCharacter {
     pub cut: Result<CutPair, String>,
 }
 
-/// Files of a character that was cut, and what its pair is told.
+/// Files of a character that was cut, and attributes of its pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CutPair {
     /// Path of the mesh as stored, relative to the project.

@@ -53,7 +53,8 @@ pub struct PairChange {
     pub fields: Vec<&'static str>,
 }
 
-const SELECT: &str = "
+/// Selects the attributes of pairs by their names.
+pub(crate) const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))";
 

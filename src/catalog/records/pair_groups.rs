@@ -15,11 +15,12 @@ const META_COLUMNS: Sql = Sql::pair(
 const GROUPS: &str = "
 SELECT p.shared, min(p.name) AS name, count(*) AS pairs FROM (
     SELECT CASE ?1 WHEN 'block' THEN nullif(block, '') WHEN 'character' THEN nullif(character, '') END AS shared, name
-    FROM pair) AS p
+    FROM pair WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = pair.id)) AS p
 GROUP BY p.shared, CASE WHEN p.shared IS NULL THEN p.name END";
 
 const SHARED_PRINTS: &str = "
-SELECT p.print_path, min(p.name) AS first FROM pair AS p GROUP BY p.print_path HAVING count(*) > 1";
+SELECT p.print_path, min(p.name) AS first FROM pair AS p
+WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = p.id) GROUP BY p.print_path HAVING count(*) > 1";
 
 impl Catalog {
     /// Returns the names of the user's columns of all pairs, sorted.

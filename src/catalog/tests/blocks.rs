@@ -2,15 +2,15 @@
 
 use serde_json::json;
 
-use super::{World, name, register};
+use super::{World, register};
 use crate::catalog::{
     BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutOutcome, CutPair, CutSummary,
-    DeadWorker, InputVersion, MadeWith, NewCharacter, NewVerdict, RerunPolicy, ReviewContext,
+    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutPair, CutReply, CutSummary,
+    DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy,
 };
 use crate::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, BlockStageRecord, ContentHash,
-    Failure, FailureClass, JobStatus, Stage, ThresholdMetric, Verdict, WorkerId,
+    Failure, FailureClass, WorkerId,
 };
 
 pub(super) fn block(text: &str) -> BlockName {
@@ -32,7 +32,7 @@ fn settings(revision: [u32; 4]) -> BlockSettings {
     BlockSettings::new(|stage| json!({ "revision": revision[stage.index()] }))
 }
 
-fn version(text: &str) -> InputVersion {
+pub(super) fn version(text: &str) -> InputVersion {
     InputVersion {
         hash: ContentHash::of(text.as_bytes()),
         stat: format!("{text} stat"),
@@ -67,7 +67,7 @@ fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
 }
 
 /// A character whose files have this content.
-fn character(label: &str, content: &str) -> NewCharacter {
+pub(super) fn character(label: &str, content: &str) -> NewCharacter {
     NewCharacter {
         label: label.to_owned(),
         character: Some("天".to_owned()),
@@ -87,17 +87,17 @@ fn character(label: &str, content: &str) -> NewCharacter {
 }
 
 impl World {
-    async fn claim_block(&self, worker: WorkerId) -> Option<(BlockLease, BlockWork)> {
+    pub(super) async fn claim_block(&self, worker: WorkerId) -> Option<(BlockLease, BlockWork)> {
         let claim = self.catalog.claim_block(worker, 1_000, 0);
         claim.await.expect("a claim")
     }
 
-    async fn leased_block(&self) -> (BlockLease, BlockWork) {
+    pub(super) async fn leased_block(&self) -> (BlockLease, BlockWork) {
         self.claim_block(self.worker).await.expect("a ready block")
     }
 
     /// Runs the remaining stages of the next block. The last one cuts these characters.
-    async fn finish_block(&self, characters: Vec<NewCharacter>) -> CutOutcome {
+    pub(super) async fn finish_block(&self, characters: Vec<NewCharacter>) -> CutReply {
         let (mut lease, work) = self.leased_block().await;
         while lease.cursor() != BlockStage::Cut {
             let stage = done(&work, lease.cursor());
@@ -110,7 +110,10 @@ impl World {
     }
 
     /// Requeues stale blocks, and returns why each would run.
-    async fn requeue_blocks(&self, revision: [u32; 4]) -> Vec<(BlockStage, BlockReason)> {
+    pub(super) async fn requeue_blocks(
+        &self,
+        revision: [u32; 4],
+    ) -> Vec<(BlockStage, BlockReason)> {
         let settings = settings(revision);
         let policy = RerunPolicy::Changed;
         let plan = self.catalog.plan_blocks(&settings, policy).await;
@@ -120,12 +123,14 @@ impl World {
         plan.map(|entry| (entry.from, entry.why)).collect()
     }
 
-    async fn import_block(&self, row: BlockAttributes) {
+    pub(super) async fn import_block(&self, row: BlockAttributes) {
         let imported = self.catalog.import_blocks(vec![row], 1).await;
         imported.expect("imported");
     }
 
-    async fn character_states(&self) -> Vec<(String, BlockCharacterState, Option<String>)> {
+    pub(super) async fn character_states(
+        &self,
+    ) -> Vec<(String, BlockCharacterState, Option<String>)> {
         let characters = self.catalog.block_characters(&block("b")).await;
         let characters = characters.expect("a read").into_iter();
         characters
@@ -134,14 +139,14 @@ impl World {
     }
 }
 
-async fn world() -> World {
+pub(super) async fn world() -> World {
     let world = World::new(0).await;
     world.import_block(attributes("b")).await;
     world
 }
 
-fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> CutOutcome {
-    CutOutcome::Stored(CutSummary {
+pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> CutReply {
+    CutReply::Stored(CutSummary {
         added,
         changed,
         unchanged,
@@ -165,121 +170,6 @@ async fn an_import_is_idempotent_and_names_what_changed() {
     assert_eq!(changed, [(block("b"), vec!["page", "labels"])]);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
     assert_eq!(world.catalog.block_names().await.expect("a read").len(), 1);
-}
-
-#[tokio::test]
-async fn a_finished_block_leaves_pairs_that_run() {
-    let world = world().await;
-    let cut = vec![character("c01-r01", "a"), character("c01-r02", "b")];
-    assert_eq!(world.finish_block(cut).await, stored(2, 0, 0, 0));
-    world.assert_counters().await;
-    let detail = world.catalog.block(&block("b")).await.expect("a read");
-    let detail = detail.expect("the block");
-    assert_eq!(detail.state.status, JobStatus::Done);
-    assert_eq!((detail.stages.len(), detail.attempts.len()), (4, 4));
-    assert_eq!(detail.state.characters, 2);
-    let pair = world
-        .catalog
-        .pair(&name("b_c01-r02"))
-        .await
-        .expect("a read");
-    let attributes = pair.expect("the pair").results.attributes;
-    assert_eq!(attributes.block.as_deref(), Some("b"));
-    assert_eq!(attributes.character.as_deref(), Some("天"));
-    assert_eq!(attributes.prior.as_deref(), Some(r#"{"angle_deg":0.5}"#));
-    assert!(world.claim_block(world.worker).await.is_none());
-    assert_eq!(world.claim(9).await.len(), 2);
-    assert_eq!(world.requeue_blocks([1; 4]).await, []);
-}
-
-#[tokio::test]
-async fn only_changed_characters_run_again_and_verdicts_stay() {
-    let world = world().await;
-    let [a, b, c] = ["a", "b", "c"].map(|label| character(label, label));
-    let first = vec![a.clone(), b.clone(), c.clone()];
-    assert_eq!(world.finish_block(first).await, stored(3, 0, 0, 0));
-    for _ in 0..3 {
-        world.finish_one().await;
-    }
-    judge(&world, "b_c").await;
-    let new_labels = BlockAttributes {
-        labels_path: Some("new.json".to_owned()),
-        ..attributes("b")
-    };
-    world.import_block(new_labels).await;
-    let changed = BlockInputVersions {
-        labels: Some(version("other labels")),
-        ..BlockInputVersions::default()
-    };
-    let known = world.catalog.known_blocks().await.expect("a read");
-    let seen = vec![(known[0].block, changed)];
-    world
-        .catalog
-        .store_block_inputs(seen)
-        .await
-        .expect("stored");
-    let requeued = world.requeue_blocks([1; 4]).await;
-    assert_eq!(requeued, [(BlockStage::Boxes, BlockReason::Labels)]);
-    // `b` has other bytes, the box of `c` is gone.
-    let second = vec![a.clone(), character("b", "new b")];
-    assert_eq!(world.finish_block(second).await, stored(0, 1, 1, 1));
-    world.assert_counters().await;
-    assert_eq!(status_of(&world, "b_a").await, Some(JobStatus::Done));
-    assert_eq!(status_of(&world, "b_b").await, Some(JobStatus::Ready));
-    assert_eq!(status_of(&world, "b_c").await, None);
-    let retired = world.catalog.retired_pairs().await.expect("a read");
-    assert_eq!(retired, [name("b_c")]);
-    let log = world.catalog.verdict_log(None).await.expect("a read");
-    assert_eq!(log.len(), 1);
-    let states = world.character_states().await;
-    let gone = (
-        "c".to_owned(),
-        BlockCharacterState::Retired,
-        Some("b_c".to_owned()),
-    );
-    assert_eq!(states[2], gone);
-    // The box comes back with the same bytes.
-    world
-        .catalog
-        .reset_blocks(vec![(known[0].block, BlockStage::Cut)])
-        .await
-        .expect("reset");
-    let third = vec![a, character("b", "new b"), c];
-    assert_eq!(world.finish_block(third).await, stored(0, 0, 3, 0));
-    world.assert_counters().await;
-    assert_eq!(status_of(&world, "b_c").await, Some(JobStatus::Done));
-    let log = world.catalog.verdict_log(None).await.expect("a read");
-    assert!(log[0].current, "{log:?}");
-}
-
-#[tokio::test]
-async fn a_changed_pair_loses_its_lease() {
-    let world = world().await;
-    world.finish_block(vec![character("a", "a")]).await;
-    let lease = world.claim(1).await.pop().expect("a pair");
-    let known = world.catalog.known_blocks().await.expect("a read");
-    let reset = world
-        .catalog
-        .reset_blocks(vec![(known[0].block, BlockStage::Cut)]);
-    reset.await.expect("reset");
-    let again = world.finish_block(vec![character("a", "new")]).await;
-    assert_eq!(again, stored(0, 1, 0, 0));
-    let late = world.catalog.checkpoint_now(lease, world.done(Stage::Fit));
-    let late = late.await.expect("a reply");
-    assert!(matches!(late, crate::catalog::CheckpointOutcome::LeaseLost));
-    world.assert_counters().await;
-}
-
-#[tokio::test]
-async fn a_pair_that_is_not_of_the_block_is_not_replaced() {
-    let world = world().await;
-    let row = super::row("b_a");
-    world.catalog.import(vec![row], 1).await.expect("imported");
-    let cut = world.finish_block(vec![character("a", "a")]).await;
-    assert_eq!(cut, CutOutcome::NameTaken(name("b_a")));
-    let states = world.catalog.block_states().await.expect("a read");
-    assert_eq!(states[0].next_stage, Some(BlockStage::Cut));
-    assert_eq!(world.character_states().await, []);
 }
 
 #[tokio::test]
@@ -526,27 +416,4 @@ async fn a_worker_without_heartbeats_stores_nothing() {
     let stage = done(&work, BlockStage::Face);
     let stored = world.catalog.checkpoint_block(lease, stage).await;
     assert_eq!(stored.expect("a reply"), None);
-}
-
-async fn status_of(world: &World, pair: &str) -> Option<JobStatus> {
-    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
-    detail.map(|detail| detail.results.status)
-}
-
-async fn judge(world: &World, pair: &str) {
-    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
-    let results = detail.expect("the pair").results;
-    assert_eq!(results.status, JobStatus::Done);
-    let verdict = NewVerdict {
-        pair: name(pair),
-        metric: Some(ThresholdMetric::DEFAULT),
-        verdict: Verdict::Pass,
-        reviewer: "lan".to_owned(),
-        reason: None,
-        note: None,
-        look: ReviewContext::default(),
-        at: None,
-    };
-    let stored = world.catalog.verdict_set(vec![verdict], 5).await;
-    stored.expect("stored");
 }

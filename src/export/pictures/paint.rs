@@ -6,9 +6,11 @@ use crate::raster::{Grid, PrintImage};
 pub type Rgb = Grid<[u8; 3]>;
 
 /// Vermillion of the palette of Okabe and Ito, which readers with colour blindness can distinguish from ink.
-pub(super) const VERMILLION: [u8; 3] = [213, 94, 0];
+pub(in crate::export) const VERMILLION: [u8; 3] = [213, 94, 0];
 /// Blue of the same palette.
-pub(super) const BLUE: [u8; 3] = [0, 114, 178];
+pub(in crate::export) const BLUE: [u8; 3] = [0, 114, 178];
+/// Orange of the same palette.
+pub(in crate::export) const ORANGE: [u8; 3] = [230, 159, 0];
 /// Colour of text.
 pub(super) const TEXT: [u8; 3] = [20, 20, 20];
 /// Background colour.
@@ -21,7 +23,7 @@ pub(in crate::export) fn eight_bits(print: &PrintImage) -> Rgb {
 }
 
 /// Resizes an image by averaging areas along a shrinking axis, and by nearest pixels along a growing axis.
-pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
+pub(in crate::export) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();
     }

@@ -1,8 +1,7 @@
 //! The stage `align`: finds the map from a face to the page, or refuses.
 
-use super::outcomes::AlignOutcome;
 use super::{BlockPipeline, StageContext, failed, output};
-use crate::block::{self, BlockError, Face, StoredPageMap};
+use crate::block::{self, AlignOutcome, BlockError, Face, StoredPageMap};
 use crate::domain::BlockSide;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
 

@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 
 use super::held::HeldPage;
-use super::outcomes::{AlignOutcome, BoxesOutcome};
 use super::{BlockPipeline, StageContext, output};
-use crate::block::{CharacterBox, PageMap, StoredPageMap, check_label_fit, place_characters};
+use crate::block::{
+    AlignOutcome, BoxesOutcome, CharacterBox, Face, PageMap, StoredPageMap, check_label_fit,
+    find_boxes, place_characters,
+};
 use crate::domain::{BlockStage, FailureClass};
 use crate::labels::{self, PageFile, reading_order};
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
@@ -38,12 +40,7 @@ impl BlockPipeline {
             .ok_or_else(rerun)?;
         let read = match &context.inputs.labels {
             Some(file) => read_labels(context, file, &page)?,
-            None => {
-                return Err(context
-                    .inputs
-                    .page
-                    .failed(FailureClass::NoSolution, "it has no labels"));
-            }
+            None => found_on_page(context, face, &page, &map)?,
         };
         let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
         let sure = placed
@@ -60,6 +57,33 @@ impl BlockPipeline {
             characters: placed.characters,
         })
     }
+}
+
+/// Finds the boxes of the characters on face and page.
+fn found_on_page(
+    context: &StageContext<'_>,
+    face: &Face,
+    page: &HeldPage,
+    map: &PageMap,
+) -> Result<PageBoxes, BlockStageError> {
+    let boxes: Vec<CharacterBox> = find_boxes(face, &page.ink, map)
+        .into_iter()
+        .map(|found| CharacterBox {
+            name: found.name(),
+            text: None,
+            page_box: found.page_box,
+        })
+        .collect();
+    if boxes.is_empty() {
+        let text = "no columns of characters were found; draw boxes around the characters, for \
+            example in the VGG Image Annotator, and give the file as labels";
+        return Err(context.inputs.page.failed(FailureClass::NoSolution, text));
+    }
+    Ok(PageBoxes {
+        labels: None,
+        warnings: Vec::new(),
+        boxes,
+    })
 }
 
 /// Reads the labels of a page and gives boxes without a name the one of their place in the reading order.

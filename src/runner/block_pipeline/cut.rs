@@ -5,14 +5,13 @@ use std::io;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome};
 use super::scan_stream::ScanStream;
 use super::{BlockPipeline, StageContext, failed, output};
 use crate::block::{
-    BlockError, CharacterMap, CutError, CutPlan, PageMap, PlacedCharacter, PrintCrop, cut_meshes,
-    cut_print,
+    AlignOutcome, BlockError, BoxesOutcome, CharacterMap, CutError, CutOutcome, CutPlan,
+    FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
-use crate::domain::{ArtifactRef, BlockStage, FailureClass, LengthUnit};
+use crate::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
 use crate::mesh::write::MeshFormat;
 use crate::raster::png_rgb8;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
@@ -23,6 +22,9 @@ const PRINT_MARGIN_MM: f64 = 0.8;
 const MIN_TRIANGLES: usize = 200;
 /// The face looks up or down if its normal has at least this z.
 const MIN_NORMAL_Z: f64 = 0.3;
+
+/// Positions with a lower confidence are not expected by `register`.
+const MIN_PRIOR: f64 = 0.5;
 
 /// The print of a character, or why it cannot be cut.
 type CutPrint = Result<(ArtifactRef, PrintCrop), String>;
@@ -82,7 +84,9 @@ impl BlockPipeline {
                         unit: Some(scan.unit),
                         scanned_face_down: (normal_z.abs() >= MIN_NORMAL_Z)
                             .then_some(normal_z < 0.0),
-                        prior: prior(&local, &crop, character, scan.unit),
+                        prior: (character.confidence >= MIN_PRIOR)
+                            .then(|| prior(&local, &crop, character))
+                            .flatten(),
                     }),
                 }
             })
@@ -152,17 +156,11 @@ fn maps(local: &CharacterMap, crop: &PrintCrop) -> Value {
     })
 }
 
-/// Returns the alignment that `register` may expect.
-fn prior(
-    local: &CharacterMap,
-    crop: &PrintCrop,
-    character: &PlacedCharacter,
-    unit: LengthUnit,
-) -> Option<Value> {
-    let print_from_mesh = local.print_from_mesh(&crop.page_from_crop)?;
-    Some(json!({
-        "print_from_mesh": print_from_mesh,
-        "confidence": character.confidence,
-        "unit": unit,
-    }))
+/// Returns the alignment that `register` may expect, as JSON.
+fn prior(local: &CharacterMap, crop: &PrintCrop, character: &PlacedCharacter) -> Option<Value> {
+    let prior = AlignmentPrior {
+        print_from_mesh: local.print_from_mesh(&crop.page_from_crop)?,
+        confidence: character.confidence,
+    };
+    serde_json::to_value(prior).ok()
 }

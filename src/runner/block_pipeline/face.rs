@@ -1,10 +1,10 @@
 //! The stage `face`: finds the faces of a scan.
 
-use super::held::heights_role;
-use super::outcomes::{FaceOutcome, FoundFace};
 use super::scan_stream::ScanStream;
 use super::{BlockPipeline, StageContext, failed, output};
-use crate::block::{BlockError, HEIGHT_STEP_MM, Orientation, draw_height_maps};
+use crate::block::{
+    BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
+};
 use crate::domain::{BlockSide, LengthUnit};
 use crate::raster::png_grey16;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput};

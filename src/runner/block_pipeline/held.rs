@@ -2,9 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::outcomes::FaceOutcome;
 use super::{BlockPipeline, StageContext, failed};
-use crate::block::{Face, PageInk, StoredHeights};
+use crate::block::{Face, FaceOutcome, PageInk, StoredHeights, heights_role};
 use crate::domain::{BlockSide, BlockStage, ContentHash};
 use crate::raster::{self, PrintImage};
 use crate::runner::block_stages::BlockStageError;
@@ -25,11 +24,6 @@ pub(super) struct HeldPage {
     pub(super) hash: ContentHash,
     pub(super) image: PrintImage,
     pub(super) ink: PageInk,
-}
-
-/// Returns the role of a face's heights among the artifacts of `face`.
-pub(super) fn heights_role(side: BlockSide) -> String {
-    format!("{side}.png")
 }
 
 impl HeldInputs {

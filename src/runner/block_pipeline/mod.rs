@@ -6,7 +6,6 @@ mod boxes;
 mod cut;
 mod face;
 mod held;
-mod outcomes;
 mod scan_stream;
 
 use std::sync::atomic::AtomicBool;

@@ -26,7 +26,7 @@ pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
-use crate::domain::{InkHypothesis, PoseFeatures};
+use crate::domain::{Affine2, InkHypothesis, PoseFeatures};
 use crate::raster::DepthMap;
 use crate::stages::binarize::rim_share;
 use half_canvas::HalfCanvas;
@@ -56,7 +56,8 @@ const TOPS_AT_RIM: f64 = 0.6;
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
 /// `depth` and `normalized` are the results of earlier stages. The pose maps depth-map pixels to print-image pixels.
-/// All metrics share this pose.
+/// All metrics share this pose. `expected` is the pose that the registration of the whole block gave, if the pair was cut
+/// from one: other poses need much better evidence.
 ///
 /// # Errors
 /// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not
@@ -78,7 +79,7 @@ const TOPS_AT_RIM: f64 = 0.6;
 /// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
 /// // One mask for each interpretation of the print, the likeliest first.
 /// assert_eq!(normalized.prints.len(), normalized.outcome.inks.len());
-/// let registered = register::register(&map, &normalized, &settings.register)?;
+/// let registered = register::register(&map, &normalized, None, &settings.register)?;
 /// for metric in &registered.outcome.metrics {
 ///     assert!(metric.confidence.is_some_and(|confidence| confidence > 0.5));
 /// }
@@ -87,11 +88,12 @@ const TOPS_AT_RIM: f64 = 0.6;
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
+    expected: Option<&Affine2>,
     params: &RegisterParams,
 ) -> Result<Registered, RegisterError> {
     let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
     let depths = relative_depths(depth, &relief);
-    let search = pose_search::search(&depths, &normalized.prints, params)?;
+    let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
     let print = &normalized.prints[search.ink];
     let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
     require_match(&refined.features, params)?;

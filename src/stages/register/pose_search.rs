@@ -1,10 +1,11 @@
 //! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
 use super::params::{RegisterError, RegisterParams};
+use crate::domain::Affine2;
 use crate::raster::Mask;
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
-    BeamWidth, ImagePyramid, PoseCandidate, RefinementPass, SearchRange, SoftMask,
+    BeamWidth, ImagePyramid, Loss, PoseCandidate, RefinementPass, Refiner, SearchRange, SoftMask,
     search_coarse_to_fine,
 };
 
@@ -16,13 +17,14 @@ const PASSES: [RefinementPass; 2] = [
         max_steps: 7,
         beam_width: keep(4, 2),
     },
-    RefinementPass {
-        size_px: 60,
-        sigma_px: 1.0,
-        max_steps: 6,
-        beam_width: keep(3, 1),
-    },
+    LAST_PASS,
 ];
+const LAST_PASS: RefinementPass = RefinementPass {
+    size_px: 60,
+    sigma_px: 1.0,
+    max_steps: 6,
+    beam_width: keep(3, 1),
+};
 
 const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
     BeamWidth { upright, mirrored }
@@ -40,6 +42,13 @@ const LEAST_SCORE: f64 = 0.12;
 /// The search refuses a pair as mirrored only if its best mirrored score is more than this many times its best upright
 /// score. Closer cases are decided after the refinement. A symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.3;
+/// A pose is the expected one if rotation, scale (natural logarithm) and position of the relief's middle differ by less
+/// than this. The position is a share of the print's longest side.
+const EXPECTED_DEG: f64 = 6.0;
+const EXPECTED_RATIO: f64 = 0.08;
+const EXPECTED_SHIFT: f64 = 0.06;
+/// A pose other than the expected one is preferred only if its score is more than this many times the expected one's.
+const UNEXPECTED_WINS: f64 = 1.5;
 /// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
@@ -65,20 +74,22 @@ impl PoseSearch {
 /// Searches for poses of the relief on every interpretation of the print. Returns the poses on the best interpretation.
 ///
 /// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth. Poses map
-/// depth-map pixels to print pixels.
+/// depth-map pixels to print pixels. If a pose is expected, it has no competitors unless one matches much better.
 ///
 /// # Errors
 /// Returns an error if the relief has no data. If no interpretation matches, returns the error for the likeliest one.
 pub(super) fn search(
     depths: &SoftMask,
     prints: &[PrintMasks],
+    expected: Option<&Affine2>,
     params: &RegisterParams,
 ) -> Result<PoseSearch, RegisterError> {
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let depth_px = longest(&depths.known);
     let inks = prints.iter().enumerate();
-    let searches = inks.map(|(ink, print)| find_poses(&wood, depth_px, ink, print, params));
+    let searches =
+        inks.map(|(ink, print)| find_poses(&wood, depth_px, ink, print, expected, params));
     let best = searches.reduce(|best, other| match (&best, &other) {
         (Ok(a), Ok(b)) if b.score() > a.score() => other,
         (Err(_), Ok(_)) => other,
@@ -93,6 +104,7 @@ fn find_poses(
     depth_px: f64,
     ink: usize,
     print: &PrintMasks,
+    expected: Option<&Affine2>,
     params: &RegisterParams,
 ) -> Result<PoseSearch, RegisterError> {
     let print_base = ImagePyramid::new(&print.soft_ink(), BASE_PX).ok_or(RegisterError::NoPose)?;
@@ -100,9 +112,13 @@ fn find_poses(
         max_scale: params.scale_band,
         beam_width: KEEP,
     };
-    let found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
-    require_upright(&found)?;
+    let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
     let print_px = longest(&print.known);
+    if let Some(expected) = expected {
+        let near = near_expected(&print_base, wood, &found, expected, &print.known);
+        prefer_expected(&mut found, near);
+    }
+    require_upright(&found)?;
     let is_at_bound = |pose: &PoseCandidate| {
         let ratio = pose.fixed_from_moving.scale() * depth_px / print_px;
         params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
@@ -115,6 +131,58 @@ fn find_poses(
         poses,
         mirrored: mirrored.first().copied(),
     })
+}
+
+/// Refines the expected pose and the poses found near it; returns the best of them that stays near. `None` if the expected
+/// pose is mirrored.
+fn near_expected(
+    print: &ImagePyramid,
+    wood: &ImagePyramid,
+    found: &[PoseCandidate],
+    expected: &Affine2,
+    known: &Mask,
+) -> Option<PoseCandidate> {
+    let bounds = known.bounding_box()?;
+    let print_px = bounds.longest_side() as f64;
+    let print_middle = [
+        (bounds.x0 + bounds.x1 - 1) as f64 / 2.0,
+        (bounds.y0 + bounds.y1 - 1) as f64 / 2.0,
+    ];
+    if expected.determinant() <= 0.0 {
+        return None;
+    }
+    let (size, sigma) = (LAST_PASS.size_px, LAST_PASS.sigma_px);
+    let (fixed, moving) = (print.level(size, sigma), wood.level(size, sigma));
+    let refiner = Refiner::new(&fixed, &moving);
+    let start = PoseCandidate {
+        fixed_from_moving: *expected,
+        score: 0.0,
+        mirrored: false,
+    };
+    // The point of the depth map that is expected at the middle of the print.
+    let middle = expected.inverse()?.apply(print_middle);
+    let is_near = |pose: &PoseCandidate| {
+        let ratio = pose.fixed_from_moving.scale() / start.fixed_from_moving.scale();
+        let [a, b] = [pose, &start].map(|pose| pose.fixed_from_moving.apply(middle));
+        let distance = (a[0] - b[0]).hypot(a[1] - b[1]);
+        pose.rotation_to(&start) < EXPECTED_DEG
+            && ratio.ln().abs() < EXPECTED_RATIO
+            && distance < EXPECTED_SHIFT * print_px
+    };
+    let refined = refiner.refine(&start, LAST_PASS.max_steps, Loss::Huber);
+    let upright = found.iter().filter(|pose| !pose.mirrored).copied();
+    upright
+        .chain([refined, refiner.evaluate(&start)])
+        .filter(is_near)
+        .max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+/// Keeps only the pose near the expected one, unless another one matches much better.
+fn prefer_expected(found: &mut Vec<PoseCandidate>, near: Option<PoseCandidate>) {
+    let best = found.iter().map(|pose| pose.score).fold(0.0, f64::max);
+    if let Some(near) = near.filter(|near| best <= UNEXPECTED_WINS * near.score) {
+        *found = vec![near];
+    }
 }
 
 /// Returns the longest side of the bounding box of the known pixels, or 1 if there are none.

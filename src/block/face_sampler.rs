@@ -1,0 +1,55 @@
+//! Reads a face between the pixels of its height map.
+
+use super::align::Face;
+use super::height_map::{HEIGHT_STEP_MM, NO_HEIGHT};
+use super::relief::surface_height;
+
+/// The four pixels around a point, each with its share.
+type Neighbours = [([i64; 2], f32); 4];
+
+impl Face {
+    /// Returns the soft strokes at a point of the face (u, v in mm), from 0 on carved ground to 1 on tops; `None` beside the
+    /// height map and where nothing was scanned.
+    pub fn strokes_at(&self, point: [f64; 2]) -> Option<f32> {
+        self.mean(point, |[x, y]| {
+            self.map.heights.get(x, y).filter(|h| *h != NO_HEIGHT)?;
+            let soft = self.relief.soft.get(x, y)?;
+            Some(f32::from(soft) / 255.0)
+        })
+    }
+
+    /// Returns the height at a point of the face (u, v in mm) over the surface under the tops of the strokes, in mm; `None`
+    /// where nothing was scanned.
+    pub fn height_at(&self, point: [f64; 2]) -> Option<f32> {
+        let height = self.mean(point, |[x, y]| {
+            let height = self.map.heights.get(x, y);
+            height.filter(|height| *height != NO_HEIGHT)
+        })?;
+        Some(height - surface_height(&self.map, &self.relief.surface, point))
+    }
+
+    /// Returns the mean of the values around a point that exist, weighted by their nearness.
+    fn mean(&self, point: [f64; 2], value: impl Fn([i64; 2]) -> Option<f32>) -> Option<f32> {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (pixel, share) in self.neighbours(point) {
+            if let Some(value) = value(pixel) {
+                sum += share * value;
+                weight += share;
+            }
+        }
+        (weight > 0.0).then(|| sum / weight)
+    }
+
+    fn neighbours(&self, point: [f64; 2]) -> Neighbours {
+        let [x, y] = [0, 1].map(|k: usize| (point[k] - self.map.origin_mm[k]) / HEIGHT_STEP_MM);
+        let (left, top) = (x.floor(), y.floor());
+        let (across, down) = ((x - left) as f32, (y - top) as f32);
+        let (left, top) = (left as i64, top as i64);
+        [
+            ([left, top], (1.0 - across) * (1.0 - down)),
+            ([left + 1, top], across * (1.0 - down)),
+            ([left, top + 1], (1.0 - across) * down),
+            ([left + 1, top + 1], across * down),
+        ]
+    }
+}

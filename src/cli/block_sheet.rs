@@ -1,0 +1,107 @@
+//! `contact-sheet --block`: draws the page of a block with boxes, or relief and ink over each other.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::busy::Busy;
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::files;
+use super::select;
+use super::table::count;
+use crate::catalog::Catalog;
+use crate::domain::ThresholdMetric;
+use crate::export::InputFileLimits;
+use crate::export::block_view::{BlockView, BlockViewError};
+use crate::raster::png_rgb8;
+use crate::store::Project;
+
+/// What to draw of a block, and where to.
+#[derive(Debug)]
+pub(super) struct BlockSheetOptions<'a> {
+    /// The block as the user typed it.
+    pub(super) block: &'a str,
+    /// Whether to draw relief and ink over each other.
+    pub(super) is_overlay: bool,
+    /// The metric whose results are shown.
+    pub(super) metric: ThresholdMetric,
+    /// The file to write.
+    pub(super) output: Option<&'a Path>,
+}
+
+/// Draws a picture of a block and writes it.
+///
+/// # Errors
+/// Returns an error if the block does not exist or is not aligned, or if the catalog or the disk fails.
+pub(super) async fn write(
+    options: &BlockSheetOptions<'_>,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.open_read_only().await?;
+    let default = ["page.png", "overlay.png"][usize::from(options.is_overlay)];
+    let given = options.output.map(Path::to_owned);
+    let path = given.unwrap_or_else(|| project.dir().join(default));
+    files::refuse_used_file(&path, &project, &catalog).await?;
+    let busy = Busy::start(context, "drawing the page");
+    let drawn = draw(options, &project, &catalog, context).await;
+    drop(busy);
+    let (png, characters) = drawn?;
+    catalog.close().await;
+    files::write_output(&path, &png, true)?;
+    report(&path, characters, context)?;
+    Ok(ExitCode::Done)
+}
+
+/// Reads and draws a block. Returns the PNG and the number of characters.
+async fn draw(
+    options: &BlockSheetOptions<'_>,
+    project: &Project,
+    catalog: &Catalog,
+    context: &Context,
+) -> anyhow::Result<(Vec<u8>, usize)> {
+    let view = read(options.block, options.metric, project, catalog, context).await?;
+    let is_overlay = options.is_overlay;
+    let draw = move || {
+        let picture = if is_overlay {
+            view.draw_overlay()
+        } else {
+            view.draw_boxes()
+        };
+        (png_rgb8(&picture), view.characters.len())
+    };
+    Ok(tokio::task::spawn_blocking(draw).await?)
+}
+
+/// Reads a block by the id that the user typed.
+///
+/// # Errors
+/// Returns an error if the block does not exist or is not aligned, or if a file or the catalog cannot be read.
+pub(super) async fn read(
+    typed: &str,
+    metric: ThresholdMetric,
+    project: &Project,
+    catalog: &Catalog,
+    context: &Context,
+) -> anyhow::Result<BlockView> {
+    let name = select::existing_block(catalog, typed).await?;
+    let limits = context.settings()?.config.limits;
+    let limits = InputFileLimits {
+        mesh: limits.mesh,
+        image: limits.image,
+    };
+    match BlockView::read(catalog, project, &name, metric, limits).await {
+        Ok(view) => Ok(view),
+        Err(error @ BlockViewError::NotAligned { .. }) => {
+            Err(Refusal::NothingSelected(error.to_string()).into())
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn report(path: &Path, characters: usize, context: &Context) -> anyhow::Result<()> {
+    context.print_json(&json!({"schema": 1, "file": path, "characters": characters}))?;
+    let number = count(characters as u64, "character");
+    context.info(&format!("{number} on {}", path.display()));
+    Ok(())
+}

@@ -1,0 +1,104 @@
+//! `demo --block`: creates a whole block with its page, and the true alignments of the pairs that are cut from it.
+
+use std::path::Path;
+
+use anyhow::Context as _;
+use serde_json::Value;
+use tokio::sync::mpsc;
+
+use super::busy::Busy;
+use super::context::{Context, now};
+use super::demo_folder::{DemoContent, check_directory, replace_data};
+use super::files;
+use super::import_blocks::BlockArgs;
+use super::table::count;
+use crate::catalog::{Catalog, ImportChunk, StoredCharacter};
+use crate::demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
+use crate::domain::{Affine2, BlockName, PairName};
+use crate::runner::{Stop, StopLevel};
+
+/// Id of the block.
+const NAME: &str = "block";
+
+/// Returns the arguments that import a block, with the boxes of its characters if `has_labels` is set.
+pub(super) fn import_args(files: &BlockFiles, has_labels: bool) -> BlockArgs {
+    BlockArgs {
+        block: Some(files.mesh.clone()),
+        page: Some(files.page.clone()),
+        labels: has_labels.then(|| files.labels.clone()),
+        name: Some(NAME.to_owned()),
+        ..BlockArgs::default()
+    }
+}
+
+/// Stores the true alignments of the pairs that were cut from the block. Returns how many there are.
+///
+/// # Errors
+/// Returns an error if the truth cannot be read or the catalog fails.
+pub(super) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Result<u64> {
+    let bytes = files::read(file)?;
+    let truth: BlockTruth = serde_json::from_slice(&bytes)
+        .with_context(|| format!("{} is not the truth of a block", file.display()))?;
+    let name = BlockName::new(NAME)?;
+    let characters = catalog.block_characters(&name).await?;
+    let truths = characters
+        .iter()
+        .filter_map(|found| pair_truth(&truth, found))
+        .collect();
+    let (sender, chunks) = mpsc::channel(1);
+    sender.send(ImportChunk::End).await?;
+    let (_, stored) = catalog.import_all(chunks, truths, now()).await?;
+    Ok(stored)
+}
+
+/// Returns the true alignment of the pair of a character, if it has one.
+fn pair_truth(truth: &BlockTruth, found: &StoredCharacter) -> Option<(PairName, Value)> {
+    let pair = PairName::new(found.pair.as_ref()?).ok()?;
+    let map = found.maps.as_ref()?.get("page_from_crop")?;
+    let [first, second, _]: [[f64; 3]; 3] = serde_json::from_value(map.clone()).ok()?;
+    let character = truth.character_at(found.bounds)?;
+    let record = truth.pair(pair.as_str(), character, &Affine2([first, second]))?;
+    Some((pair, serde_json::to_value(record).ok()?))
+}
+
+/// Returns the files of the block, which are created unless they exist. Returns `None` if a signal stopped the command.
+pub(super) async fn create_files(
+    dir: &Path,
+    options: BlockOptions,
+    context: &Context,
+) -> anyhow::Result<Option<BlockFiles>> {
+    let data = dir.join("data");
+    check_directory(dir, &data, &DemoContent::Block(options))?;
+    let files = match find_block(&data, &options) {
+        Some(files) => files,
+        None => match replace_block(&data, options, context).await? {
+            Some(files) => files,
+            None => return Ok(None),
+        },
+    };
+    let BlockOptions { kind, seed, .. } = options;
+    let action = ["created", "found"][usize::from(files.already_existed)];
+    let characters = count(files.characters as u64, "character");
+    let triangles = count(files.triangles as u64, "triangle");
+    let data = data.display();
+    context.info(&format!(
+        "{action} a {kind} block of {characters} and {triangles}, seed {seed}, in {data}"
+    ));
+    Ok(Some(files))
+}
+
+/// Writes the block next to `data` and then replaces `data`. Returns `None` if a signal stopped the command.
+async fn replace_block(
+    data: &Path,
+    options: BlockOptions,
+    context: &Context,
+) -> anyhow::Result<Option<BlockFiles>> {
+    let busy = Busy::start(context, "creating a block");
+    let write = move |folder: &Path, stop: &Stop| {
+        let is_stopped = || stop.level() != StopLevel::Go;
+        write_block(folder, &options, &is_stopped)
+    };
+    let written = replace_data(data, context, write).await?;
+    drop(busy);
+    Ok(written.map(|files| files.moved_to(data)))
+}

@@ -1,0 +1,171 @@
+//! The page of a block: its layers as images, its characters, and the 3D views of their pairs.
+
+use std::net::SocketAddr;
+use std::sync::{Arc, OnceLock};
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{Path, State};
+use axum::http::{StatusCode, header};
+use axum::response::{Html, IntoResponse as _, Response};
+use axum::routing::get;
+
+use super::page;
+use super::server::{ViewError, ViewServer};
+use crate::export::block_view::{BlockView, PageLayer, PageRegion};
+use crate::export::scan_view::assets;
+
+const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
+const STYLE_KIND: &str = "text/css; charset=utf-8";
+/// Name, content type and text of the assets of this page.
+const ASSETS: [(&str, &str, &str); 4] = [
+    (
+        "block-view.js",
+        SCRIPT_KIND,
+        include_str!("../../assets/block-view/block-view.js"),
+    ),
+    (
+        "block-messages.js",
+        SCRIPT_KIND,
+        include_str!("../../assets/block-view/block-messages.js"),
+    ),
+    (
+        "block-camera.js",
+        SCRIPT_KIND,
+        include_str!("../../assets/block-view/block-camera.js"),
+    ),
+    (
+        "block-view.css",
+        STYLE_KIND,
+        include_str!("../../assets/block-view/block-view.css"),
+    ),
+];
+/// Longer side of the image of a whole layer, pixels. Closer views ask for regions.
+const OVERVIEW_SIDE: usize = 3000;
+/// Longer side of the image of a region, pixels.
+const REGION_SIDE: usize = 2400;
+
+/// The block of a page, with the images of whole layers that were asked for.
+#[derive(Debug)]
+struct ShownBlock {
+    view: BlockView,
+    overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
+}
+
+/// Binds the address for the page of a block. Port 0 chooses the same port for equal names of blocks, if it is free.
+///
+/// # Errors
+/// Returns an error if the address cannot be bound or the system provides no randomness.
+pub async fn bind_block(address: SocketAddr, view: BlockView) -> Result<ViewServer, ViewError> {
+    let name = view.name.to_string();
+    let shown = ShownBlock {
+        view,
+        overviews: PageLayer::ALL.map(|_| OnceLock::new()),
+    };
+    let pages = Router::new()
+        .route("/", get(index))
+        .route("/assets/{name}", get(asset))
+        .route("/block.json", get(block_json))
+        .route("/layer/{layer}", get(overview))
+        .route("/region/{layer}/{x}/{y}/{width}/{height}", get(region))
+        .route("/scan/{index}", get(scan))
+        .with_state(Arc::new(shown));
+    ViewServer::open(address, &name, pages).await
+}
+
+impl ShownBlock {
+    /// Returns the image of a whole layer, which is drawn once.
+    fn overview(&self, layer: PageLayer) -> Bytes {
+        let stored = PageLayer::ALL.iter().zip(&self.overviews);
+        let mut of_layer = stored.filter(|(one, _)| **one == layer);
+        let draw = || self.picture(layer, self.view.layers.whole(), OVERVIEW_SIDE);
+        match of_layer.next() {
+            Some((_, stored)) => stored.get_or_init(draw).clone(),
+            None => draw(),
+        }
+    }
+
+    /// Draws a region of a layer as JPEG.
+    fn picture(&self, layer: PageLayer, region: PageRegion, longest: usize) -> Bytes {
+        self.view.layers.jpeg(layer, region, longest).into()
+    }
+}
+
+async fn index(State(shown): State<Arc<ShownBlock>>) -> Html<String> {
+    Html(page::block(shown.view.name.as_str()))
+}
+
+async fn asset(Path(name): Path<String>) -> Response {
+    let own = ASSETS.iter().find(|(asset, ..)| *asset == name);
+    match own
+        .map(|(_, kind, text)| (*kind, *text))
+        .or_else(|| assets::find(&name))
+    {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+async fn block_json(State(shown): State<Arc<ShownBlock>>) -> Response {
+    let kind = [(header::CONTENT_TYPE, "application/json")];
+    (kind, shown.view.to_json().to_string()).into_response()
+}
+
+async fn overview(State(shown): State<Arc<ShownBlock>>, Path(layer): Path<String>) -> Response {
+    let Ok(layer) = layer.parse::<PageLayer>() else {
+        return StatusCode::NOT_FOUND.into_response();
+    };
+    image(move || shown.overview(layer)).await
+}
+
+async fn region(
+    State(shown): State<Arc<ShownBlock>>,
+    Path((layer, x, y, width, height)): Path<(String, usize, usize, usize, usize)>,
+) -> Response {
+    let region = PageRegion {
+        corner: [x, y],
+        size: [width, height],
+    };
+    let part = region.within(shown.view.layers.size());
+    match (layer.parse::<PageLayer>(), part) {
+        (Ok(layer), Some(part)) => image(move || shown.picture(layer, part, REGION_SIDE)).await,
+        _ => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) -> Response {
+    let read = tokio::task::spawn_blocking(move || shown.view.scan(index));
+    let failed = |why: String| (StatusCode::INTERNAL_SERVER_ERROR, why).into_response();
+    match read.await {
+        Ok(Ok(Some(bytes))) => {
+            let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
+            (kind, bytes).into_response()
+        }
+        Ok(Ok(None)) => StatusCode::NOT_FOUND.into_response(),
+        Ok(Err(error)) => failed(error.to_string()),
+        Err(error) => failed(error.to_string()),
+    }
+}
+
+/// Draws an image on a thread for long work and responds with it.
+async fn image(draw: impl FnOnce() -> Bytes + Send + 'static) -> Response {
+    match tokio::task::spawn_blocking(draw).await {
+        Ok(jpeg) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ASSETS;
+
+    #[test]
+    fn assets_refer_to_no_other_host() {
+        for (name, _, text) in ASSETS {
+            let text = text.replace("http://www.w3.org/2000/svg", "");
+            for outside in ["http:", "https:", "@import", "eval(", "sourceMappingURL"] {
+                assert!(!text.contains(outside), "{name} has {outside}");
+            }
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The demo of a whole block.
+
+use std::collections::BTreeSet;
+
+use crate::cli::{empty, mocban};
+
+#[test]
+fn block_is_created_once_with_page_labels_and_truth() {
+    let dir = empty();
+    let args = [
+        "demo",
+        "d",
+        "--block=notes",
+        "--seed",
+        "7",
+        "--spacing",
+        "2",
+        "--no-run",
+    ];
+    let created = mocban(dir.path(), &args).expect(0);
+    assert!(
+        created.err.contains("created a notes block of "),
+        "{}",
+        created.err
+    );
+    let data = dir.path().join("d/data");
+    let truth = std::fs::read(data.join("truth.json")).expect("the truth");
+    let truth: serde_json::Value = serde_json::from_slice(&truth).expect("JSON");
+    let characters = truth["characters"].as_array().expect("characters");
+    assert!(characters.iter().any(|character| character["note"] == true));
+    let page = truth["page"].as_str().expect("a name");
+    let mesh = std::fs::read(data.join("block.ply")).expect("the mesh");
+    let faces = format!("element face {}\n", truth["triangles"]);
+    assert!(String::from_utf8_lossy(&mesh[..400]).contains(&faces));
+    let labels = std::fs::read_to_string(data.join("labels.json")).expect("the labels");
+    let bytes = std::fs::metadata(data.join(page)).expect("the page").len();
+    assert!(labels.contains(&format!("\"{page}{bytes}\"")));
+    let written = std::fs::metadata(data.join("block.ply")).expect("the mesh");
+    let again = mocban(dir.path(), &args).expect(0);
+    assert!(
+        again.err.contains("found a notes block of "),
+        "{}",
+        again.err
+    );
+    let found = std::fs::metadata(data.join("block.ply")).expect("the mesh");
+    assert_eq!(written.modified().ok(), found.modified().ok());
+    let left: BTreeSet<_> = std::fs::read_dir(&data)
+        .expect("a folder")
+        .map(|entry| {
+            entry
+                .expect("an entry")
+                .file_name()
+                .into_string()
+                .expect("UTF-8")
+        })
+        .collect();
+    let names = [
+        "README.txt",
+        "block.json",
+        "block.ply",
+        "labels.json",
+        page,
+        "truth.json",
+    ];
+    assert_eq!(left, names.map(ToOwned::to_owned).into());
+}
+
+#[test]
+fn directory_of_a_demo_takes_no_other_demo() {
+    let dir = empty();
+    mocban(dir.path(), &["demo", "d", "--pairs", "1", "--no-run"]).expect(0);
+    let refused = mocban(dir.path(), &["demo", "d", "--block"]).expect(2);
+    assert!(
+        refused
+            .err
+            .contains("holds the demo of tier upright and seed 1"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
+fn options_of_pairs_and_blocks_exclude_each_other() {
+    let dir = empty();
+    for args in [
+        &["demo", "--block", "--pairs", "3"][..],
+        &["demo", "--block", "--tier", "hard"],
+        &["demo", "--no-labels"],
+        &["demo", "--spacing", "0.3"],
+        &["demo", "--block=round"],
+        &["demo", "--block", "--spacing", "0.01"],
+    ] {
+        mocban(dir.path(), args).expect(2);
+    }
+    let left = std::fs::read_dir(dir.path()).expect("readable").count();
+    assert_eq!(left, 0, "nothing is created");
+}

@@ -1,0 +1,170 @@
+//! Whole blocks on the command line: import, status, show, retry, check and backup.
+
+use std::fs;
+use std::path::Path;
+
+use crate::cli::{Call, mocban};
+
+/// A file that is a mesh of one triangle, which no page belongs to.
+const TRIANGLE: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 300 0 0\nvertex 0 200 0\nendloop\nendfacet\nendsolid a\n";
+
+/// Writes the files of some blocks, and a list of them.
+fn write_blocks(dir: &Path, names: &[&str]) {
+    let mut list = "block,mesh,page,labels,unit,side\n".to_owned();
+    for name in names {
+        fs::write(dir.join(format!("{name}.stl")), TRIANGLE).expect("written");
+        fs::write(dir.join(format!("{name}.png")), "no image").expect("written");
+        list.extend([name, ",", name, ".stl,", name, ".png,,mm,front\n"]);
+    }
+    fs::write(dir.join("blocks.csv"), list).expect("written");
+}
+
+fn project(dir: &Path, args: &[&str]) -> Call {
+    mocban(dir, &[&["-C", "project"], args].concat())
+}
+
+#[test]
+fn one_block_and_a_list_are_imported_and_an_import_is_idempotent() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    write_blocks(dir.path(), &["b1", "b2"]);
+    let import = [
+        "import", "--block", "b1.stl", "--page", "b1.png", "--unit", "mm", "--json",
+    ];
+    let first = project(dir.path(), &import).expect(0).json();
+    assert_eq!(first["blocks"]["added"], 1);
+    let list = project(dir.path(), &["import", "blocks.csv", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(list["blocks"]["added"], 1);
+    assert_eq!(list["blocks"]["changed"][0]["id"], "b1");
+    assert_eq!(list["blocks"]["changed"][0]["fields"][0], "side");
+    let again = project(dir.path(), &["import", "blocks.csv"]).expect(0);
+    assert!(
+        again.err.contains("0 blocks added, 0 changed, 2 unchanged"),
+        "{}",
+        again.err
+    );
+    let named = [
+        "import", "--block", "b1.stl", "--page", "b1.png", "--name", "Kiều 1",
+    ];
+    project(dir.path(), &named).expect(0);
+    let status = project(dir.path(), &["status", "--json"]).expect(0).json();
+    assert_eq!(status["blocks"]["total"], 3);
+    assert_eq!(status["blocks"]["jobs"]["ready"], 3);
+    let text = project(dir.path(), &["status"]).expect(0);
+    assert!(
+        text.out.contains("blocks       3 blocks · 3 waiting"),
+        "{}",
+        text.out
+    );
+    assert!(
+        text.next().iter().any(|next| next.ends_with("run")),
+        "{}",
+        text.err
+    );
+}
+
+#[test]
+fn a_list_with_a_wrong_column_or_a_missing_file_imports_nothing() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    write_blocks(dir.path(), &["b1"]);
+    for (list, expected) in [
+        (
+            "block,mesh,pages,labels\nb1,b1.stl,b1.png,\n",
+            "rename \"pages\" to \"page\"",
+        ),
+        (
+            "block,mesh,page,lables\nb1,b1.stl,b1.png,\n",
+            "rename it to \"labels\"",
+        ),
+        (
+            "block,mesh,page\nb1,b1.stl,gone.png\n",
+            "page gone.png of b1 does not exist",
+        ),
+    ] {
+        fs::write(dir.path().join("list.csv"), list).expect("written");
+        let refused = project(dir.path(), &["import", "list.csv"]).expect(2);
+        assert!(refused.err.contains(expected), "{}", refused.err);
+    }
+    let missing = ["import", "--block", "gone.stl", "--page", "b1.png"];
+    let refused = project(dir.path(), &missing).expect(2);
+    assert!(
+        refused.err.contains("mesh gone.stl of gone does not exist"),
+        "{}",
+        refused.err
+    );
+    let alone = project(dir.path(), &["import", "--block", "b1.stl"]).expect(2);
+    assert!(alone.err.contains("--page"), "{}", alone.err);
+    assert!(!dir.path().join("project").exists());
+}
+
+#[test]
+fn a_refused_block_is_named_by_run_status_show_and_retry() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    write_blocks(dir.path(), &["b1"]);
+    project(dir.path(), &["import", "blocks.csv"]).expect(0);
+    let plan = project(dir.path(), &["run", "--dry-run", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(plan["blocks"][0]["block"], "b1");
+    assert_eq!(plan["blocks"][0]["why"], "new");
+    let run = project(dir.path(), &["run", "--json"]).expect(3).json();
+    assert_eq!(run["blocks"]["failed"], 1);
+    let status = project(dir.path(), &["status", "--json"]).expect(0).json();
+    let failure = &status["blocks"]["failures"][0];
+    assert_eq!(failure["block"], "b1");
+    let sentence = failure["error"].as_str().expect("a sentence").to_owned();
+    assert!(sentence.contains("b1."), "{sentence}");
+    let text = project(dir.path(), &["status"]).expect(0);
+    assert!(text.out.contains(&sentence), "{}", text.out);
+    let shown = project(dir.path(), &["show", "b1"]).expect(0);
+    assert!(shown.out.contains(&sentence), "{}", shown.out);
+    assert_eq!(shown.next().len(), 1);
+    let json = project(dir.path(), &["show", "b1", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(json["status"], "quarantined");
+    assert_eq!(json["name"], "b1");
+    // Nothing changed, so the next run does not try again.
+    let again = project(dir.path(), &["run", "--json"]).expect(3).json();
+    assert_eq!(
+        (
+            &again["blocks"]["failed"],
+            &again["blocks"]["failed_in_all"]
+        ),
+        (&0.into(), &1.into())
+    );
+    let retried = project(dir.path(), &["retry", "b1"]).expect(0);
+    assert!(
+        retried.err.contains("1 block will run again"),
+        "{}",
+        retried.err
+    );
+    project(dir.path(), &["retry", "b2"]).expect(4);
+    let run = project(dir.path(), &["run", "--json"]).expect(3).json();
+    assert_eq!(run["blocks"]["failed"], 1);
+}
+
+#[test]
+fn a_backup_holds_blocks_and_finds_their_files_again() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    write_blocks(dir.path(), &["b1"]);
+    project(dir.path(), &["import", "blocks.csv"]).expect(0);
+    project(dir.path(), &["run"]).expect(3);
+    project(dir.path(), &["check"]).expect(0);
+    project(dir.path(), &["backup", "copy.sqlite"]).expect(0);
+    fs::create_dir(dir.path().join("moved")).expect("a folder");
+    for file in ["b1.stl", "b1.png"] {
+        fs::rename(dir.path().join(file), dir.path().join("moved").join(file)).expect("moved");
+    }
+    let restore = ["restore", "copy.sqlite", "restored", "--inputs", "moved"];
+    mocban(dir.path(), &restore).expect(0);
+    let shown = mocban(dir.path(), &["-C", "restored", "show", "b1", "--json"]);
+    let shown = shown.expect(0).json();
+    let mesh = shown["mesh_path"].as_str().expect("a path");
+    assert!(mesh.ends_with("moved/b1.stl"), "{mesh}");
+    assert!(shown["failure"]["class"].is_string());
+    // Artifacts are not in a backup, so the next run computes the stages again.
+    mocban(dir.path(), &["-C", "restored", "check", "--repair"]).expect(0);
+    mocban(dir.path(), &["-C", "restored", "check"]).expect(0);
+}
