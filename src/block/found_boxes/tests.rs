@@ -105,25 +105,12 @@ impl Drawing {
         }
     }
 
-    /// Returns the drawing turned about the middle of the face.
-    fn turned(&self, angle: f64) -> impl Fn(&[Rectangle], [f64; 2]) -> bool {
-        let (sin, cos) = angle.sin_cos();
-        move |shapes: &[Rectangle], [u, v]: [f64; 2]| {
-            let (x, y) = (u - SIZE_MM[0] / 2.0, v - SIZE_MM[1] / 2.0);
-            let u = cos * x + sin * y + SIZE_MM[0] / 2.0;
-            let v = cos * y - sin * x + SIZE_MM[1] / 2.0;
-            shapes.iter().any(|[left, top, right, bottom]| {
-                u >= *left && u < *right && v >= *top && v < *bottom
-            })
-        }
-    }
-
     /// Returns the face, turned by an angle in rad.
     fn face(&self, angle: f64) -> Face {
         let margin = if angle == 0.0 { 0.0 } else { 8.0 };
         let count = |size: f64| ((size + 2.0 * margin) / HEIGHT_STEP_MM) as usize;
         let (width, height) = (count(SIZE_MM[0]), count(SIZE_MM[1]));
-        let is_stroke = self.turned(angle);
+        let is_stroke = turned(angle);
         let place = |at: usize| at as f64 * HEIGHT_STEP_MM - margin;
         let soft = Grid::from_fn(width, height, |x, y| {
             255 * u8::from(is_stroke(&self.relief, [place(x), place(y)]))
@@ -158,7 +145,7 @@ impl Drawing {
     /// Returns the page of `size` pixels that a map prints.
     fn page(&self, page_from_face: &Affine2, size: [usize; 2]) -> PageInk {
         let inverse = page_from_face.inverse().expect("an invertible map");
-        let is_ink = self.turned(0.0);
+        let is_ink = turned(0.0);
         PageInk::of_soft(Grid::from_fn(size[0], size[1], |x, y| {
             let face = inverse.apply([x as f64, y as f64]);
             255 * u8::from(is_ink(&self.ink, face))
@@ -196,6 +183,20 @@ impl Drawing {
                 }
             }
         }
+    }
+}
+
+/// Returns a function that looks whether a point lies in rectangles that are turned about the middle of the face.
+fn turned(angle: f64) -> impl Fn(&[Rectangle], [f64; 2]) -> bool {
+    let (sin, cos) = angle.sin_cos();
+    move |shapes: &[Rectangle], [u, v]: [f64; 2]| {
+        let (x, y) = (u - SIZE_MM[0] / 2.0, v - SIZE_MM[1] / 2.0);
+        let u = cos * x + sin * y + SIZE_MM[0] / 2.0;
+        let v = cos * y - sin * x + SIZE_MM[1] / 2.0;
+        let contains = |[left, top, right, bottom]: &Rectangle| {
+            u >= *left && u < *right && v >= *top && v < *bottom
+        };
+        shapes.iter().any(contains)
     }
 }
 

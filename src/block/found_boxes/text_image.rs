@@ -233,11 +233,13 @@ fn compare(relief: &Grid<u8>, ink: &Grid<u8>, on_page: &Grid<bool>) -> Grid<Trus
             }
         }
         let has_relief = around[0] > NO_RELIEF * 255.0 * around[5];
-        match (on_page.at(x, y), has_relief) {
-            (false, _) => Trust::Relief,
-            (true, false) => Trust::Ink,
-            (true, true) if correlation(&around) >= TRUST_NCC => Trust::Both,
-            (true, true) => Trust::Relief,
+        let is_on_page = on_page.at(x, y);
+        if is_on_page && !has_relief {
+            Trust::Ink
+        } else if is_on_page && correlation(&around) >= TRUST_NCC {
+            Trust::Both
+        } else {
+            Trust::Relief
         }
     })
 }
