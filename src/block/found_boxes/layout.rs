@@ -1,6 +1,5 @@
 //! The strokes of a page without frame and rules, and the part of the page inside the frame.
 
-use super::columns::Column;
 use super::rules::{Rule, find_solid, take_rules};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use crate::raster::{Grid, Mask};
@@ -84,9 +83,9 @@ impl Layout {
         }
     }
 
-    /// Erases the ornaments of a strip at the fold.
-    pub(super) fn erase_ornaments(&mut self, strip: &Column) {
-        let [left, right] = strip.across.map(|x| x * CELL);
+    /// Erases the ornaments of the strip at the fold, from its first position across to the one after the last, in cells.
+    pub(super) fn erase_ornaments(&mut self, strip: [usize; 2]) {
+        let [left, right] = strip.map(|x| x * CELL);
         let height = self.text.height();
         let part = Mask::from_fn(right - left, height, |x, y| self.text.at(left + x, y));
         let solid = find_solid(&part, (SOLID * (right - left) as f64) as usize);

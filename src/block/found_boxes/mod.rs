@@ -79,8 +79,8 @@ pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
     let Some(columns) = find_columns(&upright.layout) else {
         return Vec::new();
     };
-    for strip in columns.columns.iter().filter(|column| column.is_strip) {
-        upright.layout.erase_ornaments(strip);
+    for strip in columns.all.iter().filter(|column| column.is_strip) {
+        upright.layout.erase_ornaments(strip.across);
     }
     let (rows, pitches) = find_rows(&upright.layout, &columns);
     let places = places(&columns, &rows);
@@ -90,7 +90,7 @@ pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
         &places,
         &strokes,
         &pitches,
-        columns.columns.len(),
+        columns.all.len(),
         is_upside_down,
         page.size(),
     )
@@ -121,7 +121,7 @@ fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
     left >= -1.5 && top >= -1.5 && right <= width as f64 + 0.5 && bottom <= height as f64 + 0.5
 }
 
-/// Numbers the characters in reading order and leaves out those that the block or the page does not show.
+/// Numbers the characters in reading order and leaves out what the block or the page does not show.
 fn numbered(
     places: &[Place],
     strokes: &[Strokes],

@@ -50,7 +50,7 @@ pub(super) enum RowKind {
 
 /// A row of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Row {
+pub(super) struct TextRow {
     /// First position along y and the one after the last, cells.
     pub(super) along: [usize; 2],
     pub(super) kind: RowKind,
@@ -64,8 +64,8 @@ pub(super) struct RowPitches {
 }
 
 /// Finds the rows of each column from the top, and their pitches.
-pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<Row>>, RowPitches) {
-    let profiles: Vec<ColumnProfile> = (columns.columns.iter())
+pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<TextRow>>, RowPitches) {
+    let profiles: Vec<ColumnProfile> = (columns.all.iter())
         .map(|column| ColumnProfile::of(layout, column))
         .collect();
     let usual = usual_ink(&profiles);
@@ -244,7 +244,7 @@ impl<'a> RowSearch<'a> {
     }
 
     /// Returns the rows of the cheapest sequence from the top.
-    fn rows(&self) -> Vec<Row> {
+    fn rows(&self) -> Vec<TextRow> {
         let mut rows = Vec::new();
         let (mut to, mut notes) = (self.profile.lines.len(), false);
         loop {
@@ -256,7 +256,7 @@ impl<'a> RowSearch<'a> {
                 } else {
                     RowKind::Character
                 };
-                rows.push(Row {
+                rows.push(TextRow {
                     along: [step.from + self.profile.top, to + self.profile.top],
                     kind,
                 });
@@ -272,7 +272,7 @@ impl<'a> RowSearch<'a> {
 }
 
 /// Divides the strip at the fold, whose characters are often smaller: the pitch with the clearest cuts.
-fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<Row> {
+fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<TextRow> {
     let steps = 10;
     (0..=steps)
         .map(|step| {

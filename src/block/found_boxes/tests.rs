@@ -105,25 +105,12 @@ impl Drawing {
         }
     }
 
-    /// Returns the drawing turned about the middle of the face.
-    fn turned(&self, angle: f64) -> impl Fn(&[Rectangle], [f64; 2]) -> bool {
-        let (sin, cos) = angle.sin_cos();
-        move |shapes: &[Rectangle], [u, v]: [f64; 2]| {
-            let (x, y) = (u - SIZE_MM[0] / 2.0, v - SIZE_MM[1] / 2.0);
-            let u = cos * x + sin * y + SIZE_MM[0] / 2.0;
-            let v = cos * y - sin * x + SIZE_MM[1] / 2.0;
-            shapes.iter().any(|[left, top, right, bottom]| {
-                u >= *left && u < *right && v >= *top && v < *bottom
-            })
-        }
-    }
-
     /// Returns the face, turned by an angle in rad.
     fn face(&self, angle: f64) -> Face {
         let margin = if angle == 0.0 { 0.0 } else { 8.0 };
         let count = |size: f64| ((size + 2.0 * margin) / HEIGHT_STEP_MM) as usize;
         let (width, height) = (count(SIZE_MM[0]), count(SIZE_MM[1]));
-        let is_stroke = self.turned(angle);
+        let is_stroke = turned(angle);
         let place = |at: usize| at as f64 * HEIGHT_STEP_MM - margin;
         let soft = Grid::from_fn(width, height, |x, y| {
             255 * u8::from(is_stroke(&self.relief, [place(x), place(y)]))
@@ -150,6 +137,7 @@ impl Drawing {
                 soft,
                 face,
                 surface: Grid::new(4, 4, 1.0),
+                angle_rad: 0.0,
             },
         }
     }
@@ -157,7 +145,7 @@ impl Drawing {
     /// Returns the page of `size` pixels that a map prints.
     fn page(&self, page_from_face: &Affine2, size: [usize; 2]) -> PageInk {
         let inverse = page_from_face.inverse().expect("an invertible map");
-        let is_ink = self.turned(0.0);
+        let is_ink = turned(0.0);
         PageInk::of_soft(Grid::from_fn(size[0], size[1], |x, y| {
             let face = inverse.apply([x as f64, y as f64]);
             255 * u8::from(is_ink(&self.ink, face))
@@ -195,6 +183,20 @@ impl Drawing {
                 }
             }
         }
+    }
+}
+
+/// Returns a function that looks whether a point lies in rectangles that are turned about the middle of the face.
+fn turned(angle: f64) -> impl Fn(&[Rectangle], [f64; 2]) -> bool {
+    let (sin, cos) = angle.sin_cos();
+    move |shapes: &[Rectangle], [u, v]: [f64; 2]| {
+        let (x, y) = (u - SIZE_MM[0] / 2.0, v - SIZE_MM[1] / 2.0);
+        let u = cos * x + sin * y + SIZE_MM[0] / 2.0;
+        let v = cos * y - sin * x + SIZE_MM[1] / 2.0;
+        let contains = |[left, top, right, bottom]: &Rectangle| {
+            u >= *left && u < *right && v >= *top && v < *bottom
+        };
+        shapes.iter().any(contains)
     }
 }
 
@@ -305,15 +307,15 @@ fn characters_that_the_block_lost_are_counted_only() {
 #[test]
 fn a_worn_character_is_less_sure() {
     let mut drawing = Drawing::full(|_, _| false);
-    let [left, top, right, _] = cell(1, 1);
-    let middle = f64::midpoint(left, right);
-    // Half of the lower stroke is not carved.
-    drawing.relief.retain(|[u0, v0, u1, _]| {
-        !(*v0 > top + 5.0 && *v0 < top + ROW_MM && u1 - u0 > 5.0 && *u0 >= left - 1.0)
-    });
+    let [left, top, _, bottom] = cell(1, 1);
+    // The lower stroke is printed, but the block has lost it.
+    let is_lower_stroke =
+        |[u0, v0, _, v1]: &Rectangle| *u0 > left && *v0 > top + ROW_MM / 2.0 && *v1 < bottom;
+    drawing.relief.retain(|stroke| !is_lower_stroke(stroke));
+    assert_eq!(drawing.relief.len() + 1, drawing.ink.len());
     let (map, size) = upright();
     let found = drawing.found(&map, size);
-    assert!(middle > 0.0 && found[0].name() == "c01-r01");
+    assert_eq!(found[0].name(), "c01-r01");
     assert!(found[0].confidence < found[1].confidence - 0.1);
     assert!(found[1].confidence > 0.9);
 }
@@ -336,8 +338,9 @@ fn the_angle_of_the_text_is_found() {
     for degrees in [-3.0_f64, 0.0, 2.4] {
         let face = drawing.face(degrees.to_radians());
         let found = text_angle(&face, 0.0).to_degrees();
+        // 0.3 degrees are one pixel of the last round over the height of this small page.
         assert!(
-            (found - degrees).abs() < 0.1,
+            (found - degrees).abs() < 0.3,
             "{degrees} is found as {found}"
         );
     }

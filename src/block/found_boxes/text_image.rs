@@ -86,9 +86,7 @@ pub(super) struct TextImage {
     pub(super) relief: Grid<u8>,
     /// Soft ink, 0..=255; 0 outside the page.
     pub(super) ink: Grid<u8>,
-    /// Whether a pixel is on the page, in cells of [`TRUST_CELL`] pixels.
-    pub(super) on_page: Grid<bool>,
-    /// Which of the two images shows the text, in the same cells.
+    /// Which of the two images shows the text, in cells of [`TRUST_CELL`] pixels.
     pub(super) trust: Grid<Trust>,
 }
 
@@ -134,7 +132,6 @@ impl TextImage {
             frame,
             relief,
             ink,
-            on_page,
             trust,
         }
     }
@@ -236,11 +233,13 @@ fn compare(relief: &Grid<u8>, ink: &Grid<u8>, on_page: &Grid<bool>) -> Grid<Trus
             }
         }
         let has_relief = around[0] > NO_RELIEF * 255.0 * around[5];
-        match (on_page.at(x, y), has_relief) {
-            (false, _) => Trust::Relief,
-            (true, false) => Trust::Ink,
-            (true, true) if correlation(&around) >= TRUST_NCC => Trust::Both,
-            (true, true) => Trust::Relief,
+        let is_on_page = on_page.at(x, y);
+        if is_on_page && !has_relief {
+            Trust::Ink
+        } else if is_on_page && correlation(&around) >= TRUST_NCC {
+            Trust::Both
+        } else {
+            Trust::Relief
         }
     })
 }
