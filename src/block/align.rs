@@ -51,14 +51,14 @@ const fn sizes(shrink: usize, side_mm: f64, step_mm: f64, reach_mm: f64) -> Wind
 
 /// The face on one side of a block.
 #[derive(Debug, Clone)]
-pub struct Face {
+pub struct CarvedFace {
     /// Heights.
     pub map: HeightMap,
     /// Strokes.
     pub relief: Relief,
 }
 
-impl Face {
+impl CarvedFace {
     /// Computes the relief of stored heights; `None` if no surface fits them.
     pub fn of(stored: &StoredHeights) -> Option<Self> {
         let map = HeightMap::from(stored);
@@ -69,7 +69,7 @@ impl Face {
 
 /// A page on one side of a block.
 #[derive(Debug, Clone)]
-pub struct Alignment {
+pub struct PageAlignment {
     /// Index of the side.
     pub side: usize,
     /// Map of the face to the page.
@@ -82,7 +82,7 @@ pub struct Alignment {
 
 /// What is searched for coarse positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum SearchRange {
+enum CoarseSearch {
     /// The whole page, nearly parallel to the outline of the face.
     Narrow,
     /// A page that shows only a part of the face, or more than the face: any resolution.
@@ -91,9 +91,9 @@ enum SearchRange {
     AllAngles,
 }
 
-impl SearchRange {
+impl CoarseSearch {
     /// Returns the rotations and scales for one side.
-    fn range(self, side: &Face, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
+    fn range(self, side: &CarvedFace, relief: &ShrunkRelief, page: &PageInk) -> CoarseRange {
         let max_angle_deg = match self {
             Self::Narrow | Self::AllScales => MAX_ANGLE_DEG,
             Self::AllAngles => ALL_ANGLES_DEG,
@@ -127,7 +127,7 @@ impl SearchRange {
 }
 
 /// A position while it is refined.
-struct Candidate {
+struct PageCandidate {
     side: usize,
     map: PageMap,
     quality: f64,
@@ -137,19 +137,19 @@ struct Candidate {
 ///
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
-pub fn align(sides: &[&Face], page: &PageInk) -> Result<Alignment, BlockError> {
+pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, BlockError> {
     if sides.is_empty() {
         let found = "no side has a large flat part".to_owned();
         return Err(BlockError::NoFace { found });
     }
-    let mut best: Option<Alignment> = None;
+    let mut best: Option<PageAlignment> = None;
     for search in [
-        SearchRange::Narrow,
-        SearchRange::AllScales,
-        SearchRange::AllAngles,
+        CoarseSearch::Narrow,
+        CoarseSearch::AllScales,
+        CoarseSearch::AllAngles,
     ] {
         let found = refined(sides, page, search);
-        let quality = |found: &Option<Alignment>| {
+        let quality = |found: &Option<PageAlignment>| {
             found
                 .as_ref()
                 .map_or(-1.0, |found| found.agreement.quality())
@@ -173,8 +173,8 @@ pub fn align(sides: &[&Face], page: &PageInk) -> Result<Alignment, BlockError> {
 }
 
 /// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(sides: &[&Face], page: &PageInk, search: SearchRange) -> Option<Alignment> {
-    let mut best: Option<Candidate> = None;
+fn refined(sides: &[&CarvedFace], page: &PageInk, search: CoarseSearch) -> Option<PageAlignment> {
+    let mut best: Option<PageCandidate> = None;
     for (side, block) in sides.iter().enumerate() {
         let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
         for position in coarse::search(&relief, page, &search.range(block, &relief, page)) {
@@ -206,7 +206,7 @@ fn refined(sides: &[&Face], page: &PageInk, search: SearchRange) -> Option<Align
     }
     let (windows, field) = last?;
     let (agreement, support) = Agreement::of(&windows, &field);
-    Some(Alignment {
+    Some(PageAlignment {
         side: best.side,
         map,
         agreement,
@@ -220,7 +220,7 @@ fn first_round(
     relief: &ShrunkRelief,
     page: &PageInk,
     position: &CoarsePosition,
-) -> Option<Candidate> {
+) -> Option<PageCandidate> {
     let bounds = relief.face_bounds()?;
     let corner = |x: usize, y: usize| [x, y].map(|at| at as f64 * relief.pixel_mm);
     let low = corner(bounds[0], bounds[1]);
@@ -231,7 +231,7 @@ fn first_round(
     let field = ShiftField::fit(&windows, COMPARED_SIGMA_MM, None)?;
     let quality = agreement::mean_near(&windows, &field, COMPARED_MM);
     map = map.shifted(&field.at_all(&map.node_positions()));
-    Some(Candidate { side, map, quality })
+    Some(PageCandidate { side, map, quality })
 }
 
 /// Returns the scale at which the ink has the extent of the strokes, page pixels per mm.
@@ -267,17 +267,17 @@ fn extent(weights: &Grid<f32>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::super::test_world::{SIDES_MM, TestWorld};
-    use super::{Alignment, Face, align};
+    use super::{CarvedFace, PageAlignment, align};
     use crate::block::{BlockError, PageInk};
     use crate::domain::Affine2;
 
-    fn aligned(world: &TestWorld, page: &PageInk) -> Result<Alignment, BlockError> {
-        let face: Face = world.face();
+    fn aligned(world: &TestWorld, page: &PageInk) -> Result<PageAlignment, BlockError> {
+        let face: CarvedFace = world.face();
         align(&[&face], page)
     }
 
     /// Returns the largest error of a map at points of the face, mm.
-    fn error_mm(found: &Alignment, page_from_face: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
+    fn error_mm(found: &PageAlignment, page_from_face: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
         let points = (1..10).flat_map(|x| (1..10).map(move |y| [x, y]));
         points
             .map(|[x, y]| {

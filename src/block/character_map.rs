@@ -1,6 +1,6 @@
 //! The map from the scan to the page at one character.
 
-use super::align::Face;
+use super::align::CarvedFace;
 use super::characters::PlacedCharacter;
 use super::page_map::PageMap;
 use super::relief::surface_height;
@@ -16,7 +16,7 @@ pub struct CharacterMap {
 
 impl CharacterMap {
     /// Linearizes the map of a face to its page at the middle of a character.
-    pub fn of(face: &Face, map: &PageMap, character: &PlacedCharacter) -> Self {
+    pub fn of(face: &CarvedFace, map: &PageMap, character: &PlacedCharacter) -> Self {
         let [u0, v0, u1, v1] = character.face_box;
         let middle = [f64::midpoint(u0, u1), f64::midpoint(v0, v1)];
         let page = map.page_from_face(middle);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::agreement::Support;
-use super::align::Face;
+use super::align::CarvedFace;
 use super::field::ShiftField;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
@@ -69,7 +69,7 @@ pub struct PlacedCharacters {
 
 /// Places characters on the face: refines the map by them, and compares relief and ink of each.
 pub fn place_characters(
-    side: &Face,
+    side: &CarvedFace,
     page: &PageInk,
     alignment: (&PageMap, &Support),
     boxes: &[CharacterBox],

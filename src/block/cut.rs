@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 
 use rayon::prelude::*;
 
-use super::align::Face;
+use super::align::CarvedFace;
 use super::characters::PlacedCharacter;
 use super::relief::surface_height;
 use crate::domain::Affine2;
@@ -42,7 +42,7 @@ pub enum CutError {
 /// Which characters a point of the face belongs to.
 #[derive(Debug, Clone)]
 pub struct CutPlan<'a> {
-    side: &'a Face,
+    side: &'a CarvedFace,
     boxes: Vec<[f64; 4]>,
     origin_mm: [f64; 2],
     columns: usize,
@@ -53,7 +53,7 @@ pub struct CutPlan<'a> {
 
 impl<'a> CutPlan<'a> {
     /// Plans the cut of characters.
-    pub fn of(side: &'a Face, characters: &[PlacedCharacter]) -> Self {
+    pub fn of(side: &'a CarvedFace, characters: &[PlacedCharacter]) -> Self {
         let grown = |[u0, v0, u1, v1]: [f64; 4]| {
             [
                 u0 - MARGIN_MM,

@@ -1,13 +1,13 @@
 //! Reads a face between the pixels of its height map.
 
-use super::align::Face;
+use super::align::CarvedFace;
 use super::height_map::{HEIGHT_STEP_MM, NO_HEIGHT};
 use super::relief::surface_height;
 
 /// The four pixels around a point, each with its share.
 type Neighbours = [([i64; 2], f32); 4];
 
-impl Face {
+impl CarvedFace {
     /// Returns the soft strokes at a point of the face (u, v in mm), from 0 on carved ground to 1 on tops; `None` beside the
     /// height map and where nothing was scanned.
     pub fn strokes_at(&self, point: [f64; 2]) -> Option<f32> {

@@ -26,7 +26,7 @@ mod window_template;
 mod windows;
 
 pub use agreement::{Agreement, Support};
-pub use align::{Alignment, Face, align};
+pub use align::{CarvedFace, PageAlignment, align};
 pub use character_map::CharacterMap;
 pub use characters::{CharacterBox, PlacedCharacter, PlacedCharacters, place_characters};
 pub use cut::{CutError, CutPlan, PrintCrop, cut_meshes, cut_print};

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::agreement::{Agreement, Support};
 use super::characters::PlacedCharacter;
-use super::height_map::HeightHeader;
 use super::page_map::StoredPageMap;
+use super::stored_heights::HeightHeader;
 use crate::domain::{BlockSide, ContentHash, LengthUnit};
 
 /// What `face` returns.

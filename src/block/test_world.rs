@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::align::Face;
+use super::align::CarvedFace;
 use super::height_map::HEIGHT_STEP_MM;
 use super::orientation::Orientation;
 use super::page_ink::PageInk;
@@ -83,7 +83,7 @@ impl TestWorld {
     }
 
     /// Returns the face, bowed by 0.8 mm.
-    pub(super) fn face(&self) -> Face {
+    pub(super) fn face(&self) -> CarvedFace {
         let strokes = self.strokes(HEIGHT_STEP_MM);
         let middle = strokes.width() as f64 / 2.0;
         let values = Grid::from_fn(strokes.width(), strokes.height(), |x, y| {
@@ -96,7 +96,7 @@ impl TestWorld {
             origin_mm: [0.0; 2],
             low_mm: -15.0,
         };
-        Face::of(&StoredHeights { header, values }).expect("a face")
+        CarvedFace::of(&StoredHeights { header, values }).expect("a face")
     }
 
     /// Returns a page whose pixels show the face through a map.

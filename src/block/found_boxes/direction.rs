@@ -12,7 +12,7 @@ use super::layout::Layout;
 use super::places::{Place, Strokes};
 use super::skew::{page_angle, text_angle};
 use super::text_image::{TextFrame, TextImage};
-use crate::block::align::Face;
+use crate::block::align::CarvedFace;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::PageMap;
@@ -41,7 +41,7 @@ pub(super) struct Upright {
 
 impl Upright {
     /// Samples a page so that its columns run along y.
-    pub(super) fn of(face: &Face, page: &PageInk, map: &PageMap) -> Self {
+    pub(super) fn of(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Self {
         let soft = &face.relief.soft;
         let middle = [
             face.map.origin_mm[0] + soft.width() as f64 / 2.0 * HEIGHT_STEP_MM,

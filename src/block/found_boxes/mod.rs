@@ -19,7 +19,7 @@ use self::direction::Upright;
 use self::layout::CELL_MM;
 use self::places::{Half, Place, Strokes, measure, places};
 use self::rows::{RowPitches, find_rows};
-use super::align::Face;
+use super::align::CarvedFace;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 
@@ -74,7 +74,7 @@ impl FoundBox {
 }
 
 /// Finds the characters of a page in reading order: columns from right to left, each from the top.
-pub fn find_boxes(face: &Face, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
+pub fn find_boxes(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Vec<FoundBox> {
     let mut upright = Upright::of(face, page, map);
     let Some(columns) = find_columns(&upright.layout) else {
         return Vec::new();

@@ -1,8 +1,8 @@
 //! The angle of the text on the face.
 
-use crate::block::align::Face;
+use crate::block::align::CarvedFace;
 use crate::block::page_map::PageMap;
-use crate::block::windows::ShrunkRelief;
+use crate::block::window_images::ShrunkRelief;
 use crate::raster::Grid;
 
 /// Angles on both sides of that of the page that are searched, degrees.
@@ -22,7 +22,7 @@ pub(super) fn page_angle(map: &PageMap, middle: [f64; 2]) -> f64 {
 }
 
 /// Returns the angle near that of the page at which the projections of the relief on both axes are sharpest, rad.
-pub(super) fn text_angle(side: &Face, page_angle: f64) -> f64 {
+pub(super) fn text_angle(side: &CarvedFace, page_angle: f64) -> f64 {
     let mut best = page_angle;
     for (round, (shrink, step)) in ROUNDS.into_iter().enumerate() {
         let relief = ShrunkRelief::of(&side.map, &side.relief, shrink);

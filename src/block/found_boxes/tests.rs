@@ -1,6 +1,6 @@
 //! Characters found on small drawn pages: the same shapes as relief of a face and as ink of a page.
 
-use crate::block::align::Face;
+use crate::block::align::CarvedFace;
 use crate::block::found_boxes::skew::text_angle;
 use crate::block::found_boxes::{FoundBox, find_boxes};
 use crate::block::height_map::{HEIGHT_STEP_MM, HeightMap};
@@ -106,7 +106,7 @@ impl Drawing {
     }
 
     /// Returns the face, turned by an angle in rad.
-    fn face(&self, angle: f64) -> Face {
+    fn face(&self, angle: f64) -> CarvedFace {
         let margin = if angle == 0.0 { 0.0 } else { 8.0 };
         let count = |size: f64| ((size + 2.0 * margin) / HEIGHT_STEP_MM) as usize;
         let (width, height) = (count(SIZE_MM[0]), count(SIZE_MM[1]));
@@ -127,7 +127,7 @@ impl Drawing {
             half_extent_mm: [50.0, 50.0, 10.0],
             triangles: 1,
         };
-        Face {
+        CarvedFace {
             map: HeightMap {
                 frame,
                 origin_mm: [-margin; 2],

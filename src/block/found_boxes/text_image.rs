@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::block::align::Face;
+use crate::block::align::CarvedFace;
 use crate::block::face_layer::FACE_CELL;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
@@ -35,7 +35,7 @@ pub(super) struct TextFrame {
 
 impl TextFrame {
     /// Returns the frame around the face whose x axis is turned from u to v by an angle in rad.
-    pub(super) fn around(side: &Face, angle: f64) -> Self {
+    pub(super) fn around(side: &CarvedFace, angle: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -103,7 +103,12 @@ pub(super) enum Trust {
 
 impl TextImage {
     /// Samples relief and ink in a frame.
-    pub(super) fn sample(side: &Face, page: &PageInk, map: &PageMap, frame: TextFrame) -> Self {
+    pub(super) fn sample(
+        side: &CarvedFace,
+        page: &PageInk,
+        map: &PageMap,
+        frame: TextFrame,
+    ) -> Self {
         let [width, height] = frame.size;
         let mut relief = vec![0_u8; width * height];
         let mut ink = vec![0_u8; width * height];
@@ -159,7 +164,7 @@ impl TextImage {
 }
 
 /// Interpolates the relief along a row of the frame.
-fn sample_relief(side: &Face, frame: &TextFrame, y: usize, out: &mut [u8]) {
+fn sample_relief(side: &CarvedFace, frame: &TextFrame, y: usize, out: &mut [u8]) {
     let soft = &side.relief.soft;
     let first = frame.face_from_pixel([0.0, y as f64]);
     let start =

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::block::{Face, PageInk, PageMap};
+use crate::block::{CarvedFace, PageInk, PageMap};
 use crate::domain::enum_names;
 use crate::export::pictures::{BLUE, Rgb, VERMILLION, resized, shaded};
 use crate::raster::{Grid, jpeg_rgb8};
@@ -76,7 +76,7 @@ impl PageRegion {
 pub struct PageLayers {
     pub(super) page: Rgb,
     pub(super) ink: PageInk,
-    pub(super) face: Face,
+    pub(super) face: CarvedFace,
     pub(super) map: PageMap,
 }
 
@@ -234,7 +234,7 @@ impl FacePlaces {
 #[cfg(test)]
 pub(super) mod tests {
     use super::{BOTH, INK_BESIDE, PageLayer, PageLayers, PageRegion};
-    use crate::block::{Face, HeightHeader, Orientation, PageInk, PageMap, StoredHeights};
+    use crate::block::{CarvedFace, HeightHeader, Orientation, PageInk, PageMap, StoredHeights};
     use crate::domain::Affine2;
     use crate::export::pictures::{BLUE, Rgb, VERMILLION};
     use crate::raster::Grid;
@@ -256,7 +256,7 @@ pub(super) mod tests {
             origin_mm: [0.0, 0.0],
             low_mm: -16.0,
         };
-        let face = Face::of(&StoredHeights { header, values }).expect("a face");
+        let face = CarvedFace::of(&StoredHeights { header, values }).expect("a face");
         let page_from_face = Affine2::scale_shift(10.0, [0.0, 0.0]);
         let soft = Grid::from_fn(1000, 600, |x, _| if INK.contains(&x) { 255 } else { 0 });
         PageLayers {

@@ -7,8 +7,8 @@ use super::block_error::BlockViewError;
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
 use crate::block::{
-    AlignOutcome, BoxesOutcome, Face, FaceOutcome, FoundFace, PageInk, PageMap, StoredHeights,
-    StoredPageMap, heights_role,
+    AlignOutcome, BoxesOutcome, CarvedFace, FaceOutcome, FoundFace, PageInk, PageMap,
+    StoredHeights, StoredPageMap, heights_role,
 };
 use crate::catalog::{BlockDetail, BlockStageDetail, Catalog, PairResults};
 use crate::domain::{
@@ -170,7 +170,7 @@ impl BlockViewSources {
         let heights = heights.ok_or_else(|| unusable(BlockStage::Face, "it has no heights"))?;
         let values = raster::decode_grey16(&project.read_artifact(heights)?)?;
         let header = self.face.heights;
-        let face = Face::of(&StoredHeights { header, values });
+        let face = CarvedFace::of(&StoredHeights { header, values });
         Ok(PageLayers {
             page,
             ink,

@@ -2,10 +2,11 @@
 
 use std::collections::HashSet;
 
-use super::held::HeldPage;
-use super::{BlockPipeline, StageContext, output};
+use super::context::StageContext;
+use super::failure::output;
+use super::held::{HeldInputs, HeldPage};
 use crate::block::{
-    AlignOutcome, BoxesOutcome, CharacterBox, Face, PageMap, StoredPageMap, check_label_fit,
+    AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,
 };
 use crate::domain::{BlockStage, FailureClass};
@@ -23,46 +24,44 @@ struct PageBoxes {
     boxes: Vec<CharacterBox>,
 }
 
-impl BlockPipeline {
-    /// Places the characters on the face.
-    pub(super) fn boxes(
-        &self,
-        context: &StageContext<'_>,
-    ) -> Result<BlockStageOutput, BlockStageError> {
-        let page = self.page(context)?;
-        let faces = self.faces(context)?;
-        let aligned: AlignOutcome = context.outcome(BlockStage::Align)?;
-        let rerun = || BlockStageError::RerunFrom(BlockStage::Align);
-        let face = faces.iter().find(|(side, _)| *side == aligned.side);
-        let (_, face) = face.ok_or_else(rerun)?;
-        let map = PageMap::try_from(aligned.page_from_face)
-            .ok()
-            .ok_or_else(rerun)?;
-        let read = match &context.inputs.labels {
-            Some(file) => read_labels(context, file, &page)?,
-            None => found_on_page(context, face, &page, &map)?,
-        };
-        let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
-        let sure = placed
-            .characters
-            .iter()
-            .filter(|c| c.confidence >= SURE)
-            .count();
-        output(&BoxesOutcome {
-            labels: read.labels,
-            warnings: read.warnings,
-            count: placed.characters.len(),
-            sure,
-            page_from_face: StoredPageMap::from(&placed.map),
-            characters: placed.characters,
-        })
-    }
+/// Places the characters on the face.
+pub(super) fn boxes(
+    context: &StageContext<'_>,
+    held: &HeldInputs,
+) -> Result<BlockStageOutput, BlockStageError> {
+    let page = held.page(context)?;
+    let faces = held.faces(context)?;
+    let aligned: AlignOutcome = context.outcome(BlockStage::Align)?;
+    let rerun = || BlockStageError::RerunFrom(BlockStage::Align);
+    let face = faces.iter().find(|(side, _)| *side == aligned.side);
+    let (_, face) = face.ok_or_else(rerun)?;
+    let map = PageMap::try_from(aligned.page_from_face)
+        .ok()
+        .ok_or_else(rerun)?;
+    let read = match &context.inputs.labels {
+        Some(file) => read_labels(context, file, &page)?,
+        None => found_on_page(context, face, &page, &map)?,
+    };
+    let placed = place_characters(face, &page.ink, (&map, &aligned.support), &read.boxes);
+    let sure = placed
+        .characters
+        .iter()
+        .filter(|c| c.confidence >= SURE)
+        .count();
+    output(&BoxesOutcome {
+        labels: read.labels,
+        warnings: read.warnings,
+        count: placed.characters.len(),
+        sure,
+        page_from_face: StoredPageMap::from(&placed.map),
+        characters: placed.characters,
+    })
 }
 
 /// Finds the boxes of the characters on face and page.
 fn found_on_page(
     context: &StageContext<'_>,
-    face: &Face,
+    face: &CarvedFace,
     page: &HeldPage,
     map: &PageMap,
 ) -> Result<PageBoxes, BlockStageError> {

@@ -5,8 +5,10 @@ use std::io;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::context::StageContext;
+use super::failure::{failed, output};
+use super::held::HeldInputs;
 use super::scan_stream::ScanStream;
-use super::{BlockPipeline, StageContext, failed, output};
 use crate::block::{
     AlignOutcome, BlockError, BoxesOutcome, CharacterMap, CutError, CutOutcome, CutPlan,
     FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
@@ -29,121 +31,117 @@ const MIN_PRIOR: f64 = 0.5;
 /// The print of a character, or why it cannot be cut.
 type CutPrint = Result<(ArtifactRef, PrintCrop), String>;
 
-impl BlockPipeline {
-    /// Cuts the characters out of the scan and the page.
-    pub(super) fn cut(
-        &self,
-        context: &StageContext<'_>,
-    ) -> Result<BlockStageOutput, BlockStageError> {
-        let page = self.page(context)?;
-        let faces = self.faces(context)?;
-        let scan: FaceOutcome = context.outcome(BlockStage::Face)?;
-        let aligned: AlignOutcome = context.outcome(BlockStage::Align)?;
-        let boxes: BoxesOutcome = context.outcome(BlockStage::Boxes)?;
-        let face = faces.iter().find(|(side, _)| *side == aligned.side);
-        let (_, face) = face.ok_or(BlockStageError::RerunFrom(BlockStage::Face))?;
-        let map = PageMap::try_from(boxes.page_from_face)
-            .ok()
-            .ok_or(BlockStageError::RerunFrom(BlockStage::Boxes))?;
-        let turns = map.quarter_turns();
-        let margin_px = PRINT_MARGIN_MM * aligned.px_per_mm;
-        let prints: Vec<CutPrint> = (boxes.characters.par_iter())
-            .map(|character| {
-                let bounds = character.label.page_box;
-                let Some(crop) = cut_print(&page.image, bounds, margin_px, turns) else {
-                    return Ok(Err("its box lies outside the page".to_owned()));
-                };
-                let role = format!("{}.png", character.label.name);
-                let print = context.artifacts.write(&role, "png", png_rgb8(&crop.rgb))?;
-                Ok(Ok((print, crop)))
-            })
-            .collect::<Result<_, BlockStageError>>()?;
-        let meshes = self.meshes(
-            context,
-            &CutPlan::of(face, &boxes.characters),
-            &boxes.characters,
-        )?;
-        let normal_z = face.map.frame.axes[2][2];
-        let characters: Vec<CharacterOutput> = (boxes.characters.iter().zip(prints).zip(meshes))
-            .map(|((character, print), mesh)| {
-                let local = CharacterMap::of(face, &map, character);
-                let cut = print.and_then(|(print, crop)| {
-                    let mesh = mesh?;
-                    Ok((print, crop, mesh))
-                });
-                let maps = cut.as_ref().ok().map(|(_, crop, _)| maps(&local, crop));
-                CharacterOutput {
-                    label: character.label.name.clone(),
-                    character: character.label.text.clone(),
-                    bounds: character.label.page_box,
-                    confidence: Some(character.confidence),
-                    maps,
-                    cut: cut.map(|(print, crop, mesh)| CutFiles {
-                        mesh,
-                        print,
-                        unit: Some(scan.unit),
-                        scanned_face_down: (normal_z.abs() >= MIN_NORMAL_Z)
-                            .then_some(normal_z < 0.0),
-                        prior: (character.confidence >= MIN_PRIOR)
-                            .then(|| prior(&local, &crop, character))
-                            .flatten(),
-                    }),
-                }
-            })
-            .collect();
-        let count = characters.iter().filter(|c| c.cut.is_ok()).count();
-        self.held.clear();
-        let outcome = output(&CutOutcome {
-            count,
-            left: characters.len() - count,
-            page_hash: page.hash,
-        })?;
-        Ok(BlockStageOutput {
-            characters,
-            ..outcome
+/// Cuts the characters out of the scan and the page.
+pub(super) fn cut(
+    context: &StageContext<'_>,
+    held: &HeldInputs,
+) -> Result<BlockStageOutput, BlockStageError> {
+    let page = held.page(context)?;
+    let faces = held.faces(context)?;
+    let scan: FaceOutcome = context.outcome(BlockStage::Face)?;
+    let aligned: AlignOutcome = context.outcome(BlockStage::Align)?;
+    let boxes: BoxesOutcome = context.outcome(BlockStage::Boxes)?;
+    let face = faces.iter().find(|(side, _)| *side == aligned.side);
+    let (_, face) = face.ok_or(BlockStageError::RerunFrom(BlockStage::Face))?;
+    let map = PageMap::try_from(boxes.page_from_face)
+        .ok()
+        .ok_or(BlockStageError::RerunFrom(BlockStage::Boxes))?;
+    let turns = map.quarter_turns();
+    let margin_px = PRINT_MARGIN_MM * aligned.px_per_mm;
+    let prints: Vec<CutPrint> = (boxes.characters.par_iter())
+        .map(|character| {
+            let bounds = character.label.page_box;
+            let Some(crop) = cut_print(&page.image, bounds, margin_px, turns) else {
+                return Ok(Err("its box lies outside the page".to_owned()));
+            };
+            let role = format!("{}.png", character.label.name);
+            let print = context.artifacts.write(&role, "png", png_rgb8(&crop.rgb))?;
+            Ok(Ok((print, crop)))
         })
-    }
+        .collect::<Result<_, BlockStageError>>()?;
+    let meshes = meshes(
+        context,
+        &CutPlan::of(face, &boxes.characters),
+        &boxes.characters,
+    )?;
+    let normal_z = face.map.frame.axes[2][2];
+    let characters: Vec<CharacterOutput> = (boxes.characters.iter().zip(prints).zip(meshes))
+        .map(|((character, print), mesh)| {
+            let local = CharacterMap::of(face, &map, character);
+            let cut = print.and_then(|(print, crop)| {
+                let mesh = mesh?;
+                Ok((print, crop, mesh))
+            });
+            let maps = cut.as_ref().ok().map(|(_, crop, _)| maps(&local, crop));
+            CharacterOutput {
+                label: character.label.name.clone(),
+                character: character.label.text.clone(),
+                bounds: character.label.page_box,
+                confidence: Some(character.confidence),
+                maps,
+                cut: cut.map(|(print, crop, mesh)| CutFiles {
+                    mesh,
+                    print,
+                    unit: Some(scan.unit),
+                    scanned_face_down: (normal_z.abs() >= MIN_NORMAL_Z).then_some(normal_z < 0.0),
+                    prior: (character.confidence >= MIN_PRIOR)
+                        .then(|| prior(&local, &crop, character))
+                        .flatten(),
+                }),
+            }
+        })
+        .collect();
+    let count = characters.iter().filter(|c| c.cut.is_ok()).count();
+    held.clear();
+    let outcome = output(&CutOutcome {
+        count,
+        left: characters.len() - count,
+        page_hash: page.hash,
+    })?;
+    Ok(BlockStageOutput {
+        characters,
+        ..outcome
+    })
+}
 
-    /// Cuts the meshes of the characters and writes them. Returns the file of each, or why there is none.
-    fn meshes(
-        &self,
-        context: &StageContext<'_>,
-        plan: &CutPlan<'_>,
-        characters: &[PlacedCharacter],
-    ) -> Result<Vec<Result<ArtifactRef, String>>, BlockStageError> {
-        let scan = &context.inputs.mesh;
-        let mut stream = ScanStream::open(scan, &self.mesh_limits, context.stop)?;
-        let spill_failed = |error: io::Error| {
-            let text = format!("the temporary file of the cut: {error}");
-            BlockStageError::failed(FailureClass::Io, text)
-        };
-        let mut spill = tempfile::tempfile().map_err(spill_failed)?;
-        let mut written = Vec::with_capacity(characters.len());
-        let mut failure = None;
-        let outcome = cut_meshes(&mut stream, plan, &mut spill, |number, mesh| {
-            if mesh.triangles.len() < MIN_TRIANGLES {
-                written.push(Err("the scan shows no surface at its box".to_owned()));
-                return Ok(());
-            }
-            let role = format!("{}.ply", characters[number].label.name);
-            let bytes = MeshFormat::PlyLittleEndian.encode(&mesh);
-            match context.artifacts.write(&role, "ply", bytes) {
-                Ok(file) => written.push(Ok(file)),
-                Err(error) => {
-                    failure = Some(error);
-                    return Err(io::Error::other("the mesh of a character was not written"));
-                }
-            }
-            Ok(())
-        });
-        if let Some(error) = failure {
-            return Err(error);
+/// Cuts the meshes of the characters and writes them. Returns the file of each, or why there is none.
+fn meshes(
+    context: &StageContext<'_>,
+    plan: &CutPlan<'_>,
+    characters: &[PlacedCharacter],
+) -> Result<Vec<Result<ArtifactRef, String>>, BlockStageError> {
+    let scan = &context.inputs.mesh;
+    let mut stream = ScanStream::open(scan, context.mesh_limits, context.stop)?;
+    let spill_failed = |error: io::Error| {
+        let text = format!("the temporary file of the cut: {error}");
+        BlockStageError::failed(FailureClass::Io, text)
+    };
+    let mut spill = tempfile::tempfile().map_err(spill_failed)?;
+    let mut written = Vec::with_capacity(characters.len());
+    let mut failure = None;
+    let outcome = cut_meshes(&mut stream, plan, &mut spill, |number, mesh| {
+        if mesh.triangles.len() < MIN_TRIANGLES {
+            written.push(Err("the scan shows no surface at its box".to_owned()));
+            return Ok(());
         }
-        match outcome {
-            Ok(()) => Ok(written),
-            Err(CutError::Mesh(error)) => Err(failed(scan, BlockError::Mesh(error))),
-            Err(CutError::Spill(error) | CutError::Store(error)) => Err(spill_failed(error)),
+        let role = format!("{}.ply", characters[number].label.name);
+        let bytes = MeshFormat::PlyLittleEndian.encode(&mesh);
+        match context.artifacts.write(&role, "ply", bytes) {
+            Ok(file) => written.push(Ok(file)),
+            Err(error) => {
+                failure = Some(error);
+                return Err(io::Error::other("the mesh of a character was not written"));
+            }
         }
+        Ok(())
+    });
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    match outcome {
+        Ok(()) => Ok(written),
+        Err(CutError::Mesh(error)) => Err(failed(scan, BlockError::Mesh(error))),
+        Err(CutError::Spill(error) | CutError::Store(error)) => Err(spill_failed(error)),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{BlockPipeline, StageContext, failed};
-use crate::block::{Face, FaceOutcome, PageInk, StoredHeights, heights_role};
+use super::context::StageContext;
+use super::failure::failed;
+use crate::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
 use crate::domain::{BlockSide, BlockStage, ContentHash};
 use crate::raster::{self, PrintImage};
 use crate::runner::block_stages::BlockStageError;
@@ -16,7 +17,7 @@ pub(super) struct HeldInputs {
 }
 
 /// The faces of a block.
-pub(super) type HeldFaces = Arc<Vec<(BlockSide, Face)>>;
+pub(super) type HeldFaces = Arc<Vec<(BlockSide, CarvedFace)>>;
 
 /// A page, its ink and the hash of its file.
 #[derive(Debug)]
@@ -34,15 +35,11 @@ impl HeldInputs {
     }
 }
 
-impl BlockPipeline {
+impl HeldInputs {
     /// Returns the faces of a block, from memory or from the artifacts of `face`.
     pub(super) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
         let record = context.record(BlockStage::Face)?;
-        let mut held = self
-            .held
-            .faces
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut held = self.faces.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((hash, faces)) = &*held
             && *hash == record.result_hash
         {
@@ -55,7 +52,7 @@ impl BlockPipeline {
             let rerun = |_| BlockStageError::RerunFrom(BlockStage::Face);
             let values = raster::decode_grey16(&bytes).map_err(rerun)?;
             let header = found.heights;
-            let face = Face::of(&StoredHeights { header, values });
+            let face = CarvedFace::of(&StoredHeights { header, values });
             faces.extend(face.map(|face| (found.side, face)));
         }
         let faces = Arc::new(faces);
@@ -69,19 +66,15 @@ impl BlockPipeline {
         context: &StageContext<'_>,
     ) -> Result<Arc<HeldPage>, BlockStageError> {
         let file = &context.inputs.page;
-        let bytes = file.read(self.image_limits.max_bytes, context.stop)?;
+        let bytes = file.read(context.image_limits.max_bytes, context.stop)?;
         let hash = ContentHash::of(&bytes);
-        let mut held = self
-            .held
-            .page
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut held = self.page.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(page) = held.as_ref().filter(|page| page.hash == hash) {
             return Ok(Arc::clone(page));
         }
         // The memory of another page is freed first.
         *held = None;
-        let image = raster::decode(&bytes, &self.image_limits)
+        let image = raster::decode(&bytes, context.image_limits)
             .map_err(|error| file.failed(error.class(), error))?;
         drop(bytes);
         let ink = PageInk::of(&image).map_err(|error| failed(file, error))?;

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::failure::{StopRequested, failed};
 use crate::block::BlockError;
 use crate::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
@@ -52,12 +53,12 @@ impl<'a> ScanStream<'a> {
             let mesh = mesh::read_from(&mut source, scan.size(), scan.name(), limits)?;
             Ok(ScanSource::Mesh(mesh))
         };
-        let source = { read }().map_err(|error| super::failed(scan, BlockError::Mesh(error)))?;
+        let source = { read }().map_err(|error| failed(scan, BlockError::Mesh(error)))?;
         if let ScanSource::Mesh(mesh) = &source
             && mesh.triangles.is_empty()
         {
             let points = mesh.vertices.len();
-            return Err(super::failed(scan, BlockError::NoFaces { points }));
+            return Err(failed(scan, BlockError::NoFaces { points }));
         }
         Ok(Self {
             source,
@@ -92,20 +93,8 @@ struct Stoppable<'a>(&'a mut File, &'a AtomicBool);
 impl io::Read for Stoppable<'_> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         if self.1.load(Ordering::Relaxed) {
-            return Err(io::Error::other(Stop));
+            return Err(io::Error::other(StopRequested));
         }
         self.0.read(bytes)
     }
-}
-
-/// The error of a read after the run was asked to stop.
-#[derive(Debug, thiserror::Error)]
-#[error("the run stops")]
-struct Stop;
-
-/// Returns whether reading failed because the run stops.
-pub(super) fn is_stop(error: &io::Error) -> bool {
-    error
-        .get_ref()
-        .is_some_and(<dyn std::error::Error + Send + Sync>::is::<Stop>)
 }
