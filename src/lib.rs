@@ -193,7 +193,7 @@
 //!
 //! ## Seeing a block
 //!
-//! `src/export/block_view` reads the stored results of a block again: `block_view.rs` the files, `page_layers.rs` draws any
+//! `src/export/block_view` reads the stored results of a block again: `page_view.rs` the files, `page_layers.rs` draws any
 //! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
 //! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
 //! the same layers, and for the 3D view of a character's pair.
