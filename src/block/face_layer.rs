@@ -15,6 +15,11 @@ const MIN_LAYER_SHARE: f64 = 0.04;
 /// Heights that belong to the face, relative to the middle of its layer, mm: carved ground, bow and twist.
 const BELOW_MM: f32 = 9.0;
 const ABOVE_MM: f32 = 3.0;
+/// Pieces of the face with at least this share of its area belong to it if only a crack of this width, mm, separates them.
+const MIN_PIECE_SHARE: f64 = 0.01;
+const MAX_CRACK_MM: f64 = 6.0;
+/// Cracks that may lie one behind the other.
+const CRACKS: usize = 3;
 /// Parts narrower than this are removed, mm: clamps, rims of a turntable.
 const MIN_WIDTH_MM: f64 = 3.6;
 
@@ -51,7 +56,15 @@ fn widest_part(map: &HeightMap, layer: f32) -> Option<Mask> {
     };
     let cells = Grid::from_fn(columns, rows, in_layer);
     let reach = (MIN_WIDTH_MM / (FACE_CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
-    ConnectedComponents::label(&opened(&cells, reach)).largest()
+    let parts = ConnectedComponents::label(&opened(&cells, reach));
+    let mut face = parts.largest()?;
+    let area = (MIN_PIECE_SHARE * face.count() as f64) as usize;
+    let gap = (MAX_CRACK_MM / (FACE_CELL as f64 * HEIGHT_STEP_MM)).round() as usize;
+    // Each step may reach pieces behind another crack.
+    for _ in 0..CRACKS {
+        face = parts.meeting(&spread(&face, gap, false), area);
+    }
+    Some(face)
 }
 
 /// Returns the middles of layers with enough heights, from above, at least [`BELOW_MM`] apart.
@@ -224,6 +237,19 @@ mod tests {
             let found = face_angle(&face);
             assert!((found - angle).abs() < 0.01, "{found} {angle}");
         }
+    }
+
+    #[test]
+    fn pieces_beyond_a_crack_belong_to_the_face() {
+        let mut cracked = map(0.0, |_, _| f32::NEG_INFINITY);
+        for y in 0..800 {
+            for x in 280..300 {
+                cracked.heights.set(x, y, -30.0);
+            }
+        }
+        let found = area(&cracked);
+        let crack = 20 * 400 / (FACE_CELL * FACE_CELL);
+        assert!(found.abs_diff(FACE - crack) < FACE / 50, "{found} {FACE}");
     }
 
     #[test]

@@ -20,7 +20,7 @@ const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
-/// One of so many triangles is kept for the direction of the face and for the extent of the block, unless the mesh has
+/// Every 32nd triangle is kept for the direction of the face and for the extent of the block, unless the mesh has
 /// only a few.
 const SAMPLE_STEP: usize = 32;
 const FEW_TRIANGLES: usize = 1 << 16;

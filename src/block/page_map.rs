@@ -24,7 +24,7 @@ pub struct PageMap {
     nodes: Grid<[f64; 2]>,
 }
 
-/// A [`PageMap`] as it is stored.
+/// The stored form of a [`PageMap`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StoredPageMap {
     /// Position of the first node, mm.

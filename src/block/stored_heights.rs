@@ -12,7 +12,7 @@ const STORED_STEP_MM: f32 = 0.0005;
 /// Stored value of [`NO_HEIGHT`].
 const NOT_STORED: u16 = 0;
 
-/// A height map of a face as it is stored.
+/// The stored form of the height map of a face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredHeights {
     /// Position of the map, and what its values mean.

@@ -14,7 +14,7 @@ pub(super) struct WindowTemplate {
     norm: f32,
     /// Middle of the pixels that count, mm.
     pub(super) centre: [f64; 2],
-    /// Number of pixels that count, and those that are on the face.
+    /// Number of pixels that count, and the weights of all pixels unless each one counts.
     all: f32,
     weights: Option<Vec<f32>>,
 }

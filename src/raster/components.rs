@@ -66,6 +66,17 @@ impl ConnectedComponents {
         Some(self.labels.map(|label| *label == largest))
     }
 
+    /// Returns the pixels of components of at least this area that share a pixel with a mask.
+    pub(crate) fn meeting(&self, mask: &Mask, area: usize) -> Mask {
+        let mut meets = vec![false; self.sizes.len()];
+        for (label, set) in self.labels.data().iter().zip(mask.data()) {
+            if *set && *label != u32::MAX {
+                meets[*label as usize] = true;
+            }
+        }
+        self.select(|label| meets[label] && self.sizes[label] >= area)
+    }
+
     /// Returns the pixels of components of at least this area, in pixels.
     pub(crate) fn with_area_at_least(&self, size: usize) -> Mask {
         self.select(|label| self.sizes[label] >= size)

@@ -1,6 +1,6 @@
 //! The ink of a column line by line, and what is usual on a page.
 
-use super::columns::TextColumn;
+use super::columns::FoundColumn;
 use super::layout::Layout;
 
 /// Pitches of rows that are tried, in pitches of columns.
@@ -24,7 +24,7 @@ pub(super) struct ColumnProfile {
 }
 
 impl ColumnProfile {
-    pub(super) fn of(layout: &Layout, column: &TextColumn) -> Self {
+    pub(super) fn of(layout: &Layout, column: &FoundColumn) -> Self {
         let [top, bottom] = [layout.inside[1], layout.inside[3]];
         let [left, right] = column.across;
         let middle = usize::midpoint(left, right);

@@ -31,7 +31,7 @@ const RULE_SLOPE: f64 = 0.3;
 
 /// A column of text.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TextColumn {
+pub(super) struct FoundColumn {
     /// First position across and the one after the last, cells of the layout.
     pub(super) across: [usize; 2],
     /// Whether it is the narrow strip at the fold.
@@ -42,7 +42,7 @@ pub(super) struct TextColumn {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Columns {
     /// From left to right.
-    pub(super) all: Vec<TextColumn>,
+    pub(super) all: Vec<FoundColumn>,
     /// Distance of two columns, cells of the layout.
     pub(super) pitch: f64,
     /// Mean cost of a column.
@@ -107,8 +107,8 @@ fn means(values: &[f64], reach: usize) -> Vec<f64> {
 }
 
 /// Marks the strip at the fold: a narrower column inside the page with rules at both sides.
-fn mark_strip(columns: &mut [TextColumn], is_ruled: &dyn Fn(usize) -> bool) {
-    let width = |column: &TextColumn| column.across[1] - column.across[0];
+fn mark_strip(columns: &mut [FoundColumn], is_ruled: &dyn Fn(usize) -> bool) {
+    let width = |column: &FoundColumn| column.across[1] - column.across[0];
     let mut widths: Vec<usize> = columns.iter().map(width).collect();
     widths.sort_unstable();
     let usual = widths[widths.len() / 2] as f64;
@@ -212,7 +212,7 @@ fn divide(profile: &[f64], boundaries: &Boundaries, pitch: f64) -> Option<Column
     let mut to = count;
     while to > 0 {
         let (_, from, is_strip) = best[to];
-        columns.push(TextColumn {
+        columns.push(FoundColumn {
             across: [from, to],
             is_strip,
         });

@@ -2,7 +2,7 @@
 
 use super::columns::Columns;
 use super::layout::{CELL, Layout};
-use super::rows::{RowKind, TextRow};
+use super::rows::{FoundRow, RowKind};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use crate::block::page_map::PageMap;
 use crate::raster::Grid;
@@ -91,7 +91,7 @@ impl Strokes {
 }
 
 /// Returns the places of all columns and rows.
-pub(super) fn places(columns: &Columns, rows: &[Vec<TextRow>]) -> Vec<Place> {
+pub(super) fn places(columns: &Columns, rows: &[Vec<FoundRow>]) -> Vec<Place> {
     let mut places = Vec::new();
     for (column, (across, rows)) in columns.all.iter().zip(rows).enumerate() {
         let [left, right] = across.across;

@@ -50,7 +50,7 @@ pub(super) enum RowKind {
 
 /// A row of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TextRow {
+pub(super) struct FoundRow {
     /// First position along y and the one after the last, cells.
     pub(super) along: [usize; 2],
     pub(super) kind: RowKind,
@@ -64,7 +64,7 @@ pub(super) struct RowPitches {
 }
 
 /// Finds the rows of each column from the top, and their pitches.
-pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<TextRow>>, RowPitches) {
+pub(super) fn find_rows(layout: &Layout, columns: &Columns) -> (Vec<Vec<FoundRow>>, RowPitches) {
     let profiles: Vec<ColumnProfile> = (columns.all.iter())
         .map(|column| ColumnProfile::of(layout, column))
         .collect();
@@ -244,7 +244,7 @@ impl<'a> RowSearch<'a> {
     }
 
     /// Returns the rows of the cheapest sequence from the top.
-    fn rows(&self) -> Vec<TextRow> {
+    fn rows(&self) -> Vec<FoundRow> {
         let mut rows = Vec::new();
         let (mut to, mut notes) = (self.profile.lines.len(), false);
         loop {
@@ -256,7 +256,7 @@ impl<'a> RowSearch<'a> {
                 } else {
                     RowKind::Character
                 };
-                rows.push(TextRow {
+                rows.push(FoundRow {
                     along: [step.from + self.profile.top, to + self.profile.top],
                     kind,
                 });
@@ -272,7 +272,7 @@ impl<'a> RowSearch<'a> {
 }
 
 /// Divides the strip at the fold, whose characters are often smaller: the pitch with the clearest cuts.
-fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<TextRow> {
+fn strip_rows(profile: &ColumnProfile, usual: f64) -> Vec<FoundRow> {
     let steps = 10;
     (0..=steps)
         .map(|step| {
