@@ -12,6 +12,7 @@ mod block_inputs;
 mod block_pipeline;
 mod block_plan;
 mod block_progress;
+mod block_size;
 mod block_slot;
 mod block_stages;
 mod block_task;

@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::block_size;
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
@@ -60,8 +61,11 @@ impl PipelineExecutor {
             None
         };
         let face_down = pair.attributes.scanned_face_down;
-        let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
-            .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
+        let outcome =
+            pipeline::fit(&scan, print.as_ref(), face_down, &self.settings).map_err(|error| {
+                let length = block_size::length_of(&scan.mesh().vertices);
+                in_file(pair, &pair.attributes.mesh_path, &error.into(), length)
+            })?;
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
@@ -73,7 +77,7 @@ impl PipelineExecutor {
         // This function drops the scan, because no later stage needs it. Another pair can then use the memory.
         let scan = self.inputs.fitted_scan(pair)?;
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
-            .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
+            .map_err(|error| in_file(pair, &pair.attributes.mesh_path, &error.into(), 0.0))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
         let output = StageOutput {
             files: vec![png(DEPTH, png_grey16(&map.levels))],
@@ -95,7 +99,7 @@ impl PipelineExecutor {
                 NormalizeError::Print(_) => &pair.attributes.print_path,
                 NormalizeError::NoStrokes => &pair.attributes.mesh_path,
             };
-            in_file(path, &error.into())
+            in_file(pair, path, &error.into(), block_size::length_of_map(&depth))
         })?;
         pair.depth = Some(depth);
         let (outcome, json) = round_trip(&normalized.outcome)?;
@@ -128,7 +132,7 @@ impl PipelineExecutor {
                     }
                     _ => &pair.attributes.mesh_path,
                 };
-                in_file(path, &error.into())
+                in_file(pair, path, &error.into(), block_size::length_of_map(&depth))
             })?;
         let (outcome, json) = round_trip(&registered.outcome)?;
         let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
@@ -171,8 +175,13 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
         .print_from_depth(scale, &fit.plane_from_mesh))
 }
 
-fn in_file(path: &str, error: &StageError) -> ExecutionError {
-    ExecutionError::failed(error.class(), format!("{path}: {error}"))
+/// Returns the failure of a stage on a file. `length` is that of the scan in its unit, or 0 if it does not matter.
+fn in_file(pair: &PairContext, path: &str, error: &StageError, length: f64) -> ExecutionError {
+    let advice = match error.class() {
+        FailureClass::NoSolution => block_size::advice(length, pair.attributes.unit),
+        _ => String::new(),
+    };
+    ExecutionError::failed(error.class(), format!("{path}: {error}{advice}"))
 }
 
 /// Encodes an outcome as JSON. Returns the outcome as a later run would decode it, and the JSON.

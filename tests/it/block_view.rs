@@ -143,7 +143,6 @@ fn number(tab: &Tab<'_>, expression: &str) -> f64 {
 /// Uses the page as a person does.
 fn use_page(tab: &Tab<'_>) {
     let zoom = |tab: &Tab<'_>| number(tab, "mocbanBlock.camera.zoom");
-    let whole = zoom(tab);
     tab.screenshot("block-page");
     for (key, layer) in [("KeyR", "relief"), ("KeyO", "overlay"), ("KeyP", "page")] {
         tab.key(key);
@@ -152,6 +151,9 @@ fn use_page(tab: &Tab<'_>) {
         ));
         tab.screenshot(&format!("block-{layer}"));
     }
+    // The layout of the page may have changed while the layers were loaded.
+    tab.key("Digit0");
+    let whole = zoom(tab);
     tab.key("Equal");
     assert!((zoom(tab) / whole - 1.4).abs() < 0.01);
     tab.eval(
@@ -235,7 +237,7 @@ fn a_block_without_alignment_is_refused_in_one_sentence() {
     ] {
         let refused = at(args).expect(4);
         let expected =
-            "block b1 is not aligned with its page, so there is nothing to show: face failed: ";
+            "block b1 is not aligned with its page, so there is nothing to show: align failed: ";
         assert!(refused.err.contains(expected), "{}", refused.err);
         assert_eq!(refused.err.trim_end().lines().count(), 1, "{}", refused.err);
     }

@@ -1,0 +1,62 @@
+//! Recognizes the scan of a whole block that was given as the scan of one character.
+
+use crate::domain::LengthUnit;
+use crate::mesh::Vertices;
+use crate::raster::DepthMap;
+
+/// Lengths of whole blocks, mm. Characters have 6 to 30 mm.
+const BLOCK_MM: std::ops::RangeInclusive<f64> = 120.0..=1_000.0;
+
+/// Returns the advice for a scan that is as long as a whole block: a part of a sentence, or nothing for other scans.
+///
+/// `length` is in units of the mesh; an unknown unit counts as millimetres.
+pub(super) fn advice(length: f64, unit: Option<LengthUnit>) -> String {
+    let length_mm = length * unit.map_or(1.0, LengthUnit::mm);
+    if !BLOCK_MM.contains(&length_mm) {
+        return String::new();
+    }
+    format!(
+        "; this looks like a whole block ({length_mm:.0} mm): import it with its page by `mocban import --block`"
+    )
+}
+
+/// Returns the longest side of the bounding box of vertices, in units of the mesh.
+pub(super) fn length_of(vertices: &Vertices) -> f64 {
+    let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for vertex in vertices.iter() {
+        for (bounds, value) in bounds.iter_mut().zip(vertex) {
+            *bounds = [bounds[0].min(value), bounds[1].max(value)];
+        }
+    }
+    bounds
+        .iter()
+        .map(|[low, high]| high - low)
+        .fold(0.0, f64::max)
+}
+
+/// Returns the longer side of a depth map, in units of the mesh.
+pub(super) fn length_of_map(depth: &DepthMap) -> f64 {
+    let pixels = depth.levels.width().max(depth.levels.height());
+    pixels as f64 * depth.scale.mesh_unit_per_px
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{advice, length_of};
+    use crate::domain::LengthUnit;
+
+    #[test]
+    fn only_scans_as_long_as_a_block_get_the_advice() {
+        assert!(advice(345.0, None).contains("345 mm"));
+        assert!(advice(12.6, Some(LengthUnit::In)).contains("320 mm"));
+        for (length, unit) in [(12.0, None), (1.2, Some(LengthUnit::Cm)), (2_500.0, None)] {
+            assert_eq!(advice(length, unit), "");
+        }
+    }
+
+    #[test]
+    fn the_length_is_the_longest_side_of_the_box() {
+        let vertices = [[1.0, -4.0, 0.0], [3.0, 9.0, 2.0]].into_iter().collect();
+        assert_eq!(length_of(&vertices), 13.0);
+    }
+}
