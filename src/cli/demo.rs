@@ -83,7 +83,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         truth: Some(files.truth),
         ..ImportArgs::default()
     };
-    let outcome = import::import_pairs(&manifest, context).await?;
+    let outcome = import::import_pairs(&manifest, None, context).await?;
     import::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");

@@ -12,7 +12,7 @@ use super::busy::Busy;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::files;
-use super::import_blocks::{self, BlockArgs, BlockSource};
+use super::import_blocks::{self, BlockArgs, Imported};
 use super::manifest_file::Listing;
 use super::missing_files::MissingFiles;
 use super::new_project::import_with;
@@ -60,19 +60,22 @@ pub(super) struct ImportArgs {
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    if let Some(source) = BlockSource::of(args.file.as_deref(), &args.block, args.unit)? {
-        refuse_truths(&args)?;
-        let busy = Busy::start(context, "importing");
-        let outcome = import_blocks::import_blocks(&source, args.allow_missing, context).await;
-        drop(busy);
-        let outcome = outcome?;
-        context.print_json(&import_blocks::as_json(&outcome))?;
-        import_blocks::print_outcome(&outcome, context);
-        context.next("run");
-        return Ok(ExitCode::Done);
-    }
+    let list = match Imported::of(args.file.as_deref(), &args.block, args.unit)? {
+        Imported::Blocks(source) => {
+            refuse_truths(&args)?;
+            let busy = Busy::start(context, "importing");
+            let outcome = import_blocks::import_blocks(&source, args.allow_missing, context).await;
+            drop(busy);
+            let outcome = outcome?;
+            context.print_json(&import_blocks::as_json(&outcome))?;
+            import_blocks::print_outcome(&outcome, context);
+            context.next("run");
+            return Ok(ExitCode::Done);
+        }
+        Imported::Pairs(list) => list,
+    };
     let busy = Busy::start(context, "importing");
-    let outcome = import_pairs(&args, context).await;
+    let outcome = import_pairs(&args, list, context).await;
     drop(busy);
     let outcome = outcome?;
     context.print_json(&as_json(&outcome))?;
@@ -99,15 +102,16 @@ pub(super) struct ImportOutcome {
     warnings: Vec<String>,
 }
 
-/// Imports pairs. If the import fails, no pair is imported.
+/// Imports pairs. If the import fails, no pair is imported. `list` is the content of the list, if it was read already.
 ///
 /// # Errors
 /// Returns an error if a list is refused, or the catalog or the disk fails.
 pub(super) async fn import_pairs(
     args: &ImportArgs,
+    list: Option<Vec<u8>>,
     context: &Context,
 ) -> anyhow::Result<ImportOutcome> {
-    let mut listing = listing(args)?;
+    let mut listing = listing(args, list)?;
     let warnings = std::mem::take(&mut listing.warnings);
     let truths = match &args.truth {
         Some(file) => read_truths(file, &listing.ids, context).await?,
@@ -200,9 +204,12 @@ fn send_rows(
     Ok(missing)
 }
 
-fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
+fn listing(args: &ImportArgs, list: Option<Vec<u8>>) -> anyhow::Result<Listing> {
     match (&args.file, &args.meshes, &args.prints) {
-        (Some(file), ..) => Listing::from_file(file),
+        (Some(file), ..) => match list {
+            Some(bytes) => Listing::from_bytes(file, bytes),
+            None => Listing::from_file(file),
+        },
         (None, Some(meshes), Some(prints)) => Listing::from_folders(meshes, prints, args.unit),
         (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
     }

@@ -69,11 +69,25 @@ pub(super) enum BlockSource<'a> {
         unit: Option<LengthUnit>,
     },
     /// In a list.
-    List(&'a Path),
+    List {
+        /// Its path.
+        file: &'a Path,
+        /// Its content. It is read once, because it may be a pipe.
+        bytes: Vec<u8>,
+    },
 }
 
-impl<'a> BlockSource<'a> {
-    /// Returns where blocks are named, or `None` if the arguments name pairs.
+/// What an import adds.
+#[derive(Debug)]
+pub(super) enum Imported<'a> {
+    /// Whole blocks.
+    Blocks(BlockSource<'a>),
+    /// Pairs, with the content of their list, if they have one.
+    Pairs(Option<Vec<u8>>),
+}
+
+impl<'a> Imported<'a> {
+    /// Decides from the arguments and the header of the list what is imported.
     ///
     /// # Errors
     /// Returns an error if the list cannot be read.
@@ -81,16 +95,20 @@ impl<'a> BlockSource<'a> {
         file: Option<&'a Path>,
         args: &'a BlockArgs,
         unit: Option<LengthUnit>,
-    ) -> anyhow::Result<Option<Self>> {
+    ) -> anyhow::Result<Self> {
         if args.block.is_some() {
-            return Ok(Some(Self::One { args, unit }));
+            return Ok(Self::Blocks(BlockSource::One { args, unit }));
         }
         let Some(file) = file.filter(|file| !file.is_dir()) else {
-            return Ok(None);
+            return Ok(Self::Pairs(None));
         };
         let bytes = files::read(file)?;
         let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
-        Ok(is_list.then_some(Self::List(file)))
+        Ok(if is_list {
+            Self::Blocks(BlockSource::List { file, bytes })
+        } else {
+            Self::Pairs(Some(bytes))
+        })
     }
 }
 
@@ -130,8 +148,8 @@ pub(super) async fn import_blocks(
 }
 
 fn listing(source: &BlockSource<'_>) -> anyhow::Result<BlockListing> {
-    let file = match source {
-        BlockSource::List(file) => file,
+    let (file, bytes) = match source {
+        BlockSource::List { file, bytes } => (file, bytes),
         BlockSource::One { args, unit } => {
             let (Some(mesh), Some(page)) = (&args.block, &args.page) else {
                 anyhow::bail!("give --block and --page");
@@ -150,7 +168,7 @@ fn listing(source: &BlockSource<'_>) -> anyhow::Result<BlockListing> {
             });
         }
     };
-    let mut rows = parse_blocks(&files::read(file)?).map_err(|problems| refuse(file, &problems))?;
+    let mut rows = parse_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
     let folder = file.parent().unwrap_or(Path::new(""));
     for row in &mut rows {
         let paths = [&mut row.mesh, &mut row.page].into_iter();

@@ -56,7 +56,12 @@ impl Listing {
                 format!("{shown} is a directory; name two directories with --meshes and --prints");
             return Err(Refusal::Usage(text).into());
         }
-        let bytes = files::read(file)?;
+        Self::from_bytes(file, files::read(file)?)
+    }
+
+    /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
+    pub(super) fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+        let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
             read_jsonl
         } else {
