@@ -14,7 +14,7 @@ const AGREEMENT_MM: f64 = 0.5;
 const AGREEMENT_NCC: f64 = 0.5;
 /// Least share of agreeing windows, and least median of their correlations. Right blocks reach 0.83 and 0.78, wrong ones at
 /// most 0.54 and 0.49.
-pub(super) const MIN_AGREEMENT: f64 = 0.68;
+const MIN_AGREEMENT: f64 = 0.68;
 const MIN_MEDIAN_NCC: f64 = 0.6;
 /// Fewer windows prove nothing: about 30 cm2 of text.
 const MIN_WINDOWS: usize = 60;
@@ -35,6 +35,8 @@ pub struct Agreement {
     pub share: f64,
     /// Median of the windows' correlations.
     pub median_ncc: f64,
+    /// Share of the windows that lie near the field and correlate: nearly 1 on the right page, nearly 0 on others.
+    pub agreeing: f64,
     /// Share of the windows in the part of the face that agrees.
     pub part: f64,
     /// Share and median within that part.
@@ -85,6 +87,8 @@ impl Agreement {
             windows: windows.len(),
             share: share(&whole),
             median_ncc: median(&whole),
+            agreeing: agrees.iter().filter(|agrees| **agrees).count() as f64
+                / windows.len().max(1) as f64,
             part: part.len() as f64 / windows.len().max(1) as f64,
             part_share: share(&part),
             part_ncc: median(&part),

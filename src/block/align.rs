@@ -1,6 +1,6 @@
 //! Finds the side of a block and the map of its face to a page, or refuses.
 
-use super::agreement::{self, Agreement, MIN_AGREEMENT, Support};
+use super::agreement::{self, Agreement, Support};
 use super::coarse::{self, CoarsePosition, CoarseRange};
 use super::error::BlockError;
 use super::field::ShiftField;
@@ -166,8 +166,7 @@ pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, Blo
         best => Err(BlockError::Refused {
             width_mm: sides[0].map.heights.width() as f64 * HEIGHT_STEP_MM,
             height_mm: sides[0].map.heights.height() as f64 * HEIGHT_STEP_MM,
-            share: 100.0 * best.map_or(0.0, |best| best.agreement.share),
-            needed: 100.0 * MIN_AGREEMENT,
+            share: 100.0 * best.map_or(0.0, |best| best.agreement.agreeing),
         }),
     }
 }

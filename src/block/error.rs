@@ -39,8 +39,8 @@ pub enum BlockError {
     },
     /// Page and block do not agree.
     #[error(
-        "the page does not belong to this block: at the best position found, {share:.0} % of the places agree, and \
-         at least {needed:.0} % must; the scan was taken to be {width_mm:.0} x {height_mm:.0} mm; check the file names \
+        "the page does not belong to this block: at the best position found, {share:.0} % of the places agree; on \
+         the right page nearly all do; the scan was taken to be {width_mm:.0} x {height_mm:.0} mm; check the file names \
          and the unit"
     )]
     Refused {
@@ -50,7 +50,5 @@ pub enum BlockError {
         height_mm: f64,
         /// Percentage of places that agree.
         share: f64,
-        /// Percentage that is needed.
-        needed: f64,
     },
 }
