@@ -139,8 +139,7 @@ struct PageCandidate {
 /// Returns an error if no side shows a face or the page does not belong to the block.
 pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, BlockError> {
     if sides.is_empty() {
-        let found = "no side has a large flat part".to_owned();
-        return Err(BlockError::NoFace { found });
+        return Err(BlockError::no_face());
     }
     let mut best: Option<PageAlignment> = None;
     for search in [

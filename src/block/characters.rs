@@ -46,8 +46,6 @@ pub struct PlacedCharacter {
     pub label: CharacterBox,
     /// Smallest and largest u and v of the box on the face, mm: `[u0, v0, u1, v1]`.
     pub face_box: [f64; 4],
-    /// Whether the middle of the box is on the face.
-    pub is_on_face: bool,
     /// Correlation of relief and ink at the position; 0 if there is too little of either.
     pub ncc: f64,
     /// Shift of the character's own ink against the map, mm.
@@ -97,7 +95,6 @@ pub fn place_characters(
             PlacedCharacter {
                 label: label.clone(),
                 face_box,
-                is_on_face: relief.is_face(middle),
                 ncc,
                 shift_mm,
                 support,
@@ -176,12 +173,5 @@ impl ShrunkRelief {
             window.size[k] = (to - from) as usize + 1;
         }
         Some(window)
-    }
-
-    /// Returns whether a point belongs to the face.
-    fn is_face(&self, at: [f64; 2]) -> bool {
-        let [x, y] =
-            [0, 1].map(|k: usize| ((at[k] - self.origin_mm[k]) / self.pixel_mm).round() as i64);
-        self.face.get(x, y) == Some(true)
     }
 }

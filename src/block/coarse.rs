@@ -1,21 +1,17 @@
 //! First positions of a page on a face: cross-correlation over rotations, scales and shifts by FFT.
 
 use std::f64::consts::FRAC_PI_2;
-use std::sync::Arc;
 
 use rayon::prelude::*;
-use rustfft::algorithm::Radix4;
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftDirection, FftPlannerAvx};
 
 use super::page_ink::PageInk;
+use super::square_fft::{SIZE, SquareFft, quarter_turned};
 use super::window_images::ShrunkRelief;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::raster::blur::gaussian_blur;
 
-/// Side of the squares that are correlated, pixels.
-const SIZE: usize = 256;
 /// Blurs whose difference keeps characters and their parts, mm.
 const FINE_BLUR_MM: f64 = 0.9;
 const WIDE_BLUR_MM: f64 = 12.0;
@@ -53,7 +49,7 @@ pub(super) fn search(
     let Some(template) = FaceTemplate::of(face, range.angle_rad) else {
         return Vec::new();
     };
-    let fft = Fft2::new();
+    let fft = SquareFft::new();
     let mut found: Vec<(CoarsePosition, [usize; 3])> = Vec::new();
     // All scales are searched with one image of the page, as long as its pixels stay of a similar size.
     let pixel_mm = pixel_size(face, page, range);
@@ -155,7 +151,7 @@ impl FaceTemplate {
     }
 
     /// Rotates the face about its middle, which is placed at pixel (0, 0), and transforms it.
-    fn spectra(&self, angle: f64, pixel_mm: f64, fft: &Fft2) -> FaceSpectra {
+    fn spectra(&self, angle: f64, pixel_mm: f64, fft: &SquareFft) -> FaceSpectra {
         let (sin, cos) = angle.sin_cos();
         let mut square = vec![Complex32::default(); SIZE * SIZE];
         let (mut area, mut energy) = (0.0, 0.0);
@@ -231,7 +227,7 @@ struct PageTarget {
 }
 
 impl PageTarget {
-    fn of(page: &PageInk, scale: f64, pixel_mm: f64, fft: &Fft2) -> Self {
+    fn of(page: &PageInk, scale: f64, pixel_mm: f64, fft: &SquareFft) -> Self {
         let step = scale * pixel_mm;
         let sampler = page.sampler(step * 0.7);
         let size = page
@@ -285,7 +281,7 @@ impl PageTarget {
         face: &FaceSpectra,
         turns: usize,
         min_overlap: f32,
-        fft: &Fft2,
+        fft: &SquareFft,
     ) -> (f32, [f64; 2]) {
         let mut square = vec![Complex32::default(); SIZE * SIZE];
         let i = Complex32::new(0.0, 1.0);
@@ -328,17 +324,6 @@ impl PageTarget {
     }
 }
 
-/// Returns the index in a spectrum, stored column by column, of frequency (u, v) turned back by quarter turns.
-const fn quarter_turned(u: usize, v: usize, turns: usize) -> usize {
-    let (u_back, v_back) = ((SIZE - u) % SIZE, (SIZE - v) % SIZE);
-    match turns {
-        0 => u * SIZE + v,
-        1 => v * SIZE + u_back,
-        2 => u_back * SIZE + v_back,
-        _ => v_back * SIZE + u,
-    }
-}
-
 /// Returns half of the width and height of a face, whose outline is rotated by an angle, mm.
 fn half_extent(face: &ShrunkRelief, angle_rad: f64) -> [f64; 2] {
     let (sin, cos) = angle_rad.sin_cos();
@@ -372,45 +357,4 @@ fn difference_of_gaussians(values: &Grid<f32>, weights: &Grid<f32>, pixel_mm: f6
     let (fine, wide) = (blurred(FINE_BLUR_MM), blurred(WIDE_BLUR_MM));
     let difference = fine.zip_map(&wide, |fine, wide| fine - wide);
     difference.zip_map(weights, |value, weight| value * weight)
-}
-
-/// Two-dimensional transforms of squares.
-struct Fft2 {
-    forward: Arc<dyn Fft<f32>>,
-    inverse: Arc<dyn Fft<f32>>,
-}
-
-impl Fft2 {
-    fn new() -> Self {
-        let plan = |direction: FftDirection| match FftPlannerAvx::new() {
-            Ok(mut planner) => planner.plan_fft(SIZE, direction),
-            Err(()) => Arc::new(Radix4::new(SIZE, direction)) as Arc<dyn Fft<f32>>,
-        };
-        Self {
-            forward: plan(FftDirection::Forward),
-            inverse: plan(FftDirection::Inverse),
-        }
-    }
-
-    /// Transforms a square in row-major order; the result is stored column by column.
-    fn forward(&self, square: &mut [Complex32]) {
-        transform(&*self.forward, square);
-    }
-
-    /// Transforms a spectrum stored column by column back, without division by the number of pixels; the result is in
-    /// row-major order.
-    fn inverse(&self, spectrum: &mut [Complex32]) {
-        transform(&*self.inverse, spectrum);
-    }
-}
-
-fn transform(fft: &dyn Fft<f32>, square: &mut [Complex32]) {
-    let mut scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
-    fft.process_with_scratch(square, &mut scratch);
-    for y in 0..SIZE {
-        for x in 0..y {
-            square.swap(y * SIZE + x, x * SIZE + y);
-        }
-    }
-    fft.process_with_scratch(square, &mut scratch);
 }

@@ -1,4 +1,4 @@
-//! Cuts the mesh and the print of each character out of a block and its page.
+//! Cuts the mesh of each character out of a block.
 
 use std::io::{self, Read, Seek, SeekFrom, Write};
 
@@ -7,12 +7,10 @@ use rayon::prelude::*;
 use super::align::CarvedFace;
 use super::characters::PlacedCharacter;
 use super::relief::surface_height;
-use crate::domain::Affine2;
 use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
-use crate::raster::{Grid, PrintImage};
 
 /// Margin around a character's box, mm: ground for the plane and the threshold, but few strokes of neighbours.
-const MARGIN_MM: f64 = 0.8;
+pub const CUT_MARGIN_MM: f64 = 0.8;
 /// Heights that are cut, relative to the surface under the tops, mm: no walls, no other side, no holder.
 const BELOW_MM: f64 = 6.0;
 const ABOVE_MM: f64 = 2.0;
@@ -56,10 +54,10 @@ impl<'a> CutPlan<'a> {
     pub fn of(side: &'a CarvedFace, characters: &[PlacedCharacter]) -> Self {
         let grown = |[u0, v0, u1, v1]: [f64; 4]| {
             [
-                u0 - MARGIN_MM,
-                v0 - MARGIN_MM,
-                u1 + MARGIN_MM,
-                v1 + MARGIN_MM,
+                u0 - CUT_MARGIN_MM,
+                v0 - CUT_MARGIN_MM,
+                u1 + CUT_MARGIN_MM,
+                v1 + CUT_MARGIN_MM,
             ]
         };
         let boxes: Vec<[f64; 4]> = characters.iter().map(|c| grown(c.face_box)).collect();
@@ -271,60 +269,14 @@ fn welded(triangles: &[Triangle]) -> Mesh {
     Mesh::from_soup(vertices).welded()
 }
 
-/// The print of one character, cut out of its page.
-#[derive(Debug, Clone)]
-pub struct PrintCrop {
-    /// 8-bit colours, turned by quarter turns so that the character is upright.
-    pub rgb: Grid<[u8; 3]>,
-    /// Maps pixels of the crop to pixels of the page.
-    pub page_from_crop: Affine2,
-}
-
-/// Cuts the print of one box out of a page, with a margin in pixels. `quarter_turns` is the number of quarter turns from
-/// x to y by which the page is turned. Returns `None` if the box lies outside the page.
-pub fn cut_print(
-    page: &PrintImage,
-    [left, top, right, bottom]: [f64; 4],
-    margin_px: f64,
-    quarter_turns: u8,
-) -> Option<PrintCrop> {
-    let rgb = &page.rgb;
-    let range = |low: f64, high: f64, count: usize| {
-        let first = (low - margin_px).round().max(0.0);
-        let last = (high + margin_px).round().min(count as f64 - 1.0);
-        (last >= first).then(|| (first as usize, (last - first) as usize + 1))
-    };
-    let (x0, width) = range(left, right, rgb.width())?;
-    let (y0, height) = range(top, bottom, rgb.height())?;
-    let (w, h) = (width as f64 - 1.0, height as f64 - 1.0);
-    let (x, y) = (x0 as f64, y0 as f64);
-    // Upright pixels (i, j) to pixels of the page.
-    let (size, map) = match quarter_turns % 4 {
-        0 => ([width, height], [[1.0, 0.0, x], [0.0, 1.0, y]]),
-        1 => ([height, width], [[0.0, -1.0, x + w], [1.0, 0.0, y]]),
-        2 => ([width, height], [[-1.0, 0.0, x + w], [0.0, -1.0, y + h]]),
-        _ => ([height, width], [[0.0, 1.0, x], [-1.0, 0.0, y + h]]),
-    };
-    let page_from_crop = Affine2(map);
-    let pixel = |i: usize, j: usize| {
-        let [x, y] = page_from_crop.apply([i as f64, j as f64]);
-        rgb.at(x as usize, y as usize).map(|c| (c >> 8) as u8)
-    };
-    Some(PrintCrop {
-        rgb: Grid::from_fn(size[0], size[1], pixel),
-        page_from_crop,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
 
     use super::super::test_world::TestWorld;
-    use super::{CutPlan, MARGIN_MM, cut_meshes, cut_print};
+    use super::{CUT_MARGIN_MM, CutPlan, cut_meshes};
     use crate::block::{CharacterBox, PlacedCharacter};
     use crate::mesh::Mesh;
-    use crate::raster::{Grid, PrintImage};
 
     fn character(face_box: [f64; 4]) -> PlacedCharacter {
         PlacedCharacter {
@@ -334,7 +286,6 @@ mod tests {
                 page_box: [0.0; 4],
             },
             face_box,
-            is_on_face: true,
             ncc: 1.0,
             shift_mm: [0.0; 2],
             support: 1.0,
@@ -400,7 +351,7 @@ mod tests {
         );
         assert!(found[2].1.triangles.is_empty());
         for ((_, mesh), [u0, v0, u1, v1]) in found.iter().zip(boxes).take(2) {
-            let side = 10.0 + 2.0 * MARGIN_MM;
+            let side = 10.0 + 2.0 * CUT_MARGIN_MM;
             let expected = 2.0 * (side / 0.5).powi(2);
             let count = mesh.triangles.len() as f64;
             assert!(
@@ -408,28 +359,11 @@ mod tests {
                 "{count} {expected}"
             );
             for vertex in mesh.vertices.iter() {
-                let reach = MARGIN_MM + 0.5;
+                let reach = CUT_MARGIN_MM + 0.5;
                 assert!(vertex[0] > u0 - reach && vertex[0] < u1 + reach);
                 assert!(vertex[1] > v0 - reach && vertex[1] < v1 + reach);
                 assert_eq!(vertex[2], tops);
             }
         }
-    }
-
-    #[test]
-    fn prints_are_turned_upright_and_keep_their_place() {
-        let rgb = Grid::from_fn(90, 70, |x, y| [(x as u16) << 8, (y as u16) << 8, 0]);
-        let page = PrintImage::from(rgb);
-        for turns in 0..4 {
-            let crop = cut_print(&page, [20.0, 30.0, 49.0, 39.0], 2.0, turns).unwrap();
-            let upright = turns % 2 == 0;
-            let size = [crop.rgb.width(), crop.rgb.height()];
-            assert_eq!(size, if upright { [34, 14] } else { [14, 34] });
-            for (x, y) in [(0, 0), (5, 3), (size[0] - 1, size[1] - 1)] {
-                let [px, py] = crop.page_from_crop.apply([x as f64, y as f64]);
-                assert_eq!(crop.rgb.at(x, y), [px as u8, py as u8, 0], "{turns} turns");
-            }
-        }
-        assert!(cut_print(&page, [200.0, 30.0, 230.0, 39.0], 2.0, 0).is_none());
     }
 }

@@ -52,3 +52,12 @@ pub enum BlockError {
         share: f64,
     },
 }
+
+impl BlockError {
+    /// Returns the error of a scan without a side that may be a face.
+    pub fn no_face() -> Self {
+        Self::NoFace {
+            found: "no side has a large flat part".to_owned(),
+        }
+    }
+}

@@ -44,17 +44,7 @@ pub(super) fn find_face(map: &HeightMap) -> Option<Mask> {
 /// Returns the largest part of the heights around a layer, without narrow parts.
 fn widest_part(map: &HeightMap, layer: f32) -> Option<Mask> {
     let (low, high) = (layer - BELOW_MM, layer + ABOVE_MM);
-    let heights = &map.heights;
-    let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
-    let in_layer = |x: usize, y: usize| {
-        let inside = |at: &&f32| **at > low && **at < high;
-        let count = |dy: usize| {
-            let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
-            row.iter().filter(inside).count()
-        };
-        2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
-    };
-    let cells = Grid::from_fn(columns, rows, in_layer);
+    let cells = cells_with(map, |height| height > low && height < high);
     let reach = (MIN_WIDTH_MM / (FACE_CELL as f64 * HEIGHT_STEP_MM) / 2.0).round() as usize;
     let parts = ConnectedComponents::label(&opened(&cells, reach));
     let mut face = parts.largest()?;
@@ -97,12 +87,17 @@ fn layers(map: &HeightMap) -> Vec<f32> {
 
 /// Returns the cells of a map that contains only a face, in which at least half of the pixels have a height.
 pub(super) fn cells_of_face(map: &HeightMap) -> Mask {
+    cells_with(map, |height| height != NO_HEIGHT)
+}
+
+/// Returns the cells in which at least half of the heights satisfy a condition.
+fn cells_with(map: &HeightMap, condition: impl Fn(f32) -> bool) -> Mask {
     let heights = &map.heights;
     let (columns, rows) = (heights.width() / FACE_CELL, heights.height() / FACE_CELL);
     Grid::from_fn(columns, rows, |x, y| {
         let count = |dy: usize| {
             let row = &heights.row(y * FACE_CELL + dy)[x * FACE_CELL..][..FACE_CELL];
-            row.iter().filter(|height| **height != NO_HEIGHT).count()
+            row.iter().filter(|height| condition(**height)).count()
         };
         2 * (0..FACE_CELL).map(count).sum::<usize>() >= FACE_CELL * FACE_CELL
     })

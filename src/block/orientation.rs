@@ -159,12 +159,12 @@ impl Orientation {
             .column_iter()
             .chain(spread.eigenvectors.column_iter());
         let n = candidates
-            .map(|candidate| refined(candidate.into_owned(), sample))
-            .max_by(|a, b| {
-                let area = |n| layer_area(n, sample, LAYER_SHARE * long_side);
-                area(a).total_cmp(&area(b))
+            .map(|candidate| {
+                let n = refined(candidate.into_owned(), sample);
+                (n, layer_area(&n, sample, LAYER_SHARE * long_side))
             })
-            .map_or(Vector3::z(), with_fixed_sign);
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(Vector3::z(), |(n, _)| with_fixed_sign(n));
         // The largest variance of the area within the plane of the face.
         let flat = Matrix3::identity() - n * n.transpose();
         let within = SymmetricEigen::new(flat * covariance * flat);

@@ -125,19 +125,9 @@ impl PageMap {
 
     /// Returns the pixels of a row of points of the face: `count` points from `first`, `step_mm` apart along u.
     pub fn row(&self, first: [f64; 2], step_mm: f64, count: usize) -> Vec<[f64; 2]> {
-        let mut row = Vec::with_capacity(count + ROW_STEP);
-        let exact = |k: usize| self.page_from_face([first[0] + k as f64 * step_mm, first[1]]);
-        let mut from = exact(0);
-        for start in (0..count).step_by(ROW_STEP) {
-            let to = exact(start + ROW_STEP);
-            for k in 0..ROW_STEP {
-                let share = k as f64 / ROW_STEP as f64;
-                row.push([0, 1].map(|axis: usize| from[axis] + share * (to[axis] - from[axis])));
-            }
-            from = to;
-        }
-        row.truncate(count);
-        row
+        points_of_row(count, ROW_STEP, |k| {
+            self.page_from_face([first[0] + k as f64 * step_mm, first[1]])
+        })
     }
 
     /// Returns the derivative of the map at a point: page pixels per mm along u (first column) and v.
@@ -226,6 +216,27 @@ impl PageMap {
         let sides = [self.nodes.width(), self.nodes.height()];
         [0, 1].map(|k: usize| self.origin_mm[k] + (sides[k] as f64 - 1.0) / 2.0 * NODE_STEP_MM)
     }
+}
+
+/// Returns the points of a row: every point at a multiple of `step` is computed exactly, and those between are
+/// interpolated linearly.
+pub(super) fn points_of_row(
+    count: usize,
+    step: usize,
+    exact: impl Fn(usize) -> [f64; 2],
+) -> Vec<[f64; 2]> {
+    let mut points = Vec::with_capacity(count + step);
+    let mut from = exact(0);
+    for start in (0..count).step_by(step) {
+        let to = exact(start + step);
+        for k in 0..step {
+            let share = k as f64 / step as f64;
+            points.push([0, 1].map(|axis: usize| from[axis] + share * (to[axis] - from[axis])));
+        }
+        from = to;
+    }
+    points.truncate(count);
+    points
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ pub(super) struct ComputedBlockStage {
 
 /// What happens to a block after a stage.
 pub(super) enum AfterStage {
-    /// It goes on with this stage.
+    /// The job continues with this stage.
     Continue(Box<BlockInProgress>, BlockStage),
     /// Its task ends. The number of pairs that were added or changed.
     End(BlockEnd, u64),

@@ -4,6 +4,7 @@ mod block_kills;
 mod blocks;
 mod fake_blocks;
 mod fake_executor;
+mod gate;
 mod prefetch;
 pub(super) mod values;
 

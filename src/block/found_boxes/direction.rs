@@ -9,7 +9,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::layout::Layout;
-use super::places::{Place, Strokes};
+use super::places::{CharacterPlace, Strokes};
 use super::skew::{page_angle, text_angle};
 use super::text_image::{TextFrame, TextImage};
 use crate::block::align::CarvedFace;
@@ -71,7 +71,7 @@ impl Upright {
     }
 
     /// Returns whether the characters stand on their heads.
-    pub(super) fn is_upside_down(&self, places: &[Place], strokes: &[Strokes]) -> bool {
+    pub(super) fn is_upside_down(&self, places: &[CharacterPlace], strokes: &[Strokes]) -> bool {
         let limit = if self.is_as_on_page {
             -SURE_ERRORS
         } else {

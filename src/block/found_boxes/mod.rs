@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use self::columns::find_columns;
 use self::direction::Upright;
 use self::layout::CELL_MM;
-use self::places::{Half, Place, Strokes, measure, places};
+use self::places::{CharacterPlace, Half, Strokes, measure, places};
 use self::rows::{RowPitches, find_rows};
 use super::align::CarvedFace;
 use super::page_ink::PageInk;
@@ -97,7 +97,7 @@ pub fn find_boxes(face: &CarvedFace, page: &PageInk, map: &PageMap) -> Vec<Found
 }
 
 /// Returns whether a place holds a character.
-fn is_character(place: &Place, strokes: &Strokes, pitches: &RowPitches) -> bool {
+fn is_character(place: &CharacterPlace, strokes: &Strokes, pitches: &RowPitches) -> bool {
     let pitch = if place.half.is_some() {
         pitches.note
     } else {
@@ -123,7 +123,7 @@ fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
 
 /// Numbers the characters in reading order and leaves out what the block or the page does not show.
 fn numbered(
-    places: &[Place],
+    places: &[CharacterPlace],
     strokes: &[Strokes],
     pitches: &RowPitches,
     columns: usize,

@@ -25,7 +25,7 @@ pub(super) enum Half {
 
 /// Room for one character.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct CharacterPlace {
     /// Index of the column from the left and of the row from the top.
     pub(super) column: usize,
     pub(super) row: usize,
@@ -91,14 +91,14 @@ impl Strokes {
 }
 
 /// Returns the places of all columns and rows.
-pub(super) fn places(columns: &Columns, rows: &[Vec<FoundRow>]) -> Vec<Place> {
+pub(super) fn places(columns: &Columns, rows: &[Vec<FoundRow>]) -> Vec<CharacterPlace> {
     let mut places = Vec::new();
     for (column, (across, rows)) in columns.all.iter().zip(rows).enumerate() {
         let [left, right] = across.across;
         for (row, found) in rows.iter().enumerate() {
             let [top, bottom] = found.along;
             let mut add = |half: Option<Half>, left: usize, right: usize| {
-                places.push(Place {
+                places.push(CharacterPlace {
                     column,
                     row,
                     half,
@@ -162,7 +162,7 @@ pub(super) fn measure(
     image: &TextImage,
     layout: &Layout,
     map: &PageMap,
-    places: &[Place],
+    places: &[CharacterPlace],
 ) -> Vec<Strokes> {
     let (width, height) = (layout.cells.width(), layout.cells.height());
     let mut owners = Grid::new(width + 1, height + 1, NO_PLACE);
@@ -223,7 +223,7 @@ pub(super) fn measure(
 }
 
 /// Returns the share of the relief in a place that is printed; 1 if there is none.
-fn printed(image: &TextImage, layout: &Layout, place: &Place) -> f64 {
+fn printed(image: &TextImage, layout: &Layout, place: &CharacterPlace) -> f64 {
     let [left, top, right, bottom] = place.room;
     let (mut all, mut printed) = (1.0, 1.0);
     for y in top * CELL..bottom * CELL {

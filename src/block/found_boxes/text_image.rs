@@ -6,7 +6,7 @@ use crate::block::align::CarvedFace;
 use crate::block::face_layer::FACE_CELL;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
-use crate::block::page_map::PageMap;
+use crate::block::page_map::{PageMap, points_of_row};
 use crate::raster::Grid;
 
 /// Size of a pixel, mm: that of height maps.
@@ -190,20 +190,9 @@ fn sample_relief(side: &CarvedFace, frame: &TextFrame, y: usize, out: &mut [u8])
 
 /// Returns the pixels of the page at a row of the frame.
 fn page_points(map: &PageMap, frame: &TextFrame, y: usize) -> Vec<[f64; 2]> {
-    let count = frame.size[0];
-    let exact = |x: usize| map.page_from_face(frame.face_from_pixel([x as f64, y as f64]));
-    let mut points = Vec::with_capacity(count + ROW_STEP);
-    let mut from = exact(0);
-    for start in (0..count).step_by(ROW_STEP) {
-        let to = exact(start + ROW_STEP);
-        for k in 0..ROW_STEP {
-            let share = k as f64 / ROW_STEP as f64;
-            points.push([0, 1].map(|axis: usize| from[axis] + share * (to[axis] - from[axis])));
-        }
-        from = to;
-    }
-    points.truncate(count);
-    points
+    points_of_row(frame.size[0], ROW_STEP, |x| {
+        map.page_from_face(frame.face_from_pixel([x as f64, y as f64]))
+    })
 }
 
 /// Sums of relief r, ink i, r r, i i, r i and the number of pixels.

@@ -44,7 +44,7 @@ impl SplitMix {
 
 /// How a page is turned and bent.
 #[derive(Debug, Clone, Copy, Default)]
-struct Bend {
+struct PageBend {
     /// Clockwise.
     degrees: f64,
     /// Sideways shift at the corners, in pixels.
@@ -53,7 +53,7 @@ struct Bend {
     bow: f64,
 }
 
-impl Bend {
+impl PageBend {
     /// Returns the box around a box on a bent page from its place and half its width and height on an even page of ten
     /// columns and 20 rows.
     fn bounds(self, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> [f64; 4] {
@@ -63,7 +63,7 @@ impl Bend {
     }
 }
 
-impl From<f64> for Bend {
+impl From<f64> for PageBend {
     fn from(degrees: f64) -> Self {
         Self {
             degrees,
@@ -80,7 +80,7 @@ struct Page {
 
 impl Page {
     /// Draws columns from the right, each from a height in pixels. Boxes differ from their places at random.
-    fn new(columns: &[(f64, Vec<Cell>)], bend: impl Into<Bend>, random: &mut SplitMix) -> Self {
+    fn new(columns: &[(f64, Vec<Cell>)], bend: impl Into<PageBend>, random: &mut SplitMix) -> Self {
         let (mut page, bend) = (Self::default(), bend.into());
         for (k, (top, cells)) in columns.iter().enumerate() {
             let middle = 3000.0 - PITCH[0] * k as f64;
@@ -268,7 +268,7 @@ fn leaning_and_bent_columns_are_straightened() {
         for degrees in [-3.0, 0.0, 2.0] {
             let mut random = SplitMix(13 + k as u64);
             let columns = plain_columns(10, 20, &mut random);
-            let bend = Bend {
+            let bend = PageBend {
                 degrees,
                 keystone,
                 bow,

@@ -10,16 +10,14 @@ use super::failure::{failed, output};
 use super::held::HeldInputs;
 use super::scan_stream::ScanStream;
 use crate::block::{
-    AlignOutcome, BlockError, BoxesOutcome, CharacterMap, CutError, CutOutcome, CutPlan,
-    FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
+    AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
+    CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
 use crate::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
 use crate::mesh::write::MeshFormat;
 use crate::raster::png_rgb8;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
 
-/// Margin of the prints around a box, mm.
-const PRINT_MARGIN_MM: f64 = 0.8;
 /// Meshes with fewer triangles show no character.
 const MIN_TRIANGLES: usize = 200;
 /// The face looks up or down if its normal has at least this z.
@@ -47,7 +45,7 @@ pub(super) fn cut(
         .ok()
         .ok_or(BlockStageError::RerunFrom(BlockStage::Boxes))?;
     let turns = map.quarter_turns();
-    let margin_px = PRINT_MARGIN_MM * aligned.px_per_mm;
+    let margin_px = CUT_MARGIN_MM * aligned.px_per_mm;
     let prints: Vec<CutPrint> = (boxes.characters.par_iter())
         .map(|character| {
             let bounds = character.label.page_box;

@@ -41,8 +41,7 @@ pub(super) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
         .flat_map(|face| face.size_mm)
         .fold(0.0, f64::max);
     if faces.is_empty() {
-        let found = "no side has a large flat part".to_owned();
-        return Err(fail(BlockError::NoFace { found }));
+        return Err(fail(BlockError::no_face()));
     }
     if context.inputs.unit.is_some() && longest < MIN_SIDE_MM {
         let found = format!(

@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::{Condvar, Mutex};
 
 use serde_json::{Value, json};
 
+use super::gate::Gate;
 use crate::domain::{BlockStage, BlockStageRecord, Failure, FailureClass};
 use crate::runner::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
@@ -22,7 +23,7 @@ pub(super) struct FakeBlocks {
     /// Revision of the settings of the stage `boxes`.
     pub(super) revision: AtomicU32,
     /// Stages of some blocks wait until this is opened.
-    gate: (Mutex<bool>, Condvar),
+    gate: Gate,
 }
 
 impl FakeBlocks {
@@ -35,18 +36,7 @@ impl FakeBlocks {
 
     /// Opens the gate for good.
     pub(super) fn open(&self) {
-        *self.gate.0.lock().expect("an unpoisoned lock") = true;
-        self.gate.1.notify_all();
-    }
-
-    fn wait(&self) {
-        let open = self.gate.0.lock().expect("an unpoisoned lock");
-        drop(
-            self.gate
-                .1
-                .wait_while(open, |open| !*open)
-                .expect("no panic"),
-        );
+        self.gate.open();
     }
 
     fn behave(&self, name: &str, stage: BlockStage, tries: usize) -> Result<(), BlockStageError> {
@@ -60,7 +50,7 @@ impl FakeBlocks {
                 Err(BlockStageError::RerunFrom(BlockStage::Face))
             }
             "waits" if stage == BlockStage::Align => {
-                self.wait();
+                self.gate.wait();
                 Ok(())
             }
             _ => Ok(()),

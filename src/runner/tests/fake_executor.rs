@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, OnceLock};
+use std::sync::{Mutex, OnceLock};
 
 use serde_json::json;
 
+use super::gate::Gate;
 use super::values;
 use crate::catalog::InputVersion;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
@@ -25,7 +26,7 @@ pub(super) struct FakeExecutor {
     /// Where the files of pairs are, if they exist.
     pub(super) project: OnceLock<Project>,
     /// Stages of some pairs wait until this is opened.
-    gate: (Mutex<bool>, Condvar),
+    gate: Gate,
 }
 
 impl FakeExecutor {
@@ -40,18 +41,7 @@ impl FakeExecutor {
 
     /// Opens the gate for good.
     pub(super) fn open(&self) {
-        *self.gate.0.lock().expect("an unpoisoned lock") = true;
-        self.gate.1.notify_all();
-    }
-
-    fn wait(&self) {
-        let open = self.gate.0.lock().expect("an unpoisoned lock");
-        drop(
-            self.gate
-                .1
-                .wait_while(open, |open| !*open)
-                .expect("an unpoisoned lock"),
-        );
+        self.gate.open();
     }
 
     fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), ExecutionError> {
@@ -70,18 +60,18 @@ impl FakeExecutor {
                 is_transient: true,
             }),
             "hangs" if stage == Stage::Fit => {
-                self.wait();
+                self.gate.wait();
                 Ok(())
             }
             "loses" if stage == Stage::Register && tries == 1 => {
                 Err(ExecutionError::RerunFrom(Stage::Depth))
             }
             "lasts" if stage == Stage::Register => {
-                self.wait();
+                self.gate.wait();
                 Ok(())
             }
             "wait" => {
-                self.wait();
+                self.gate.wait();
                 Ok(())
             }
             _ => Ok(()),
