@@ -162,6 +162,7 @@ class BlockPage {
     const part = this.camera.visible();
     const path = `/region/${layer}/${part.x}/${part.y}/${part.width}/${part.height}`;
     if (this.region.getAttribute("src") === path && !this.region.hidden) return;
+    this.requested = path;
     const loaded = new Image();
     loaded.src = path;
     try {
@@ -169,8 +170,8 @@ class BlockPage {
     } catch {
       return;
     }
-    // The user may have moved on; an old region is still right in its place, unless the layer changed.
-    if (layer !== this.layer) return;
+    // The user may have moved on, or changed the layer.
+    if (layer !== this.layer || this.requested !== path) return;
     this.region.src = path;
     this.place(this.region, part);
     this.region.hidden = false;

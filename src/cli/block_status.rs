@@ -45,6 +45,11 @@ impl BlockStatus {
         self.number(&[JobStatus::Ready, JobStatus::Backoff])
     }
 
+    /// Returns the number of blocks that a process works on or left.
+    pub(super) fn leased(&self) -> u64 {
+        self.number(&[JobStatus::Leased])
+    }
+
     /// Returns the failed blocks.
     fn failed(&self) -> impl Iterator<Item = &BlockState> {
         let states = self.states.iter();
@@ -82,7 +87,7 @@ impl BlockStatus {
     /// Returns `12 blocks · 9 done · 1 running · 1 failed · 2345 characters`. If no process works on the project, leased
     /// blocks are interrupted.
     pub(super) fn line(&self, is_running: bool, palette: Palette) -> String {
-        let leased = self.number(&[JobStatus::Leased]);
+        let leased = self.leased();
         let characters: u64 = self.states.iter().map(|state| state.characters).sum();
         let mut parts = vec![count(self.states.len() as u64, "block")];
         let (word, tone) = if is_running {

@@ -252,7 +252,7 @@ pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<Strin
         steps.push("import pairs.csv".to_owned());
     }
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
-    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) > 0 {
+    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0 {
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.blocks.first_failed() {

@@ -263,9 +263,11 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
-    let running = status.in_process() > 0;
+    let leased = status.failures.blocks.leased();
+    let running = status.in_process() > 0 || (status.running && leased > 0);
     let waiting = status.waiting() + status.failures.blocks.waiting();
-    if !running && waiting + status.interrupted() + status.counts.stale > 0 {
+    let interrupted = status.interrupted() + if status.running { 0 } else { leased };
+    if !running && waiting + interrupted + status.counts.stale > 0 {
         steps.push("run".to_owned());
     }
     if let Some(first) = status.failures.blocks.first_failed() {

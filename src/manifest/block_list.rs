@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::column_names::{missing_column, similar_column};
+use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
 use super::text::{LineCounter, as_utf8, delimiter};
 use crate::domain::{BlockName, BlockSide, LengthUnit};
@@ -11,9 +12,6 @@ use crate::domain::{BlockName, BlockSide, LengthUnit};
 /// The columns of a list of blocks. The first three are required.
 const COLUMNS: [&str; 6] = ["block", "mesh", "page", "labels", "unit", "side"];
 const REQUIRED: usize = 3;
-
-/// Longest path in bytes; the system accepts no longer one.
-const MAX_PATH_BYTES: usize = 4096;
 
 /// A block of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -145,7 +145,7 @@ fn check_lengths(draft: &DraftRow, reasons: &mut Vec<String>) {
 /// all lines that follow become one cell.
 pub(super) const MAX_ROW_BYTES: usize = 1 << 20;
 /// Longest path in bytes; the system accepts no longer one.
-const MAX_PATH_BYTES: usize = 4096;
+pub(super) const MAX_PATH_BYTES: usize = 4096;
 /// Longest other cell in bytes.
 const MAX_CELL_BYTES: usize = 1 << 16;
 

@@ -1,5 +1,5 @@
-//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and CSV lists of whole blocks. The functions parse text or lists of paths
-//! and read no files. All problems of a list are reported together.
+//! Lists of pairs: CSV, JSON Lines, or two directories paired by file stem; and CSV lists of whole blocks. The functions
+//! parse text or lists of paths and read no files. All problems of a list are reported together.
 
 mod block_list;
 mod column_names;

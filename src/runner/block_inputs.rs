@@ -9,8 +9,8 @@ use crate::catalog::{BlockAttributes, BlockInputVersions, Catalog, InputVersion,
 use crate::domain::{BlockId, BlockStage, ContentHash, Failure, FailureClass};
 use crate::store::{Input, InputError, Project, hash_input, stat_input};
 
-/// Stores the new versions of changed input files of blocks in the catalog. Skips files that no stage has read. A file
-/// counts as unchanged if reading it fails or is ended by `limits`.
+/// Stores the new versions of changed input files of blocks in the catalog. Skips scans and pages that no stage has read;
+/// labels may have been added to a block that was finished without them. A file counts as unchanged if reading it fails or is ended by `limits`.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
@@ -44,14 +44,18 @@ impl ReadItem for ComparedBlock {
         let KnownBlock {
             attributes, inputs, ..
         } = &self.known;
-        let change = |path: &str, known: &Option<InputVersion>| {
-            change(&self.project.input(path), known.as_ref()?)
+        let changed_file =
+            |path: &str, known: Option<&InputVersion>| change(&self.project.input(path), known?);
+        let unread = InputVersion {
+            hash: ContentHash::of(b""),
+            stat: String::new(),
         };
+        let known_labels = inputs.labels.as_ref().unwrap_or(&unread);
         let labels = attributes.labels_path.as_ref();
         let changed = BlockInputVersions {
-            mesh: change(&attributes.mesh_path, &inputs.mesh),
-            page: change(&attributes.page_path, &inputs.page),
-            labels: labels.and_then(|path| change(path, &inputs.labels)),
+            mesh: changed_file(&attributes.mesh_path, inputs.mesh.as_ref()),
+            page: changed_file(&attributes.page_path, inputs.page.as_ref()),
+            labels: labels.and_then(|path| changed_file(path, Some(known_labels))),
         };
         let is_changed = changed != BlockInputVersions::default();
         is_changed.then_some((self.known.block, changed))

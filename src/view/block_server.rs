@@ -40,10 +40,9 @@ const ASSETS: [(&str, &str, &str); 4] = [
         include_str!("../../assets/block-view/block-view.css"),
     ),
 ];
-/// Longer side of the image of a whole layer, pixels. Closer views ask for regions.
-const OVERVIEW_SIDE: usize = 3000;
-/// Longer side of the image of a region, pixels.
-const REGION_SIDE: usize = 2400;
+/// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller
+/// part and so never have fewer pixels.
+const LONGEST_SIDE: usize = 3000;
 
 /// The block of a page, with the images of whole layers that were asked for.
 #[derive(Debug)]
@@ -78,7 +77,7 @@ impl ShownBlock {
     fn overview(&self, layer: PageLayer) -> Bytes {
         let stored = PageLayer::ALL.iter().zip(&self.overviews);
         let mut of_layer = stored.filter(|(one, _)| **one == layer);
-        let draw = || self.picture(layer, self.view.layers.whole(), OVERVIEW_SIDE);
+        let draw = || self.picture(layer, self.view.layers.whole(), LONGEST_SIDE);
         match of_layer.next() {
             Some((_, stored)) => stored.get_or_init(draw).clone(),
             None => draw(),
@@ -128,7 +127,7 @@ async fn region(
     };
     let part = region.within(shown.view.layers.size());
     match (layer.parse::<PageLayer>(), part) {
-        (Ok(layer), Some(part)) => image(move || shown.picture(layer, part, REGION_SIDE)).await,
+        (Ok(layer), Some(part)) => image(move || shown.picture(layer, part, LONGEST_SIDE)).await,
         _ => StatusCode::NOT_FOUND.into_response(),
     }
 }

@@ -78,11 +78,12 @@ impl Catalog {
         lease: BlockLease,
         stage: BlockCheckpoint,
     ) -> Result<Option<BlockLease>> {
+        // An earlier stage than that of the lease may have been computed again.
+        let next = stage.record.stage.next();
         let stored = self.in_transaction({
             let lease = lease.clone();
             move |conn| Box::pin(async move { store(conn, &lease, &stage).await })
         });
-        let next = lease.cursor.next();
         Ok(match (stored.await?, next) {
             (Stored::Now | Stored::Before, Some(cursor)) => Some(BlockLease {
                 cursor,

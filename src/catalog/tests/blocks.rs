@@ -255,6 +255,22 @@ fn failed(work: &BlockWork, stage: BlockStage, action: BlockFailureAction) -> Bl
 }
 
 #[tokio::test]
+async fn an_earlier_stage_that_is_computed_again_continues_with_the_stage_after_it() {
+    let world = world().await;
+    let (mut lease, work) = world.leased_block().await;
+    for stage in [
+        BlockStage::Face,
+        BlockStage::Align,
+        BlockStage::Face,
+        BlockStage::Align,
+    ] {
+        let stored = world.catalog.checkpoint_block(lease, done(&work, stage));
+        lease = stored.await.expect("stored").expect("a lease");
+        assert_eq!(Some(lease.cursor), stage.next());
+    }
+}
+
+#[tokio::test]
 async fn a_refused_block_stays_until_a_retry_or_another_page() {
     let world = world().await;
     let (lease, work) = world.leased_block().await;

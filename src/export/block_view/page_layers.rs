@@ -101,11 +101,11 @@ impl PageLayers {
 
     /// Draws a layer of a region, which must lie within the page, as a picture of `size` pixels.
     pub fn draw(&self, layer: PageLayer, region: PageRegion, size: [usize; 2]) -> Rgb {
-        let view = FacePlaces::new(&self.map, region, size);
+        let view = || FacePlaces::new(&self.map, region, size);
         match layer {
             PageLayer::Page => self.page_part(region, size),
-            PageLayer::Relief => self.relief(&view),
-            PageLayer::Overlay => self.overlay(&view),
+            PageLayer::Relief => self.relief(&view()),
+            PageLayer::Overlay => self.overlay(&view()),
         }
     }
 
@@ -145,7 +145,7 @@ impl PageLayers {
         view.picture(|face, page| {
             let ink = ink.at(page).unwrap_or(0.0);
             match self.face.strokes_at(face) {
-                Some(strokes) => mixed([255; 3], BOTH, ink, strokes),
+                Some(strokes) => mixed(ink, strokes),
                 None => blend(BESIDE, INK_BESIDE, ink),
             }
         })
@@ -153,9 +153,9 @@ impl PageLayers {
 }
 
 /// Returns the colour of ink and strokes over each other: of the sheet, of one of them, or of both.
-fn mixed(sheet: [u8; 3], both: [u8; 3], ink: f32, strokes: f32) -> [u8; 3] {
-    let without_ink = blend(sheet, VERMILLION, strokes);
-    let with_ink = blend(BLUE, both, strokes);
+fn mixed(ink: f32, strokes: f32) -> [u8; 3] {
+    let without_ink = blend([255; 3], VERMILLION, strokes);
+    let with_ink = blend(BLUE, BOTH, strokes);
     blend(without_ink, with_ink, ink)
 }
 

@@ -141,7 +141,7 @@ impl BlockViewSources {
             files: serde_json::from_value(face.files.clone())
                 .map_err(|error| unusable(&error.to_string()))?,
             map,
-            agreement: aligned.agreement.share,
+            agreement: aligned.agreement.agreeing,
             page_path: detail.state.attributes.page_path.clone(),
             page_hash: serde_json::from_value(made_with).unwrap_or_default(),
         })

@@ -90,7 +90,6 @@ pub(super) fn cut(
         })
         .collect();
     let count = characters.iter().filter(|c| c.cut.is_ok()).count();
-    held.clear();
     let outcome = output(&CutOutcome {
         count,
         left: characters.len() - count,

@@ -33,9 +33,7 @@ impl HeldInputs {
         *self.faces.lock().unwrap_or_else(PoisonError::into_inner) = None;
         *self.page.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
-}
 
-impl HeldInputs {
     /// Returns the faces of a block, from memory or from the artifacts of `face`.
     pub(super) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
         let record = context.record(BlockStage::Face)?;
@@ -46,6 +44,8 @@ impl HeldInputs {
             return Ok(Arc::clone(faces));
         }
         let outcome: FaceOutcome = context.outcome(BlockStage::Face)?;
+        // The memory of another block is freed first.
+        *held = None;
         let mut faces = Vec::new();
         for found in outcome.faces {
             let bytes = context.artifacts.read(record, &heights_role(found.side))?;

@@ -68,11 +68,15 @@ impl BlockStages for BlockPipeline {
             mesh_limits: &self.mesh_limits,
             image_limits: &self.image_limits,
         };
-        match stage {
+        let outcome = match stage {
             BlockStage::Face => face::face(&context),
             BlockStage::Align => align::align(&context, &self.held),
             BlockStage::Boxes => boxes::boxes(&context, &self.held),
             BlockStage::Cut => cut::cut(&context, &self.held),
+        };
+        if stage == BlockStage::Cut || matches!(outcome, Err(BlockStageError::Failed { .. })) {
+            self.held.clear();
         }
+        outcome
     }
 }

@@ -113,6 +113,30 @@ async fn changed_labels_run_only_the_changed_characters_again() {
 }
 
 #[tokio::test]
+async fn labels_that_are_added_to_a_finished_block_are_used() {
+    let fixture = RunFixture::of_blocks(&["b_1"], "r1 a\nr2 b").await;
+    let with_labels = fixture.block_state("b_1").await.attributes;
+    let without = BlockAttributes {
+        labels_path: None,
+        ..with_labels.clone()
+    };
+    let import = async |attributes: BlockAttributes| {
+        let imported = fixture.catalog.import_blocks(vec![attributes], 1).await;
+        imported.expect("imported");
+    };
+    import(without.clone()).await;
+    fixture.run(&options(1)).await;
+    assert_eq!(fixture.block_state("b_1").await.characters, 1);
+    import(with_labels).await;
+    fixture.run(&options(1)).await;
+    assert_eq!(fixture.counts("b_1"), [1, 1, 2, 2]);
+    assert_eq!(fixture.block_state("b_1").await.characters, 2);
+    import(without).await;
+    fixture.run(&options(1)).await;
+    assert_eq!(fixture.counts("b_1"), [1, 1, 3, 3]);
+}
+
+#[tokio::test]
 async fn a_changed_page_or_mesh_or_setting_runs_the_stages_that_depend_on_it() {
     let fixture = RunFixture::of_blocks(&["b_1"], "r1 a").await;
     fixture.run(&options(1)).await;

@@ -109,9 +109,10 @@ impl BlockStages for FakeBlocks {
                 artifacts.write("field.txt", "txt", [heights, page.into_bytes()].concat())?;
             }
             BlockStage::Boxes => {
-                let labels = inputs.labels.as_ref().expect("labels");
+                let found = || Ok("r1 found".to_owned());
+                let labels = inputs.labels.as_ref().map_or_else(found, text)?;
                 return Ok(BlockStageOutput {
-                    outcome: json!({ "labels": text(labels)? }),
+                    outcome: json!({ "labels": labels }),
                     characters: Vec::new(),
                 });
             }
