@@ -16,7 +16,7 @@ const AGREEMENT_NCC: f64 = 0.5;
 /// one, the highest values were 0.44 and 0.53, where both pages have the same columns.
 const MIN_AGREEMENT: f64 = 0.68;
 const MIN_MEDIAN_NCC: f64 = 0.6;
-/// Fewer windows prove nothing: about 30 cm2 of text.
+/// Fewer windows prove nothing: about 22 cm2 of text.
 const MIN_WINDOWS: usize = 60;
 /// A part of the face is accepted alone if it has at least this share of the windows. In the same 30 blocks, the highest
 /// value was 0.25.
@@ -36,11 +36,11 @@ pub struct Agreement {
     pub share: f64,
     /// Median of the windows' correlations.
     pub median_ncc: f64,
-    /// Share of the windows that lie near the field and correlate: nearly 1 on the right page, nearly 0 on others.
+    /// Share of the windows that lie within 0.5 mm of the field and have a correlation of at least 0.5.
     pub agreeing: f64,
     /// Share of the windows in the part of the face that agrees.
     pub part: f64,
-    /// Share and median within that part.
+    /// Share of that part's windows that lie within 0.5 mm of the field.
     pub part_share: f64,
     /// Median of the correlations in that part.
     pub part_ncc: f64,

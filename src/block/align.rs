@@ -141,13 +141,15 @@ pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, Blo
     if sides.is_empty() {
         return Err(BlockError::no_face());
     }
+    let shrink = |side: &&CarvedFace| ShrunkRelief::of(&side.map, &side.relief, ROUNDS[0].0.shrink);
+    let reliefs: Vec<ShrunkRelief> = sides.iter().map(shrink).collect();
     let mut best: Option<PageAlignment> = None;
     for search in [
         CoarseSearch::Narrow,
         CoarseSearch::AllScales,
         CoarseSearch::AllAngles,
     ] {
-        let found = refined(sides, page, search);
+        let found = refined(sides, &reliefs, page, search);
         let quality = |found: &Option<PageAlignment>| {
             found
                 .as_ref()
@@ -170,13 +172,18 @@ pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, Blo
     }
 }
 
-/// Searches coarse positions, chooses the one whose places agree best, and refines it.
-fn refined(sides: &[&CarvedFace], page: &PageInk, search: CoarseSearch) -> Option<PageAlignment> {
+/// Searches coarse positions, chooses the one whose places agree best, and refines it. `reliefs` are the faces in the
+/// pixels of the first round.
+fn refined(
+    sides: &[&CarvedFace],
+    reliefs: &[ShrunkRelief],
+    page: &PageInk,
+    search: CoarseSearch,
+) -> Option<PageAlignment> {
     let mut best: Option<PageCandidate> = None;
-    for (side, block) in sides.iter().enumerate() {
-        let relief = ShrunkRelief::of(&block.map, &block.relief, ROUNDS[0].0.shrink);
-        for position in coarse::search(&relief, page, &search.range(block, &relief, page)) {
-            let Some(candidate) = first_round(side, &relief, page, &position) else {
+    for (side, (block, relief)) in sides.iter().zip(reliefs).enumerate() {
+        for position in coarse::search(relief, page, &search.range(block, relief, page)) {
+            let Some(candidate) = first_round(side, relief, page, &position) else {
                 continue;
             };
             if best
@@ -191,7 +198,7 @@ fn refined(sides: &[&CarvedFace], page: &PageInk, search: CoarseSearch) -> Optio
     let block = sides[best.side];
     let (mut map, mut last) = (best.map, None);
     let mut shrunk = ROUNDS[0].0.shrink;
-    let mut relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);
+    let mut relief = reliefs[best.side].clone();
     for (sizes, sigma, fine) in ROUNDS {
         if sizes.shrink != shrunk {
             shrunk = sizes.shrink;

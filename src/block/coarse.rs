@@ -40,7 +40,8 @@ pub(super) struct CoarseRange {
     pub(super) count: usize,
 }
 
-/// Searches positions of a page on a face; the best ones first, each with another rotation or scale.
+/// Returns the best positions of a page on a face, best first; of positions with neighbouring rotation and scale, only
+/// the best.
 pub(super) fn search(
     face: &ShrunkRelief,
     page: &PageInk,
@@ -50,17 +51,15 @@ pub(super) fn search(
         return Vec::new();
     };
     let fft = SquareFft::new();
-    let mut found: Vec<(CoarsePosition, [usize; 3])> = Vec::new();
-    // All scales are searched with one image of the page, as long as its pixels stay of a similar size.
+    // All scales use the same pixel size, so the spectra of the face are computed once.
     let pixel_mm = pixel_size(face, page, range);
-    let jobs: Vec<(usize, f64)> = range.scales.iter().copied().enumerate().collect();
     let spectra: Vec<FaceSpectra> = range
         .angles
         .par_iter()
         .map(|angle| template.spectra(*angle, pixel_mm, &fft))
         .collect();
-    let results: Vec<Vec<(CoarsePosition, [usize; 3])>> = jobs
-        .par_iter()
+    let results: Vec<Vec<(CoarsePosition, [usize; 3])>> = (range.scales.par_iter())
+        .enumerate()
         .map(|(scale_at, scale)| {
             let target = PageTarget::of(page, *scale, pixel_mm, &fft);
             let mut found = Vec::with_capacity(4 * range.angles.len());
@@ -74,13 +73,13 @@ pub(super) fn search(
                         page_from_face,
                         score,
                     };
-                    found.push((position, [*scale_at, angle_at, turns]));
+                    found.push((position, [scale_at, angle_at, turns]));
                 }
             }
             found
         })
         .collect();
-    found.extend(results.into_iter().flatten());
+    let mut found: Vec<_> = results.into_iter().flatten().collect();
     found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
     let mut kept: Vec<(CoarsePosition, [usize; 3])> = Vec::new();
     for candidate in found {
@@ -136,7 +135,7 @@ impl FaceTemplate {
         let [left, top, right, bottom] = face.face_bounds()?;
         let weights = face.face.map(|inside| f32::from(u8::from(*inside)));
         let values = difference_of_gaussians(&face.soft, &weights, face.pixel_mm);
-        let middle = |first: usize, end: usize| (first + end - 1) as f64 / 2.0 * face.pixel_mm;
+        let middle = |first: usize, last: usize| (first + last) as f64 / 2.0 * face.pixel_mm;
         Some(Self {
             values,
             face: face.face.clone(),

@@ -6,7 +6,7 @@ use super::agreement::{Agreement, Support};
 use super::characters::PlacedCharacter;
 use super::page_map::StoredPageMap;
 use super::stored_heights::HeightHeader;
-use crate::domain::{BlockSide, ContentHash, LengthUnit};
+use crate::domain::{BlockSide, LengthUnit};
 
 /// What `face` returns.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -74,8 +74,6 @@ pub struct CutOutcome {
     pub count: usize,
     /// Number of characters with nothing to cut.
     pub left: usize,
-    /// Hash of the content of the page from which the prints were cut.
-    pub page_hash: ContentHash,
 }
 
 /// Returns the role of a face's heights among the artifacts of `face`.

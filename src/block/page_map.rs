@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_interpolated_to_a_hundredth_of_a_pixel() {
+    fn a_row_is_interpolated_to_a_twentieth_of_a_pixel() {
         let map = warped();
         let row = map.row([-20.0, 33.0], 0.3, 380);
         for (k, point) in row.iter().enumerate() {

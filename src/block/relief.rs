@@ -13,9 +13,9 @@ use crate::raster::{Grid, Mask};
 const CELL: usize = 27;
 /// The height of a cell is this quantile of its heights, which spikes do not reach.
 const TOP_QUANTILE: f64 = 0.95;
-/// Residuals of the fit count half at this scale, mm. Starts wide, so that the ground does not hold the surface down.
+/// Residuals of the fit count a quarter at this scale, mm. Starts wide, so that the ground does not hold the surface down.
 const SCALES_MM: [f64; 8] = [2.0, 1.2, 0.8, 0.5, 0.3, 0.2, 0.15, 0.12];
-/// Tops within this many cells around a cell are its tops: 16 mm across.
+/// Tops within this many cells around a cell are its tops: 20 mm across.
 const DILATION: usize = 2;
 /// Local correction of the surface, at most, mm.
 const MAX_LOCAL_MM: f64 = 0.6;

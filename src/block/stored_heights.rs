@@ -28,7 +28,7 @@ pub struct HeightHeader {
     pub frame: Orientation,
     /// Coordinates u and v of the centre of the top-left pixel, mm.
     pub origin_mm: [f64; 2],
-    /// Height of the value 1, mm.
+    /// Height of the value 0, mm, which itself means that there is no height.
     pub low_mm: f32,
 }
 

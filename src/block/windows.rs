@@ -54,8 +54,8 @@ pub(super) fn match_windows(
         (0..=count as usize)
             .map(move |k| first + (k as f64 * (last - first) as f64 / count).round() as usize)
     };
-    let windows: Vec<Window> = middles(top, bottom - 1)
-        .flat_map(|y| middles(left, right - 1).map(move |x| [x, y]))
+    let windows: Vec<Window> = middles(top, bottom)
+        .flat_map(|y| middles(left, right).map(move |x| [x, y]))
         .map(|[x, y]| {
             let clip =
                 |at: usize, count: usize| (at.saturating_sub(half), (at + half + 1).min(count));
@@ -127,7 +127,7 @@ mod tests {
     };
 
     #[test]
-    fn windows_find_the_shift_to_a_tenth_of_a_pixel() {
+    fn windows_find_the_shift_to_a_fifth_of_a_pixel() {
         let (relief, page, map) = shifted_world(SIZES.shrink);
         let windows = match_windows(&relief, &page, &map, &SIZES);
         assert!(windows.len() > 30);

@@ -50,7 +50,7 @@ impl DetectedFormat {
     }
 }
 
-fn has_extension(name: &str, wanted: &str) -> bool {
+pub(super) fn has_extension(name: &str, wanted: &str) -> bool {
     std::path::Path::new(name)
         .extension()
         .is_some_and(|ext| ext.eq_ignore_ascii_case(wanted))

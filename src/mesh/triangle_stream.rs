@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use super::error::{self, MeshError, MeshLimits, MeshReadError};
+use super::format::has_extension;
 use super::stl;
 use super::triangle_mesh::Mesh;
 use crate::domain::FileKind;
@@ -56,8 +57,8 @@ pub fn binary_stl_triangles(head: &[u8], len: u64, name: &str) -> Result<Option<
     if let Some(count) = stl::whole_binary_count(head, len) {
         return Ok(Some(count));
     }
-    let is_named_stl = name.to_ascii_lowercase().ends_with(".stl");
-    let is_binary = head.iter().any(|byte| *byte == 0 || *byte >= 0x80);
+    let is_named_stl = has_extension(name, "stl");
+    let is_binary = FileKind::of(head) == FileKind::Binary;
     match stl::binary_count(head) {
         Some(count) if is_named_stl && is_binary => {
             let have = len.saturating_sub(stl::HEADER as u64) / stl::FACET as u64;
@@ -107,4 +108,49 @@ pub fn pass_over_binary_stl(
         left -= facets.len();
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{STL_HEAD, binary_stl_triangles};
+    use crate::mesh::MeshError;
+
+    /// The first bytes of a binary STL with 300,000 triangles, whose header is a text.
+    fn head() -> Vec<u8> {
+        let mut head = b"solid of a scanner".to_vec();
+        head.resize(80, b' ');
+        head.extend(300_000_u32.to_le_bytes());
+        head
+    }
+
+    #[test]
+    fn whole_binary_files_are_recognized_by_their_length() {
+        let len = STL_HEAD as u64 + 50 * 300_000;
+        assert_eq!(
+            binary_stl_triangles(&head(), len, "b.stl"),
+            Ok(Some(300_000))
+        );
+    }
+
+    #[test]
+    fn a_binary_file_that_ends_early_is_refused() {
+        let refused = binary_stl_triangles(&head(), 5_000_084, "b.STL");
+        let expected = MeshError::Truncated {
+            format: "binary STL",
+            what: "triangles".into(),
+            have: 100_000,
+            want: 300_000,
+        };
+        assert_eq!(refused, Err(expected));
+    }
+
+    #[test]
+    fn text_in_any_script_is_no_binary_file() {
+        let mut text = "solid mộc bản\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n".repeat(3);
+        for mark in ["", "\u{feff}"] {
+            text.insert_str(0, mark);
+            let head = &text.as_bytes()[..STL_HEAD];
+            assert_eq!(binary_stl_triangles(head, 5_000, "b.stl"), Ok(None));
+        }
+    }
 }

@@ -18,7 +18,7 @@ pub(super) struct StageArtifacts<'a> {
 }
 
 impl<'a> StageArtifacts<'a> {
-    /// No artifacts yet.
+    /// Creates an empty set of artifacts.
     pub(super) fn new(project: &'a Project, block: &'a BlockName, stage: BlockStage) -> Self {
         Self {
             project,

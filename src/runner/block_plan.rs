@@ -15,7 +15,7 @@ pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
     BlockSettings::new(|stage| stages.settings(stage))
 }
 
-/// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
+/// Stores which input files of blocks changed, requeues blocks to run again, and ends back-offs that are due.
 ///
 /// # Errors
 /// Returns an error if a database operation fails.

@@ -2,7 +2,6 @@
 
 use std::fs::File;
 use std::io::{self, Read as _};
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
@@ -78,11 +77,6 @@ impl BlockFile {
     /// Returns the path as stored, for messages: `PATH: what is wrong`.
     pub fn name(&self) -> &str {
         &self.stored
-    }
-
-    /// Returns the path on disk, or the address of an object, for the extension of the file name.
-    pub fn path(&self) -> &Path {
-        self.input.path()
     }
 
     /// Returns the length in bytes.

@@ -17,7 +17,7 @@ use crate::store::Project;
 pub struct RunPlan {
     /// The pairs. Pairs that are yet to be cut from blocks are not included.
     pub pairs: Plan,
-    /// The blocks. None if only named pairs would run.
+    /// The blocks. Empty if only named pairs would run.
     pub blocks: Vec<BlockPlanEntry>,
 }
 

@@ -45,7 +45,7 @@ pub(super) struct Scheduler {
     session: WorkerSession,
     selection: Option<PairSelection>,
     prefetch: Prefetch,
-    /// The block in progress. While there is one, this process starts no pairs.
+    /// The block in progress. While there is one, this process claims no pairs.
     block: BlockSlot,
     max_storing: usize,
     max_failures: Option<u64>,

@@ -338,7 +338,7 @@ fn the_angle_of_the_text_is_found() {
     for degrees in [-3.0_f64, 0.0, 2.4] {
         let face = drawing.face(degrees.to_radians());
         let found = text_angle(&face, 0.0).to_degrees();
-        // 0.3 degrees are one pixel of the last round over the height of this small page.
+        // One pixel of the last round over the height of this small page is 0.23 degrees.
         assert!(
             (found - degrees).abs() < 0.3,
             "{degrees} is found as {found}"

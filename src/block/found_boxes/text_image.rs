@@ -48,14 +48,16 @@ impl TextFrame {
                 row.iter().rposition(|set| *set),
             ];
             for x in ends.into_iter().flatten() {
-                let u = side.map.origin_mm[0] + x as f64 * step;
-                let v = side.map.origin_mm[1] + y as f64 * step;
-                for (k, at) in [cos * u + sin * v, cos * v - sin * u]
-                    .into_iter()
-                    .enumerate()
-                {
-                    low[k] = low[k].min(at);
-                    high[k] = high[k].max(at + step);
+                for (right, down) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let u = side.map.origin_mm[0] + (x + right) as f64 * step;
+                    let v = side.map.origin_mm[1] + (y + down) as f64 * step;
+                    for (k, at) in [cos * u + sin * v, cos * v - sin * u]
+                        .into_iter()
+                        .enumerate()
+                    {
+                        low[k] = low[k].min(at);
+                        high[k] = high[k].max(at);
+                    }
                 }
             }
         }

@@ -106,7 +106,7 @@ fn read_stamp(dir: &Path) -> Option<BlockStamp> {
 }
 
 /// Writes a world below `dir`, unless it is already there. Writes `block.ply`, the page, `labels.json` and
-/// `truth.json`, then `block.json`. Calls `is_stopped` again and again.
+/// `truth.json`, then `block.json`. Calls `is_stopped` before each write to the mesh.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written or `is_stopped` returns true.

@@ -9,12 +9,10 @@ use crate::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,
 };
+use crate::catalog::Catalog;
 use crate::domain::{BlockStage, FailureClass};
 use crate::labels::{self, PageFile, reading_order};
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
-
-/// Characters with at least this confidence count as sure.
-const SURE: f64 = 0.5;
 
 /// Boxes on a page, and where they come from.
 struct PageBoxes {
@@ -46,7 +44,7 @@ pub(super) fn boxes(
     let sure = placed
         .characters
         .iter()
-        .filter(|c| c.confidence >= SURE)
+        .filter(|c| c.confidence >= Catalog::LOW_CHARACTER_CONFIDENCE)
         .count();
     output(&BoxesOutcome {
         labels: read.labels,

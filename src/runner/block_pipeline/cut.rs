@@ -23,7 +23,7 @@ const MIN_TRIANGLES: usize = 200;
 /// The face looks up or down if its normal has at least this z.
 const MIN_NORMAL_Z: f64 = 0.3;
 
-/// Positions with a lower confidence are not expected by `register`.
+/// Least confidence of a position that `register` gets as a prior.
 const MIN_PRIOR: f64 = 0.5;
 
 /// The print of a character, or why it cannot be cut.
@@ -93,7 +93,6 @@ pub(super) fn cut(
     let outcome = output(&CutOutcome {
         count,
         left: characters.len() - count,
-        page_hash: page.hash,
     })?;
     Ok(BlockStageOutput {
         characters,

@@ -144,10 +144,7 @@ fn near_expected(
 ) -> Option<PoseCandidate> {
     let bounds = known.bounding_box()?;
     let print_px = bounds.longest_side() as f64;
-    let print_middle = [
-        (bounds.x0 + bounds.x1 - 1) as f64 / 2.0,
-        (bounds.y0 + bounds.y1 - 1) as f64 / 2.0,
-    ];
+    let print_middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
     if expected.determinant() <= 0.0 {
         return None;
     }
