@@ -284,7 +284,8 @@ CREATE TABLE block (
     page_stat text,
     labels_hash bytea CHECK (length(labels_hash) = 32),
     labels_stat text,
-    imported bigint NOT NULL
+    imported bigint NOT NULL,
+    control_points text CHECK (CAST(control_points AS json) IS NOT NULL)
 );
 
 CREATE TABLE block_job (

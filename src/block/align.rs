@@ -67,11 +67,9 @@ impl CarvedFace {
     }
 }
 
-/// A page on one side of a block.
+/// A page on a face of a block.
 #[derive(Debug, Clone)]
 pub struct PageAlignment {
-    /// Index of the side.
-    pub side: usize,
     /// Map of the face to the page.
     pub map: PageMap,
     /// Evidence.
@@ -133,41 +131,40 @@ struct PageCandidate {
     quality: f64,
 }
 
-/// Aligns a page with the sides of a block.
+/// Aligns a page with the sides of a block. Returns the index of the side and the alignment.
 ///
 /// # Errors
 /// Returns an error if no side shows a face or the page does not belong to the block.
-pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<PageAlignment, BlockError> {
+pub fn align(sides: &[&CarvedFace], page: &PageInk) -> Result<(usize, PageAlignment), BlockError> {
     if sides.is_empty() {
         return Err(BlockError::no_face());
     }
-    let shrink = |side: &&CarvedFace| ShrunkRelief::of(&side.map, &side.relief, ROUNDS[0].0.shrink);
-    let reliefs: Vec<ShrunkRelief> = sides.iter().map(shrink).collect();
-    let mut best: Option<PageAlignment> = None;
+    let reliefs: Vec<ShrunkRelief> = sides.iter().map(|side| shrunk_face(side)).collect();
+    let mut best: Option<(usize, PageAlignment)> = None;
     for search in [
         CoarseSearch::Narrow,
         CoarseSearch::AllScales,
         CoarseSearch::AllAngles,
     ] {
         let found = refined(sides, &reliefs, page, search);
-        let quality = |found: &Option<PageAlignment>| {
-            found
-                .as_ref()
-                .map_or(-1.0, |found| found.agreement.quality())
+        let quality = |found: &Option<(usize, PageAlignment)>| {
+            let found = found.as_ref();
+            found.map_or(-1.0, |(_, found)| found.agreement.quality())
         };
         if quality(&found) > quality(&best) {
             best = found;
         }
-        if best.as_ref().is_some_and(|best| best.agreement.is_sure()) {
+        let agreement = best.as_ref().map(|(_, best)| best.agreement);
+        if agreement.is_some_and(|agreement| agreement.is_sure()) {
             break;
         }
     }
     match best {
-        Some(alignment) if alignment.agreement.is_sure() => Ok(alignment),
+        Some(best) if best.1.agreement.is_sure() => Ok(best),
         best => Err(BlockError::Refused {
             width_mm: sides[0].map.heights.width() as f64 * HEIGHT_STEP_MM,
             height_mm: sides[0].map.heights.height() as f64 * HEIGHT_STEP_MM,
-            share: 100.0 * best.map_or(0.0, |best| best.agreement.agreeing),
+            share: 100.0 * best.map_or(0.0, |(_, best)| best.agreement.agreeing),
         }),
     }
 }
@@ -179,7 +176,7 @@ fn refined(
     reliefs: &[ShrunkRelief],
     page: &PageInk,
     search: CoarseSearch,
-) -> Option<PageAlignment> {
+) -> Option<(usize, PageAlignment)> {
     let mut best: Option<PageCandidate> = None;
     for (side, (block, relief)) in sides.iter().zip(reliefs).enumerate() {
         for position in coarse::search(relief, page, &search.range(block, relief, page)) {
@@ -194,15 +191,30 @@ fn refined(
             }
         }
     }
-    let best = best?;
-    let block = sides[best.side];
-    let (mut map, mut last) = (best.map, None);
+    let PageCandidate { side, map, .. } = best?;
+    Some((side, refine(sides[side], &reliefs[side], page, map)?))
+}
+
+/// Returns a face in the pixels of the first round.
+pub(super) fn shrunk_face(face: &CarvedFace) -> ShrunkRelief {
+    ShrunkRelief::of(&face.map, &face.relief, ROUNDS[0].0.shrink)
+}
+
+/// Follows the strokes from a first map in rounds of ever smaller windows. `relief` is the face in the pixels of the first
+/// round. Returns `None` if too few windows match.
+pub(super) fn refine(
+    face: &CarvedFace,
+    relief: &ShrunkRelief,
+    page: &PageInk,
+    mut map: PageMap,
+) -> Option<PageAlignment> {
+    let mut last = None;
     let mut shrunk = ROUNDS[0].0.shrink;
-    let mut relief = reliefs[best.side].clone();
+    let mut relief = relief.clone();
     for (sizes, sigma, fine) in ROUNDS {
         if sizes.shrink != shrunk {
             shrunk = sizes.shrink;
-            relief = ShrunkRelief::of(&block.map, &block.relief, shrunk);
+            relief = ShrunkRelief::of(&face.map, &face.relief, shrunk);
         }
         let windows = match_windows(&relief, page, &map, &sizes);
         let field = ShiftField::fit(&windows, sigma, fine)?;
@@ -212,7 +224,6 @@ fn refined(
     let (windows, field) = last?;
     let (agreement, support) = Agreement::of(&windows, &field);
     Some(PageAlignment {
-        side: best.side,
         map,
         agreement,
         support,
@@ -226,12 +237,7 @@ fn first_round(
     page: &PageInk,
     position: &CoarsePosition,
 ) -> Option<PageCandidate> {
-    let bounds = relief.face_bounds()?;
-    let corner = |x: usize, y: usize| [x, y].map(|at| at as f64 * relief.pixel_mm);
-    let low = corner(bounds[0], bounds[1]);
-    let high = corner(bounds[2], bounds[3]);
-    let place = |at: [f64; 2]| [0, 1].map(|k: usize| relief.origin_mm[k] + at[k]);
-    let mut map = PageMap::affine(&position.page_from_face, place(low), place(high));
+    let mut map = relief.page_map(&position.page_from_face)?;
     let windows = match_windows(relief, page, &map, &COMPARED);
     let field = ShiftField::fit(&windows, COMPARED_SIGMA_MM, None)?;
     let quality = agreement::mean_near(&windows, &field, COMPARED_MM);
@@ -278,7 +284,7 @@ mod tests {
 
     fn aligned(world: &TestWorld, page: &PageInk) -> Result<PageAlignment, BlockError> {
         let face: CarvedFace = world.face();
-        align(&[&face], page)
+        align(&[&face], page).map(|(_, alignment)| alignment)
     }
 
     /// Returns the largest error of a map at points of the face, mm.

@@ -21,11 +21,27 @@ impl CarvedFace {
     /// Returns the height at a point of the face (u, v in mm) over the surface under the tops of the strokes, in mm; `None`
     /// where nothing was scanned.
     pub fn height_at(&self, point: [f64; 2]) -> Option<f32> {
-        let height = self.mean(point, |[x, y]| {
+        let height = self.height_in_frame(point)?;
+        Some(height - surface_height(&self.map, &self.relief.surface, point))
+    }
+
+    /// Returns the point of the mesh at a point of the face (u, v in mm), in the mesh's own frame and unit; `None` where
+    /// nothing was scanned.
+    pub fn mesh_point(&self, point: [f64; 2]) -> Option<[f64; 3]> {
+        let height = self.height_in_frame(point)?;
+        Some(
+            self.map
+                .frame
+                .mesh_from_face([point[0], point[1], f64::from(height)]),
+        )
+    }
+
+    /// Returns the height along the axis n of the frame, mm.
+    fn height_in_frame(&self, point: [f64; 2]) -> Option<f32> {
+        self.mean(point, |[x, y]| {
             let height = self.map.heights.get(x, y);
             height.filter(|height| *height != NO_HEIGHT)
-        })?;
-        Some(height - surface_height(&self.map, &self.relief.surface, point))
+        })
     }
 
     /// Returns the mean of the values around a point that exist, weighted by their nearness.

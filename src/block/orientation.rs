@@ -199,6 +199,14 @@ impl Orientation {
             .map(|axis| axis[0] * x + axis[1] * y + axis[2] * z)
     }
 
+    /// Returns the point of the mesh with the coordinates u, v and n in mm.
+    pub fn mesh_from_face(&self, face: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k: usize| {
+            let along = (self.axes.iter().zip(face)).map(|(axis, at)| axis[k] * at);
+            self.centre[k] + along.sum::<f64>() / self.mm
+        })
+    }
+
     /// Returns the frame of the other side: v and n are reversed.
     #[must_use]
     pub fn other_side(&self) -> Self {

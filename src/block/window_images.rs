@@ -7,6 +7,7 @@ use super::height_map::{HEIGHT_STEP_MM, HeightMap};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
+use crate::domain::Affine2;
 use crate::raster::Grid;
 
 /// Shifts that are correlated together, one per lane.
@@ -60,6 +61,16 @@ impl ShrunkRelief {
     pub(super) fn face_bounds(&self) -> Option<[usize; 4]> {
         let bounds = self.face.bounding_box()?;
         Some([bounds.x0, bounds.y0, bounds.x1, bounds.y1])
+    }
+
+    /// Returns an affine map to the page (from mm to pixels) as a map over the face; `None` if there is no face.
+    pub(super) fn page_map(&self, page_from_face: &Affine2) -> Option<PageMap> {
+        let [left, top, right, bottom] = self.face_bounds()?;
+        let place = |pixel: [usize; 2]| {
+            [0, 1].map(|k: usize| self.origin_mm[k] + pixel[k] as f64 * self.pixel_mm)
+        };
+        let (low, high) = (place([left, top]), place([right, bottom]));
+        Some(PageMap::affine(page_from_face, low, high))
     }
 }
 

@@ -162,6 +162,7 @@ mod tests {
             attempts: 0,
             crashes: 0,
             failure: (status == JobStatus::Quarantined).then_some(failure),
+            control_points: None,
             characters: 100,
             left_out: 1,
             retired: 0,

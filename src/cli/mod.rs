@@ -3,6 +3,7 @@
 mod agreement;
 mod args;
 mod backup;
+mod block_points;
 mod block_sheet;
 mod block_status;
 mod browser;

@@ -10,7 +10,7 @@ use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
-use crate::domain::{BlockCharacterState, BlockName, JobStatus, one_line};
+use crate::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
 use crate::store::Project;
 
 /// Number of characters that are listed of each kind.
@@ -34,7 +34,12 @@ pub(super) async fn show_block(
     let json = as_json(&detail, &characters, project)?;
     context.print(&json, || text(&detail, &characters, context.stdout))?;
     let quoted = shell_quoted(name.as_str());
+    let failure = detail.state.failure.as_ref();
     match detail.state.status {
+        // Control points may help.
+        JobStatus::Quarantined if failure.is_some_and(|one| one.stage == BlockStage::Align) => {
+            context.next(&format!("view {quoted}"));
+        }
         JobStatus::Quarantined => context.next(&format!("retry {quoted}")),
         JobStatus::Leased => context.next("status --watch"),
         JobStatus::Ready | JobStatus::Backoff => context.next("run"),
@@ -89,6 +94,11 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
             optional(attributes.side.map(|side| side.to_string()), "found"),
         ),
     ];
+    let points = state.control_points.as_ref().map(|chosen| {
+        let points = count(chosen.points.len() as u64, "point");
+        ("control points", format!("{points} on the {}", chosen.side))
+    });
+    let rows = rows.into_iter().chain(points);
     let rows = rows.map(|(word, value)| vec![format!("  {word}"), one_line(&value).into_owned()]);
     parts.push(columns(rows, "<<"));
     if let Some(failure) = &state.failure {

@@ -5,6 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use clap::Args;
 use serde_json::json;
 
+use super::block_points::BlockPoints;
 use super::block_sheet;
 use super::browser::open;
 use super::context::{Context, shell_quoted};
@@ -12,10 +13,12 @@ use super::exit::{ExitCode, Refusal};
 use super::output;
 use super::select;
 use super::signals;
-use crate::domain::ThresholdMetric;
+use crate::catalog::Catalog;
+use crate::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
 use crate::runner::{Stop, StopLevel};
+use crate::store::Project;
 use crate::view::{self, ViewServer};
 
 /// Arguments of `view`.
@@ -38,11 +41,9 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
     let (project, catalog) = context.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     if select::block(&catalog, &args.pair).await?.is_some() {
-        let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
-        let block = block_sheet::read(&args.pair, metric, &project, &catalog, context).await;
+        let page = block_page(address, &args, &project, &catalog, context).await;
         catalog.close().await;
-        let page = view::bind_block(address, block?).await?;
-        return serve(page, &args, context).await;
+        return serve(page?, &args, context).await;
     }
     let limits = context.settings()?.config.limits;
     let limits = InputFileLimits {
@@ -73,6 +74,41 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
     };
     let page = view::bind(address, name.as_str(), &scan).await?;
     serve(page, &args, context).await
+}
+
+/// Binds the page of a block. If its page was refused, only its correction is shown.
+async fn block_page(
+    address: SocketAddr,
+    args: &ViewArgs,
+    project: &Project,
+    catalog: &Catalog,
+    context: &Context,
+) -> anyhow::Result<ViewServer> {
+    let name = select::existing_block(catalog, &args.pair).await?;
+    let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
+    let view = match block_sheet::read(&args.pair, metric, project, catalog, context).await {
+        Ok(view) => Some(view),
+        Err(error) => {
+            let Some(why) = refusal(catalog, &name).await? else {
+                return Err(error);
+            };
+            context.warn(&format!("block {name} is not aligned: {why}"));
+            context.info("choose the same places on the relief and on the page to align them");
+            None
+        }
+    };
+    let store = BlockPoints::new(context, &name);
+    Ok(view::bind_block(address, &name, view, store).await?)
+}
+
+/// Returns why the page of a block was refused, if it was.
+async fn refusal(catalog: &Catalog, name: &BlockName) -> anyhow::Result<Option<String>> {
+    let detail = catalog.block(name).await?;
+    let failure = detail.and_then(|detail| detail.state.failure);
+    let refused = failure.filter(|stored| {
+        stored.stage == BlockStage::Align && stored.failure.class == FailureClass::NoSolution
+    });
+    Ok(refused.map(|stored| stored.failure.message))
 }
 
 /// Announces a page and serves it until the user ends it.

@@ -13,7 +13,7 @@ use super::run_context::RunContext;
 use super::stage_output::result_hash;
 use crate::catalog::{
     BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
-    MadeWith, NewCharacter,
+    NewCharacter,
 };
 use crate::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
@@ -65,7 +65,7 @@ pub(super) async fn store_stage(
     };
     let settings = context.blocks.settings(stage);
     let checkpoint = BlockCheckpoint {
-        made_with: MadeWith::new(stage, &settings, &block.work.attributes, &block.inputs),
+        made_with: block.made_with(stage, &settings),
         record: record.clone(),
         inputs: block.inputs.clone(),
         ms,
@@ -171,7 +171,7 @@ pub(super) async fn store_failure(
         stage,
         failure: failure.clone(),
         action,
-        made_with: MadeWith::new(stage, &settings, &block.work.attributes, &block.inputs),
+        made_with: block.made_with(stage, &settings),
         inputs: block.inputs,
         ms,
         at: now,

@@ -6,7 +6,7 @@ use super::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::catalog::{BlockAttributes, BlockInputVersions, Catalog, InputVersion, KnownBlock};
-use crate::domain::{BlockId, BlockStage, ContentHash, Failure, FailureClass};
+use crate::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
 use crate::store::{Input, InputError, Project, hash_input, stat_input};
 
 /// Stores the new versions of changed input files of blocks in the catalog. Skips scans and pages that no stage has read;
@@ -150,8 +150,8 @@ impl BlockSources {
         Ok(())
     }
 
-    /// Returns what a stage is computed from.
-    pub(super) fn inputs(&self) -> BlockInputs {
+    /// Returns what a stage is computed from. `control_points` are those of these files.
+    pub(super) fn inputs(&self, control_points: Option<ControlPoints>) -> BlockInputs {
         let file = |path: &str, input: &Input| {
             BlockFile::new(path.to_owned(), input.clone(), input.size())
         };
@@ -164,6 +164,7 @@ impl BlockSources {
             labels: labels.map(|(path, input)| file(path, input)),
             unit: attributes.unit,
             side: attributes.side,
+            control_points,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A block between two of its stages.
 
+use serde_json::Value;
+
 use super::block_inputs::BlockSources;
 use super::block_stages::BlockStageOutput;
-use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
+use crate::catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
 use crate::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
@@ -27,6 +29,24 @@ pub(super) struct BlockInProgress {
     pub(super) sources: BlockSources,
     /// Versions of the input files, as far as they are known.
     pub(super) inputs: BlockInputVersions,
+}
+
+impl BlockInProgress {
+    /// Describes what a stage is computed from.
+    pub(super) fn made_with(&self, stage: BlockStage, settings: &Value) -> MadeWith {
+        let BlockWork {
+            attributes,
+            control_points,
+            ..
+        } = &self.work;
+        MadeWith::new(
+            stage,
+            settings,
+            attributes,
+            &self.inputs,
+            control_points.as_ref(),
+        )
+    }
 }
 
 /// A computed stage.

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::Value;
 
 use crate::domain::{
-    ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, Failure, FailureClass,
-    LengthUnit,
+    ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, ControlPoints, Failure,
+    FailureClass, LengthUnit,
 };
 use crate::store::{Input, InputError};
 
@@ -148,6 +148,8 @@ pub struct BlockInputs {
     pub unit: Option<LengthUnit>,
     /// The side that the page shows, if the user gave it.
     pub side: Option<BlockSide>,
+    /// Places that a person chose on this scan and this page.
+    pub control_points: Option<ControlPoints>,
 }
 
 /// What a stage returns.

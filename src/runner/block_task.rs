@@ -161,9 +161,11 @@ async fn compute(
 ) -> Result<ComputedBlockStage, Interruption> {
     let begun = Instant::now();
     let (sources, read) = (block.sources.clone(), block.inputs.clone());
+    let points = block.work.control_points.clone();
+    let points = points.filter(|points| read.have(points));
     let inner = Arc::clone(context);
     let outcome = on_thread(context, move |stop| {
-        let inputs = sources.inputs();
+        let inputs = sources.inputs(points);
         let artifacts = StageArtifacts::new(&inner.project, &inputs.name, stage);
         let output = inner
             .blocks

@@ -7,22 +7,29 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
-use axum::response::{Html, IntoResponse as _, Response};
+use axum::response::{Html, IntoResponse as _, Redirect, Response};
 use axum::routing::get;
 
+use super::correction_server::{self, CorrectionStore};
 use super::page;
 use super::server::{ViewError, ViewServer};
+use crate::domain::BlockName;
 use crate::export::block_view::{BlockView, PageLayer, PageRegion};
 use crate::export::scan_view::assets;
 
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";
 /// Name, content type and text of the assets of this page.
-const ASSETS: [(&str, &str, &str); 4] = [
+const ASSETS: [(&str, &str, &str); 5] = [
     (
         "block-view.js",
         SCRIPT_KIND,
         include_str!("../../assets/block-view/block-view.js"),
+    ),
+    (
+        "block-correct.js",
+        SCRIPT_KIND,
+        include_str!("../../assets/block-view/block-correct.js"),
     ),
     (
         "block-messages.js",
@@ -51,25 +58,39 @@ struct ShownBlock {
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
-/// Binds the address for the page of a block. Port 0 chooses the same port for equal names of blocks, if it is free.
+/// Binds the address for the page of a block, and for its correction. Without `view`, only the correction is shown. Port 0 chooses the same port for equal names of blocks, if it is free.
 ///
 /// # Errors
 /// Returns an error if the address cannot be bound or the system provides no randomness.
-pub async fn bind_block(address: SocketAddr, view: BlockView) -> Result<ViewServer, ViewError> {
-    let name = view.name.to_string();
+pub async fn bind_block(
+    address: SocketAddr,
+    block: &BlockName,
+    view: Option<BlockView>,
+    store: impl CorrectionStore,
+) -> Result<ViewServer, ViewError> {
+    let pages = match view {
+        Some(view) => page_routes(view),
+        None => Router::new().route("/", get(async || Redirect::to("/correct"))),
+    };
+    let pages = pages
+        .route("/assets/{name}", get(asset))
+        .merge(correction_server::routes(block.clone(), store));
+    ViewServer::open(address, block.as_str(), pages).await
+}
+
+/// Returns the routes of the page of a block that is aligned.
+fn page_routes(view: BlockView) -> Router {
     let shown = ShownBlock {
         view,
         overviews: PageLayer::ALL.map(|_| OnceLock::new()),
     };
-    let pages = Router::new()
+    Router::new()
         .route("/", get(index))
-        .route("/assets/{name}", get(asset))
         .route("/block.json", get(block_json))
         .route("/layer/{layer}", get(overview))
         .route("/region/{layer}/{x}/{y}/{width}/{height}", get(region))
         .route("/scan/{index}", get(scan))
-        .with_state(Arc::new(shown));
-    ViewServer::open(address, &name, pages).await
+        .with_state(Arc::new(shown))
 }
 
 impl ShownBlock {

@@ -28,11 +28,20 @@ pub(super) fn view(pair: &str) -> String {
 
 /// Returns the page of a block. Its script loads the data and creates the controls.
 pub(super) fn block(name: &str) -> String {
+    block_page(name, "/assets/block-view.js")
+}
+
+/// Returns the page on which the alignment of a block is corrected.
+pub(super) fn correction(name: &str) -> String {
+    block_page(name, "/assets/block-correct.js")
+}
+
+fn block_page(name: &str, script: &str) -> String {
     let head = html! {
         link rel="stylesheet" href="/assets/scan-viewer.css";
         link rel="stylesheet" href="/assets/block-view.css";
         link rel="icon" href="data:,";
-        script type="module" src="/assets/block-view.js" {}
+        script type="module" src=(script) {}
     };
     let body = html! {
         body.scan-page {
@@ -56,11 +65,17 @@ pub(super) fn token_used() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{block, forward, token_used, view};
+    use super::{block, correction, forward, token_used, view};
 
     #[test]
     fn pages_load_only_from_this_server() {
-        for page in [view("a<b"), block("a<b"), forward(), token_used()] {
+        for page in [
+            view("a<b"),
+            block("a<b"),
+            correction("a<b"),
+            forward(),
+            token_used(),
+        ] {
             assert!(!page.contains("//"), "{page}");
         }
         assert!(view("a<b").contains("<title>a&lt;b</title>"));

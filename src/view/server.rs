@@ -8,7 +8,7 @@ use axum::extract::{Path, RawQuery, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
-use axum::{Router, middleware};
+use axum::{Extension, Router, middleware};
 use tokio::net::TcpListener;
 
 use super::page;
@@ -102,7 +102,7 @@ impl ViewServer {
         let router = Router::new()
             .route(START, get(start))
             .with_state(self.access)
-            .merge(self.pages)
+            .merge(self.pages.layer(Extension(Arc::clone(&access))))
             .layer(middleware::from_fn_with_state(access, guard));
         serve(self.listener, router, ConnectionLimits::system(), stop).await;
     }

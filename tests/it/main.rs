@@ -6,6 +6,7 @@ mod agreement;
 mod attacks;
 mod backup;
 mod bit_flips;
+mod block_correction;
 mod block_demo;
 mod block_view;
 mod blocks;

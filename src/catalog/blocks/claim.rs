@@ -1,7 +1,7 @@
 //! Leases of block jobs: claims, releases, and what a leased block needs.
 
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockLease, BlockWork};
-use crate::catalog::blocks::records::{BLOCK, input_versions, stage_records};
+use crate::catalog::blocks::records::{BLOCK, control_points, input_versions, stage_records};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow as _, from_row};
@@ -139,11 +139,13 @@ async fn work(conn: &mut Conn, lease: &BlockLease) -> Result<BlockWork> {
     };
     let attributes = BlockAttributes::from_row(&row)?;
     let inputs: BlockInputVersions = input_versions(&row)?;
+    let control_points = control_points(&row)?;
     let mut results = stage_records(conn, lease.block).await?;
     results.retain(|record| record.stage < lease.cursor);
     Ok(BlockWork {
         attributes,
         inputs,
+        control_points,
         results,
     })
 }

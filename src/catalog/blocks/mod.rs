@@ -8,6 +8,7 @@
 pub(crate) mod characters;
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
+pub(crate) mod control_points;
 pub(crate) mod cut;
 pub(crate) mod fail;
 pub(crate) mod import;

@@ -7,7 +7,7 @@ use crate::catalog::db::row::from_row;
 use crate::catalog::queue::lease::InputVersion;
 use crate::domain::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
-    Failure, LengthUnit, UnixMillis, WorkerId,
+    ControlPoints, Failure, LengthUnit, UnixMillis, WorkerId,
 };
 
 /// Attributes of a block as imported.
@@ -47,6 +47,16 @@ pub struct BlockInputVersions {
     pub labels: Option<InputVersion>,
 }
 
+impl BlockInputVersions {
+    /// Returns whether control points were chosen on this mesh and this page.
+    pub fn have(&self, points: &ControlPoints) -> bool {
+        let is = |version: &Option<InputVersion>, hash: ContentHash| {
+            version.as_ref().is_some_and(|version| version.hash == hash)
+        };
+        is(&self.mesh, points.mesh) && is(&self.page, points.page)
+    }
+}
+
 /// The settings of the four stages of a block, by stage: each stage's revision and settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockSettings([Value; 4]);
@@ -77,6 +87,9 @@ pub struct MadeWith {
     /// Hash of the labels. `None` if the stage does not depend on them, if there are none, or in a failure before they
     /// were read.
     pub labels: Option<ContentHash>,
+    /// Hash of the control points. `None` if there are none for these files, or if the stage does not depend on them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub control_points: Option<ContentHash>,
 }
 
 impl MadeWith {
@@ -86,7 +99,9 @@ impl MadeWith {
         settings: &Value,
         attributes: &BlockAttributes,
         inputs: &BlockInputVersions,
+        control_points: Option<&ControlPoints>,
     ) -> Self {
+        let points = control_points.filter(|points| inputs.have(points) && stage.reads_page());
         let hash = |version: &Option<InputVersion>| version.as_ref().map(|version| version.hash);
         let has_labels = attributes.labels_path.is_some() && stage.depends_on_labels();
         Self {
@@ -95,6 +110,7 @@ impl MadeWith {
             mesh: hash(&inputs.mesh),
             page: stage.reads_page().then(|| hash(&inputs.page)).flatten(),
             labels: has_labels.then(|| hash(&inputs.labels)).flatten(),
+            control_points: points.map(ControlPoints::hash),
         }
     }
 }
@@ -135,6 +151,8 @@ pub struct BlockWork {
     pub attributes: BlockAttributes,
     /// Input files as last read.
     pub inputs: BlockInputVersions,
+    /// Places that a person chose on scan and page.
+    pub control_points: Option<ControlPoints>,
     /// Results of all completed stages, in order.
     pub results: Vec<BlockStageRecord>,
 }

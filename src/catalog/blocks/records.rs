@@ -12,13 +12,14 @@ use crate::catalog::db::value::Json;
 use crate::catalog::queue::lease::InputVersion;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{
-    BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, Failure, JobStatus, UnixMillis,
+    BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, ControlPoints, Failure,
+    JobStatus, UnixMillis,
 };
 
 /// Selects a block with its input files as last read.
 pub(crate) const BLOCK: &str = "
 SELECT id, name, mesh_path, page_path, labels_path, unit, side, mesh_hash, mesh_stat, page_hash, page_stat, labels_hash,
-    labels_stat FROM block WHERE id = ?1";
+    labels_stat, control_points FROM block WHERE id = ?1";
 
 const BLOCKS: &str = "
 SELECT id, name, mesh_path, page_path, labels_path, unit, side, mesh_hash, mesh_stat, page_hash, page_stat, labels_hash,
@@ -28,7 +29,8 @@ const RESULTS: &str =
     "SELECT stage, outcome, files, result_hash FROM block_result WHERE block = ?1 ORDER BY stage";
 
 const STATES: &str = "
-SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, j.stage, j.status, j.attempt, j.crashes,
+SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
+    j.stage, j.status, j.attempt, j.crashes,
     j.failed_stage, j.class, j.message, j.failed_at,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut') AS characters,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'left') AS left_out,
@@ -60,7 +62,7 @@ pub struct StoredBlockFailure {
 }
 
 /// A block with the state of its job.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BlockState {
     /// Attributes as imported.
     #[serde(flatten)]
@@ -75,6 +77,9 @@ pub struct BlockState {
     pub crashes: u32,
     /// The failure, if the block failed or backs off.
     pub failure: Option<StoredBlockFailure>,
+    /// Places that a person chose on scan and page.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub control_points: Option<ControlPoints>,
     /// Characters that were cut and are pairs.
     pub characters: u64,
     /// Characters with a box that were not cut.
@@ -212,6 +217,7 @@ impl FromRow for BlockState {
             attempts: row.get("attempt")?,
             crashes: row.get("crashes")?,
             failure,
+            control_points: control_points(row)?,
             characters: row.get("characters")?,
             left_out: row.get("left_out")?,
             retired: row.get("retired")?,
@@ -310,6 +316,12 @@ pub(crate) async fn stage_records(
     block: BlockId,
 ) -> Result<Vec<BlockStageRecord>> {
     query_as(RESULTS).bind(block.0).fetch_all(conn).await
+}
+
+/// Reads the control points from a row with the columns of [`BLOCK`].
+pub(crate) fn control_points(row: &Row) -> Result<Option<ControlPoints>> {
+    let stored: Option<Json<ControlPoints>> = row.get("control_points")?;
+    Ok(stored.map(|Json(points)| points))
 }
 
 /// Reads the input files from a row with the columns of [`BLOCK`].

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::catalog::Result;
 use crate::catalog::blocks::model::{BlockAttributes, MadeWith};
-use crate::catalog::blocks::records::{BLOCK, input_versions};
+use crate::catalog::blocks::records::{BLOCK, control_points, input_versions};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::row::{FromRow as _, from_row};
@@ -110,8 +110,9 @@ async fn end_lease(
         .fetch_one(&mut *conn)
         .await?;
     let (attributes, inputs) = (BlockAttributes::from_row(&row)?, input_versions(&row)?);
+    let points = control_points(&row)?;
     // The settings of the dead worker are unknown, so only changed inputs make this failure outdated.
-    let failed_with = MadeWith::new(stage, &Value::Null, &attributes, &inputs);
+    let failed_with = MadeWith::new(stage, &Value::Null, &attributes, &inputs, points.as_ref());
     query(POISONED)
         .bind(left.block.0)
         .bind(crashes)

@@ -7,18 +7,18 @@ use serde_json::Value;
 
 use crate::catalog::blocks::import::NEW_JOB;
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockSettings, MadeWith};
-use crate::catalog::blocks::records::input_versions;
+use crate::catalog::blocks::records::{control_points, input_versions};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::queue::staleness::RerunPolicy;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockId, BlockName, BlockStage, JobStatus, Stage};
+use crate::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 
 const JOBS: &str = "
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.mesh_hash, b.mesh_stat, b.page_hash,
-    b.page_stat, b.labels_hash, b.labels_stat, j.stage, j.status, j.failed_stage, j.failed_with
+    b.page_stat, b.labels_hash, b.labels_stat, b.control_points, j.stage, j.status, j.failed_stage, j.failed_with
 FROM block AS b JOIN block_job AS j ON j.block = b.id ORDER BY b.id";
 
 const RESULTS: &str = "SELECT block, stage, made_with FROM block_result ORDER BY block, stage";
@@ -50,6 +50,8 @@ pub enum BlockReason {
     Labels,
     /// Its unit or its side changed.
     Attributes,
+    /// A person chose control points or removed them.
+    ControlPoints,
     /// Settings changed.
     Settings,
     /// It failed with other settings or inputs.
@@ -67,6 +69,7 @@ impl std::fmt::Display for BlockReason {
             Self::Page => "the page changed",
             Self::Labels => "the labels changed",
             Self::Attributes => "unit or side changed",
+            Self::ControlPoints => "the control points changed",
             Self::Settings => "settings changed",
             Self::FailedBefore => "it failed with other settings or files",
             Self::Requested => "requested",
@@ -90,6 +93,7 @@ struct BlockJob {
     block: BlockId,
     attributes: BlockAttributes,
     inputs: BlockInputVersions,
+    control_points: Option<ControlPoints>,
     cursor: i64,
     status: JobStatus,
     failure: Option<(BlockStage, MadeWith)>,
@@ -103,6 +107,7 @@ impl FromRow for BlockJob {
             block: row.get("id")?,
             attributes: BlockAttributes::from_row(row)?,
             inputs: input_versions(row)?,
+            control_points: control_points(row)?,
             cursor: row.get("stage")?,
             status: row.get("status")?,
             failure: failed_stage.zip(failed_with.map(|Json(with)| with)),
@@ -123,12 +128,18 @@ impl BlockJob {
         made: &MadeWith,
         settings: &BlockSettings,
     ) -> Option<BlockReason> {
-        let now = MadeWith::new(stage, settings.of(stage), &self.attributes, &self.inputs);
+        let points = self.control_points.as_ref();
+        let (attributes, inputs) = (&self.attributes, &self.inputs);
+        let now = MadeWith::new(stage, settings.of(stage), attributes, inputs, points);
         [
             (made.mesh != now.mesh, BlockReason::Mesh),
             (made.page != now.page, BlockReason::Page),
             (made.labels != now.labels, BlockReason::Labels),
             (made.attributes != now.attributes, BlockReason::Attributes),
+            (
+                made.control_points != now.control_points,
+                BlockReason::ControlPoints,
+            ),
             (
                 // The settings of a worker that died are not known.
                 made.settings != now.settings && made.settings != Value::Null,

@@ -2,7 +2,7 @@
 //!
 //! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction.
 //! A checksum is the first 64 bits of a BLAKE3 hash of the table's number, the row's number and the row's columns. For
-//! a pair or a block, it covers only the imported columns. For a verdict, an answer and a manual alignment, it also covers the
+//! a pair or a block, it covers only the columns that no run writes. For a verdict, an answer and a manual alignment, it also covers the
 //! previous row's checksum. This reveals a row that was removed together with its checksum. The tables of undone rows
 //! have no such chain.
 
@@ -178,7 +178,8 @@ impl ChecksummedTable {
             Self::ManualAlignmentUndo => statements!("manual_alignment_undo", "alignment", "t.*",
                 "(SELECT a.pair FROM manual_alignment AS a WHERE a.id = t.alignment)", false),
             Self::Block => statements!("block", "id",
-                "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.attributes, t.imported",
+                "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.attributes, t.imported, \
+                 t.control_points",
                 "NULL", false),
         }
     }

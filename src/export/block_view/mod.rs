@@ -1,12 +1,15 @@
 //! What a person sees of a whole block: its page, the relief in the frame of the page, and the characters with their
 //! results.
 
+mod block_correction;
 mod block_error;
+mod block_files;
 mod block_sheets;
 mod characters;
 mod page_layers;
 mod page_view;
 
+pub use block_correction::{BlockCorrection, CorrectionError, PicturePoint, TriedAlignment};
 pub use block_error::BlockViewError;
 pub use characters::{CharacterStatus, CharacterView};
 pub use page_layers::{PageLayer, PageLayers, PageRegion};

@@ -101,11 +101,10 @@ impl PageLayers {
 
     /// Draws a layer of a region, which must lie within the page, as a picture of `size` pixels.
     pub fn draw(&self, layer: PageLayer, region: PageRegion, size: [usize; 2]) -> Rgb {
-        let view = || FacePlaces::new(&self.map, region, size);
         match layer {
             PageLayer::Page => self.page_part(region, size),
-            PageLayer::Relief => self.relief(&view()),
-            PageLayer::Overlay => self.overlay(&view()),
+            PageLayer::Relief => relief(&self.face, &self.map, region, size),
+            PageLayer::Overlay => overlay(&self.ink, &self.face, &self.map, region, size),
         }
     }
 
@@ -113,7 +112,7 @@ impl PageLayers {
     /// so that its longer side has at most `longest` pixels.
     pub fn jpeg(&self, layer: PageLayer, region: PageRegion, longest: usize) -> Vec<u8> {
         let picture = self.draw(layer, region, region.picture_size(longest));
-        jpeg_rgb8(&picture, QUALITY)
+        jpeg(&picture)
     }
 
     fn page_part(&self, region: PageRegion, [width, height]: [usize; 2]) -> Rgb {
@@ -126,30 +125,50 @@ impl PageLayers {
         });
         resized(&part, width, height)
     }
+}
 
-    fn relief(&self, view: &FacePlaces) -> Rgb {
-        let [low, high] = SHADED_MM;
-        let levels = view.picture(|face, _| match self.face.height_at(face) {
-            Some(height) => {
-                let share = (height.clamp(low, high) - low) / (high - low);
-                1 + (share * LEVELS) as u16
-            }
-            None => 0,
-        });
-        let mm_per_level = f64::from((high - low) / LEVELS);
-        shaded(&levels, mm_per_level * self.map.scale() / view.step)
-    }
+/// Encodes a picture as JPEG.
+pub(super) fn jpeg(picture: &Rgb) -> Vec<u8> {
+    jpeg_rgb8(picture, QUALITY)
+}
 
-    fn overlay(&self, view: &FacePlaces) -> Rgb {
-        let ink = self.ink.sampler(view.step);
-        view.picture(|face, page| {
-            let ink = ink.at(page).unwrap_or(0.0);
-            match self.face.strokes_at(face) {
-                Some(strokes) => mixed(ink, strokes),
-                None => blend(BESIDE, INK_BESIDE, ink),
-            }
-        })
-    }
+/// Draws the relief of a face as it lies on a region of a page, lit from the upper left.
+pub(super) fn relief(
+    face: &CarvedFace,
+    map: &PageMap,
+    region: PageRegion,
+    size: [usize; 2],
+) -> Rgb {
+    let view = FacePlaces::new(map, region, size);
+    let [low, high] = SHADED_MM;
+    let levels = view.picture(|at, _| match face.height_at(at) {
+        Some(height) => {
+            let share = (height.clamp(low, high) - low) / (high - low);
+            1 + (share * LEVELS) as u16
+        }
+        None => 0,
+    });
+    let mm_per_level = f64::from((high - low) / LEVELS);
+    shaded(&levels, mm_per_level * map.scale() / view.step)
+}
+
+/// Draws the ink of a region of a page and the strokes of a face over each other.
+pub(super) fn overlay(
+    ink: &PageInk,
+    face: &CarvedFace,
+    map: &PageMap,
+    region: PageRegion,
+    size: [usize; 2],
+) -> Rgb {
+    let view = FacePlaces::new(map, region, size);
+    let ink = ink.sampler(view.step);
+    view.picture(|at, page| {
+        let ink = ink.at(page).unwrap_or(0.0);
+        match face.strokes_at(at) {
+            Some(strokes) => mixed(ink, strokes),
+            None => blend(BESIDE, INK_BESIDE, ink),
+        }
+    })
 }
 
 /// Returns the colour of ink and strokes over each other: of the sheet, of one of them, or of both.

@@ -4,22 +4,18 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
+use super::block_files::{PageFile, read_face};
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
-use crate::block::{
-    AlignOutcome, BoxesOutcome, CarvedFace, FaceOutcome, FoundFace, PageInk, PageMap,
-    StoredHeights, StoredPageMap, heights_role,
-};
+use crate::block::{AlignOutcome, BoxesOutcome, FaceOutcome, FoundFace, PageMap, StoredPageMap};
 use crate::catalog::{BlockDetail, BlockStageDetail, Catalog, PairResults};
 use crate::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, PairName, ThresholdMetric,
 };
 use crate::export::pair_pictures::{InputFileLimits, PictureError};
-use crate::export::pictures::eight_bits;
 use crate::export::scan_view::ScanView;
-use crate::export::source_print::SourcePrintError;
-use crate::raster::{self, ImageLimits};
-use crate::store::{Project, read_input};
+use crate::raster::ImageLimits;
+use crate::store::Project;
 
 /// A block that is aligned with its page, and the results of its characters.
 #[derive(Debug)]
@@ -149,39 +145,21 @@ impl BlockViewSources {
 
     /// Reads the page and the heights.
     fn read(self, project: &Project, limits: &ImageLimits) -> Result<PageLayers, BlockViewError> {
-        let unusable = |stage, why: &str| BlockViewError::Outcome {
-            stage,
-            why: why.to_owned(),
-        };
-        let input = project.input(&self.page_path);
-        let path = input.path().to_owned();
-        let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")
-            .map_err(SourcePrintError::Read)?;
-        if self.page_hash.is_some_and(|hash| hash != file.digest.hash) {
-            return Err(SourcePrintError::Changed(path).into());
-        }
-        let image = raster::decode(&file.bytes, limits)
-            .map_err(|source| SourcePrintError::Decode { path, source })?;
-        drop(file);
-        let ink = PageInk::of(&image)?;
-        let page = eight_bits(&image);
-        drop(image);
-        let heights = self.files.get(&heights_role(self.face.side));
-        let heights = heights.ok_or_else(|| unusable(BlockStage::Face, "it has no heights"))?;
-        let values = raster::decode_grey16(&project.read_artifact(heights)?)?;
-        let header = self.face.heights;
-        let face = CarvedFace::of(&StoredHeights { header, values });
+        let page = PageFile::read(project, &self.page_path, self.page_hash, limits)?;
         Ok(PageLayers {
-            page,
-            ink,
-            face: face.ok_or_else(|| unusable(BlockStage::Face, "no surface fits its heights"))?,
-            map: PageMap::try_from(self.map).map_err(|why| unusable(BlockStage::Align, &why))?,
+            page: page.picture,
+            ink: page.ink,
+            face: read_face(project, &self.files, &self.face)?,
+            map: PageMap::try_from(self.map).map_err(|why| BlockViewError::Outcome {
+                stage: BlockStage::Align,
+                why,
+            })?,
         })
     }
 }
 
 /// Returns the error of a block without alignment, with its failure or what to do.
-fn not_aligned(name: &BlockName, detail: &BlockDetail) -> BlockViewError {
+pub(super) fn not_aligned(name: &BlockName, detail: &BlockDetail) -> BlockViewError {
     let why = match &detail.state.failure {
         Some(stored) => format!("{} failed: {}", stored.stage, stored.failure.message),
         None => "it has not run yet; use `run` first".to_owned(),
@@ -192,7 +170,7 @@ fn not_aligned(name: &BlockName, detail: &BlockDetail) -> BlockViewError {
     }
 }
 
-fn outcome<T: DeserializeOwned>(stage: &BlockStageDetail) -> Result<T, BlockViewError> {
+pub(super) fn outcome<T: DeserializeOwned>(stage: &BlockStageDetail) -> Result<T, BlockViewError> {
     T::deserialize(&stage.outcome).map_err(|error| BlockViewError::Outcome {
         stage: stage.stage,
         why: error.to_string(),

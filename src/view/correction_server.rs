@@ -1,0 +1,202 @@
+//! The page on which a person chooses the same places on the relief and on the page of a block.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{Path, State};
+use axum::http::{StatusCode, header};
+use axum::response::{Html, IntoResponse as _, Response};
+use axum::routing::{get, post};
+use axum::{Extension, Json, Router};
+use serde::Deserialize;
+use serde_json::json;
+use tokio::sync::OnceCell;
+
+use super::page;
+use crate::domain::{BlockName, BlockSide, ControlPoints};
+use crate::export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
+use crate::local_server::AccessControl;
+
+/// Reads a block for its correction, and stores the control points.
+pub trait CorrectionStore: Send + Sync + 'static {
+    /// Reads the block. Returns a sentence if that fails.
+    fn read(&self) -> impl Future<Output = Result<BlockCorrection, String>> + Send;
+
+    /// Stores control points, or removes the stored ones. Returns a sentence if that fails.
+    fn save(
+        &self,
+        points: Option<ControlPoints>,
+    ) -> impl Future<Output = Result<(), String>> + Send;
+
+    /// Returns the command that aligns the block again.
+    fn next_command(&self) -> String;
+}
+
+/// The state of the page.
+struct CorrectionState<S> {
+    block: BlockName,
+    store: S,
+    /// The block, which is read when the page is opened.
+    shown: OnceCell<Arc<BlockCorrection>>,
+    /// The last alignment that was tried and accepted.
+    tried: Mutex<Option<Arc<TriedAlignment>>>,
+}
+
+/// Points as the page sends them.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PointsBody {
+    side: BlockSide,
+    points: Vec<PicturePoint>,
+}
+
+type Shown<S> = State<Arc<CorrectionState<S>>>;
+
+/// Returns the routes of the page of a block.
+pub(super) fn routes<S: CorrectionStore>(block: BlockName, store: S) -> Router {
+    let state = CorrectionState {
+        block,
+        store,
+        shown: OnceCell::new(),
+        tried: Mutex::new(None),
+    };
+    Router::new()
+        .route("/correct", get(index::<S>))
+        .route("/correct/block.json", get(block_json::<S>))
+        .route("/correct/face/{side}/{turns}", get(face::<S>))
+        .route("/correct/page", get(page_image::<S>))
+        .route("/correct/overlay", get(overlay::<S>))
+        .route("/correct/try", post(try_points::<S>))
+        .route("/correct/save", post(save::<S>))
+        .route("/correct/remove", post(remove::<S>))
+        .with_state(Arc::new(state))
+}
+
+impl<S: CorrectionStore> CorrectionState<S> {
+    /// Returns the block, which is read once.
+    async fn shown(&self) -> Result<Arc<BlockCorrection>, Response> {
+        let read = async || self.store.read().await.map(Arc::new);
+        let shown = self.shown.get_or_try_init(read).await;
+        shown.map(Arc::clone).map_err(unavailable)
+    }
+
+    fn tried(&self) -> Option<Arc<TriedAlignment>> {
+        let tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        tried.clone()
+    }
+
+    fn set_tried(&self, tried: Option<TriedAlignment>) {
+        let mut stored = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        *stored = tried.map(Arc::new);
+    }
+
+    /// Stores points, and responds.
+    async fn store_points(&self, points: Option<ControlPoints>) -> Response {
+        match self.store.save(points).await {
+            Ok(()) => Json(json!({"next": self.store.next_command()})).into_response(),
+            Err(why) => unavailable(why),
+        }
+    }
+}
+
+async fn index<S: CorrectionStore>(State(state): Shown<S>) -> Html<String> {
+    Html(page::correction(state.block.as_str()))
+}
+
+async fn block_json<S: CorrectionStore>(
+    State(state): Shown<S>,
+    Extension(access): Extension<Arc<AccessControl>>,
+) -> Response {
+    match state.shown().await {
+        Ok(shown) => {
+            let mut value = shown.to_json();
+            value["csrf_token"] = json!(access.csrf_token());
+            Json(value).into_response()
+        }
+        Err(failed) => failed,
+    }
+}
+
+/// Responds with the relief of a side after a number of quarter turns, clockwise.
+async fn face<S: CorrectionStore>(
+    State(state): Shown<S>,
+    Path((side, turns)): Path<(String, u8)>,
+) -> Response {
+    let Ok(side) = side.parse::<BlockSide>() else {
+        return StatusCode::NOT_FOUND.into_response();
+    };
+    image(&state, move |shown| shown.face_jpeg(side, turns)).await
+}
+
+async fn page_image<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+    image(&state, |shown| Some(shown.page_jpeg())).await
+}
+
+async fn overlay<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+    let tried = state.tried();
+    image(&state, move |_| tried.map(|tried| tried.overlay.clone())).await
+}
+
+/// Aligns from points. An alignment that is accepted is kept for `save`.
+async fn try_points<S: CorrectionStore>(
+    State(state): Shown<S>,
+    body: Result<Json<PointsBody>, JsonRejection>,
+) -> Response {
+    let body = match body {
+        Ok(Json(body)) => body,
+        Err(rejection) => return refused(rejection.status(), &rejection.to_string()),
+    };
+    let shown = match state.shown().await {
+        Ok(shown) => shown,
+        Err(failed) => return failed,
+    };
+    let tried = move || shown.try_points(body.side, &body.points);
+    match tokio::task::spawn_blocking(tried).await {
+        Ok(Ok(tried)) => {
+            let agreement = tried.agreement;
+            state.set_tried(Some(tried));
+            Json(json!({"agreement": agreement})).into_response()
+        }
+        Ok(Err(error)) => {
+            state.set_tried(None);
+            refused(StatusCode::UNPROCESSABLE_ENTITY, &error.to_string())
+        }
+        Err(error) => unavailable(error.to_string()),
+    }
+}
+
+async fn save<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+    match state.tried() {
+        Some(tried) => state.store_points(Some(tried.points.clone())).await,
+        None => refused(StatusCode::CONFLICT, "try the points before saving them"),
+    }
+}
+
+async fn remove<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+    state.set_tried(None);
+    state.store_points(None).await
+}
+
+/// Draws an image on a thread for long work and responds with it.
+async fn image<S: CorrectionStore>(
+    state: &CorrectionState<S>,
+    draw: impl FnOnce(&BlockCorrection) -> Option<Vec<u8>> + Send + 'static,
+) -> Response {
+    let shown = match state.shown().await {
+        Ok(shown) => shown,
+        Err(failed) => return failed,
+    };
+    match tokio::task::spawn_blocking(move || draw(&shown)).await {
+        Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
+        Ok(None) => StatusCode::NOT_FOUND.into_response(),
+        Err(error) => unavailable(error.to_string()),
+    }
+}
+
+fn refused(status: StatusCode, why: &str) -> Response {
+    (status, Json(json!({"error": why}))).into_response()
+}
+
+fn unavailable(why: String) -> Response {
+    refused(StatusCode::SERVICE_UNAVAILABLE, &why)
+}
