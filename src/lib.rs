@@ -196,7 +196,8 @@
 //! `src/export/block_view` reads the stored results of a block again: `page_view.rs` the files, `page_layers.rs` draws any
 //! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
 //! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
-//! the same layers, and for the 3D view of a character's pair.
+//! the same layers, and for the 3D view of a character's pair. `view::correction_server` lets a person choose the same
+//! places on the relief and on the page; the catalog stores them as control points, and `align` starts from them.
 //!
 //! ## Modules
 //!
@@ -225,7 +226,7 @@
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of blocks and of reports | `domain`, `mesh`, `raster`, `block`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
-//! | `view` | the pages that show one scan on its print in 3D, or a whole block | `local_server`, `export` |
+//! | `view` | the pages that show one scan on its print in 3D, or a whole block | `domain`, `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner`, `platform` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |

@@ -50,7 +50,7 @@ struct PointsBody {
     points: Vec<PicturePoint>,
 }
 
-type Shown<S> = State<Arc<CorrectionState<S>>>;
+type CorrectionPage<S> = State<Arc<CorrectionState<S>>>;
 
 /// Returns the routes of the page of a block.
 pub(super) fn routes<S: CorrectionStore>(block: BlockName, store: S) -> Router {
@@ -99,12 +99,12 @@ impl<S: CorrectionStore> CorrectionState<S> {
     }
 }
 
-async fn index<S: CorrectionStore>(State(state): Shown<S>) -> Html<String> {
+async fn index<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Html<String> {
     Html(page::correction(state.block.as_str()))
 }
 
 async fn block_json<S: CorrectionStore>(
-    State(state): Shown<S>,
+    State(state): CorrectionPage<S>,
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
     match state.shown().await {
@@ -119,7 +119,7 @@ async fn block_json<S: CorrectionStore>(
 
 /// Responds with the relief of a side after a number of quarter turns, clockwise.
 async fn face<S: CorrectionStore>(
-    State(state): Shown<S>,
+    State(state): CorrectionPage<S>,
     Path((side, turns)): Path<(String, u8)>,
 ) -> Response {
     let Ok(side) = side.parse::<BlockSide>() else {
@@ -128,18 +128,18 @@ async fn face<S: CorrectionStore>(
     image(&state, move |shown| shown.face_jpeg(side, turns)).await
 }
 
-async fn page_image<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+async fn page_image<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
     image(&state, |shown| Some(shown.page_jpeg())).await
 }
 
-async fn overlay<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+async fn overlay<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
     let tried = state.tried();
     image(&state, move |_| tried.map(|tried| tried.overlay.clone())).await
 }
 
 /// Aligns from points. An alignment that is accepted is kept for `save`.
 async fn try_points<S: CorrectionStore>(
-    State(state): Shown<S>,
+    State(state): CorrectionPage<S>,
     body: Result<Json<PointsBody>, JsonRejection>,
 ) -> Response {
     let body = match body {
@@ -165,14 +165,14 @@ async fn try_points<S: CorrectionStore>(
     }
 }
 
-async fn save<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+async fn save<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
     match state.tried() {
         Some(tried) => state.store_points(Some(tried.points.clone())).await,
         None => refused(StatusCode::CONFLICT, "try the points before saving them"),
     }
 }
 
-async fn remove<S: CorrectionStore>(State(state): Shown<S>) -> Response {
+async fn remove<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
     state.set_tried(None);
     state.store_points(None).await
 }

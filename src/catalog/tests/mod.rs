@@ -4,6 +4,7 @@ mod answers;
 mod block_pairs;
 mod blocks;
 mod claim_order;
+mod control_points;
 mod guards;
 mod histories;
 mod import;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
-use super::block_files::{PageFile, read_face};
+use super::block_files::{PagePicture, read_face};
 use super::page_layers::{PageRegion, jpeg, overlay, relief};
 use super::page_view::{not_aligned, outcome};
 use crate::block::{
@@ -27,7 +27,7 @@ const LONGEST_SIDE: f64 = 3000.0;
 pub struct BlockCorrection {
     name: BlockName,
     faces: Vec<FacePicture>,
-    page: PageFile,
+    page: PagePicture,
     mesh_hash: ContentHash,
     saved: Option<ControlPoints>,
     /// The side that is aligned with the page.
@@ -140,7 +140,7 @@ impl BlockCorrection {
         let page_path = &detail.state.attributes.page_path;
         Ok(Self {
             faces: faces.collect::<Result<_, BlockViewError>>()?,
-            page: PageFile::read(project, page_path, None, limits)?,
+            page: PagePicture::read(project, page_path, None, limits)?,
             mesh_hash: mesh.map_err(unusable)?,
             saved: detail.state.control_points.clone(),
             aligned,

@@ -10,13 +10,13 @@ use crate::store::{Project, read_input};
 
 /// The image of a page.
 #[derive(Debug)]
-pub(super) struct PageFile {
+pub(super) struct PagePicture {
     pub(super) hash: ContentHash,
     pub(super) picture: Rgb,
     pub(super) ink: PageInk,
 }
 
-impl PageFile {
+impl PagePicture {
     /// Reads a page. `aligned` is the hash of the file that was aligned, if it must be the same.
     pub(super) fn read(
         project: &Project,

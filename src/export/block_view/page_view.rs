@@ -4,7 +4,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
-use super::block_files::{PageFile, read_face};
+use super::block_files::{PagePicture, read_face};
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
 use crate::block::{AlignOutcome, BoxesOutcome, FaceOutcome, FoundFace, PageMap, StoredPageMap};
@@ -145,7 +145,7 @@ impl BlockViewSources {
 
     /// Reads the page and the heights.
     fn read(self, project: &Project, limits: &ImageLimits) -> Result<PageLayers, BlockViewError> {
-        let page = PageFile::read(project, &self.page_path, self.page_hash, limits)?;
+        let page = PagePicture::read(project, &self.page_path, self.page_hash, limits)?;
         Ok(PageLayers {
             page: page.picture,
             ink: page.ink,
