@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 10;
+PRAGMA user_version = 11;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -276,7 +276,8 @@ CREATE TABLE retired_pair (
 ) STRICT;
 
 -- A whole block as imported: the scan of a face, the image of its page, and perhaps labels; and these files as last read.
--- `attributes` are the columns that results depend on.
+-- `attributes` are the columns that results depend on. `true_boxes` are boxes on the page that are known to be right, if
+-- there are any: a list of `domain::TrueBox` as JSON.
 CREATE TABLE block (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL UNIQUE,
@@ -292,7 +293,8 @@ CREATE TABLE block (
     page_stat TEXT,
     labels_hash BLOB CHECK (length(labels_hash) = 32),
     labels_stat TEXT,
-    imported INTEGER NOT NULL
+    imported INTEGER NOT NULL,
+    true_boxes TEXT CHECK (json_valid(true_boxes))
 ) STRICT;
 
 -- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`. The failure is stored

@@ -31,7 +31,9 @@ mod worker_metrics;
 pub use alignment_prior::AlignmentPrior;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
-pub use block::{BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord};
+pub use block::{
+    BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
+};
 pub(crate) use enum_names::enum_names;
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
