@@ -38,8 +38,7 @@ pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<Ex
     let (project, catalog) = context.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     if select::block(&catalog, &args.pair).await?.is_some() {
-        let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
-        let block = block_sheet::read(&args.pair, metric, &project, &catalog, context).await;
+        let block = block_sheet::read(&args.pair, args.metric, &project, &catalog, context).await;
         catalog.close().await;
         let page = view::bind_block(address, block?).await?;
         return serve(page, &args, context).await;

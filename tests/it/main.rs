@@ -7,6 +7,7 @@ mod attacks;
 mod backup;
 mod bit_flips;
 mod block_demo;
+mod block_export;
 mod block_view;
 mod blocks;
 mod browser;

@@ -6,8 +6,10 @@ mod block_sheets;
 mod characters;
 mod page_layers;
 mod page_view;
+mod registered_face;
 
 pub use block_error::BlockViewError;
 pub use characters::{CharacterStatus, CharacterView};
 pub use page_layers::{PageLayer, PageLayers, PageRegion};
 pub use page_view::BlockView;
+pub(super) use registered_face::RegisteredFace;
