@@ -182,7 +182,8 @@
 //! `src/export/exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog.
 //! `record.rs` defines the record of a pair that all formats share, `record_fields.rs` its fields with unit and frame,
 //! `pair_pictures.rs` reads inputs and artifacts when a format needs them, and `format_writer.rs` says what a format must
-//! implement; the formats are in `formats/`. `manifest.rs` recognizes earlier exports, which are replaced as a whole.
+//! implement; the formats are in `formats/`. `block_lines.rs` and `block_grid.rs` write whole blocks with the maps of their
+//! faces, `page_labels.rs` their pages with the boxes of the characters. `manifest.rs` recognizes earlier exports, which are replaced as a whole.
 //!
 //! ## The 3D view
 //!
@@ -224,7 +225,7 @@
 //! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `block`, `labels`, `stages`, `store`, `catalog`, `failpoint`, `platform` |
 //! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of blocks and of reports | `domain`, `mesh`, `raster`, `block`, `store`, `catalog`, `report` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of blocks and of reports | `domain`, `mesh`, `raster`, `labels`, `block`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts, manual alignments, attention checks | `domain`, `raster`, `stages`, `local_server`, `store`, `catalog`, `report`, `export` |
 //! | `view` | the pages that show one scan on its print in 3D, or a whole block | `domain`, `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |

@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (10);
+INSERT INTO catalog_version (version) VALUES (11);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (
@@ -285,7 +285,8 @@ CREATE TABLE block (
     labels_hash bytea CHECK (length(labels_hash) = 32),
     labels_stat text,
     imported bigint NOT NULL,
-    control_points text CHECK (CAST(control_points AS json) IS NOT NULL)
+    true_boxes text CHECK (true_boxes IS NULL OR CAST(true_boxes AS json) IS NOT NULL),
+    control_points text CHECK (control_points IS NULL OR CAST(control_points AS json) IS NOT NULL)
 );
 
 CREATE TABLE block_job (

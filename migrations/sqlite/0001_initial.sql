@@ -276,7 +276,8 @@ CREATE TABLE retired_pair (
 ) STRICT;
 
 -- A whole block as imported: the scan of a face, the image of its page, and perhaps labels; and these files as last read.
--- `attributes` are the columns that results depend on. `control_points` are places that a person chose on the scan and on
+-- `attributes` are the columns that results depend on. `true_boxes` are boxes on the page that are known to be right, if
+-- there are any: a list of `domain::TrueBox` as JSON. `control_points` are places that a person chose on the scan and on
 -- the page, with the hashes of both files.
 CREATE TABLE block (
     id INTEGER PRIMARY KEY,
@@ -294,6 +295,7 @@ CREATE TABLE block (
     labels_hash BLOB CHECK (length(labels_hash) = 32),
     labels_stat TEXT,
     imported INTEGER NOT NULL,
+    true_boxes TEXT CHECK (json_valid(true_boxes)),
     control_points TEXT CHECK (json_valid(control_points))
 ) STRICT;
 

@@ -39,7 +39,8 @@ pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
     BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockSettings, BlockWork, CutPair, MadeWith, NewCharacter, StoredCharacter,
+    BlockLease, BlockSettings, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
+    NewCharacter, StoredCharacter,
 };
 pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,

@@ -24,8 +24,8 @@ pub(super) struct BlockSheetOptions<'a> {
     pub(super) block: &'a str,
     /// Whether to draw relief and ink over each other.
     pub(super) is_overlay: bool,
-    /// The metric whose results are shown.
-    pub(super) metric: ThresholdMetric,
+    /// The metric whose results are shown, if one was asked for.
+    pub(super) metric: Option<ThresholdMetric>,
     /// The file to write.
     pub(super) output: Option<&'a Path>,
 }
@@ -76,10 +76,11 @@ async fn draw(
 /// Reads a block by the id that the user typed.
 ///
 /// # Errors
-/// Returns an error if the block does not exist or is not aligned, or if a file or the catalog cannot be read.
+/// Returns an error if the block does not exist, is not aligned or has no result of the metric that was asked for, or if a
+/// file or the catalog cannot be read.
 pub(super) async fn read(
     typed: &str,
-    metric: ThresholdMetric,
+    metric: Option<ThresholdMetric>,
     project: &Project,
     catalog: &Catalog,
     context: &Context,
@@ -92,7 +93,7 @@ pub(super) async fn read(
     };
     match BlockView::read(catalog, project, &name, metric, limits).await {
         Ok(view) => Ok(view),
-        Err(error @ BlockViewError::NotAligned { .. }) => {
+        Err(error @ (BlockViewError::NotAligned { .. } | BlockViewError::NoResult { .. })) => {
             Err(Refusal::NothingSelected(error.to_string()).into())
         }
         Err(error) => Err(error.into()),

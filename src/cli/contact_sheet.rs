@@ -25,14 +25,14 @@ pub(super) struct ContactSheetArgs {
     #[arg(long, value_name = "NAME", conflicts_with_all = ["pairs", "order", "limit", "columns"])]
     pub(super) block: Option<String>,
     /// With `--block`: draw relief and ink over each other, to see where the registration is off
-    #[arg(long, requires = "block")]
+    #[arg(long, requires = "block", conflicts_with = "metric")]
     pub(super) overlay: bool,
     /// The PNG to write [default: in the project, sheet.png, or for a block, page.png or overlay.png]
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
-    /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief
-    #[arg(long, default_value_t = ThresholdMetric::DEFAULT)]
-    pub(super) metric: ThresholdMetric,
+    /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief [default: ensemble]
+    #[arg(long)]
+    pub(super) metric: Option<ThresholdMetric>,
     /// Order of the pairs: worst, score, margin, confidence (least confident first) or name
     #[arg(long, default_value = "worst")]
     pub(super) order: ContactSheetOrder,
@@ -54,7 +54,7 @@ impl Default for ContactSheetArgs {
             block: None,
             overlay: false,
             output: None,
-            metric: ThresholdMetric::DEFAULT,
+            metric: None,
             order: ContactSheetOrder::Worst,
             limit: 60,
             columns: 5,
@@ -106,8 +106,9 @@ pub(super) async fn write(
         None => project.dir().join("sheet.png"),
     };
     files::refuse_used_file(&path, &project, &catalog).await?;
+    let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
     let options = ContactSheetOptions {
-        metric: args.metric,
+        metric,
         pairs: select::some_or_all(&catalog, &args.pairs).await?,
         order: args.order,
         limit: usize::from(args.limit),
@@ -120,7 +121,6 @@ pub(super) async fn write(
     let sheet = sheet?;
     catalog.close().await;
     if sheet.shown == 0 {
-        let metric = args.metric;
         let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
         return Err(Refusal::NothingSelected(text).into());
     }

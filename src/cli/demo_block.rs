@@ -31,7 +31,8 @@ pub(super) fn import_args(files: &BlockFiles, has_labels: bool) -> BlockArgs {
     }
 }
 
-/// Stores the true alignments of the pairs that were cut from the block. Returns how many there are.
+/// Stores the true boxes of the block, and the true alignments of the pairs that were cut from it. Returns how many of these
+/// there are.
 ///
 /// # Errors
 /// Returns an error if the truth cannot be read or the catalog fails.
@@ -40,6 +41,10 @@ pub(super) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Resu
     let truth: BlockTruth = serde_json::from_slice(&bytes)
         .with_context(|| format!("{} is not the truth of a block", file.display()))?;
     let name = BlockName::new(NAME)?;
+    let boxes = truth.true_boxes();
+    if !boxes.is_empty() {
+        catalog.set_true_boxes(name.clone(), boxes).await?;
+    }
     let characters = catalog.block_characters(&name).await?;
     let truths = characters
         .iter()

@@ -174,7 +174,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         return Err(Refusal::NothingSelected(text).into());
     }
     print_summary(&summary, &args, context)?;
-    Ok(if summary.unreadable.is_empty() {
+    Ok(if summary.is_complete() {
         ExitCode::Done
     } else {
         ExitCode::SomeFailed
@@ -188,6 +188,8 @@ fn print_summary(
 ) -> anyhow::Result<()> {
     let unreadable = summary.unreadable.iter();
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
+    let blocks = summary.unreadable_blocks.iter();
+    let blocks = blocks.map(|(block, why)| json!({"block": block, "error": why}));
     context.print_json(&json!({
         "schema": 1,
         "done": summary.pairs.done,
@@ -197,14 +199,18 @@ fn print_summary(
             json!({"train": train, "validation": validation, "test": test})
         }),
         "unreadable": unreadable.collect::<Vec<_>>(),
+        "unreadable_blocks": blocks.collect::<Vec<_>>(),
         "kept_earlier": summary.kept_earlier,
     }))?;
+    for (block, why) in &summary.unreadable_blocks {
+        context.warn(&format!("the export lacks files of block {block}: {why}"));
+    }
     for (pair, why) in &summary.unreadable {
         context.warn(&format!("the export has no files of {pair}: {why}"));
     }
     let shown = args.output.display();
     if summary.kept_earlier {
-        let lost = count(summary.unreadable.len() as u64, "pair");
+        let lost = lost_files(summary);
         context.info(&format!(
             "the earlier export in {shown} was kept, because the new one would lack the files of {lost}; repair them, or export to a new directory"
         ));
@@ -217,12 +223,25 @@ fn print_summary(
             path.display()
         ));
     }
-    if !summary.unreadable.is_empty() {
+    if !summary.is_complete() {
         // A run trusts the catalog, so the check must come first.
         context.next("check --repair");
         context.next("run");
     }
     Ok(())
+}
+
+/// Returns how many pairs and blocks have files that cannot be read.
+fn lost_files(summary: &ExportSummary) -> String {
+    let numbers = [
+        (summary.unreadable.len(), "pair"),
+        (summary.unreadable_blocks.len(), "block"),
+    ];
+    let lost = numbers.into_iter().filter(|(number, _)| *number > 0);
+    let lost: Vec<String> = lost
+        .map(|(number, what)| count(number as u64, what))
+        .collect();
+    lost.join(" and ")
 }
 
 fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {

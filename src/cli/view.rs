@@ -85,8 +85,7 @@ async fn block_page(
     context: &Context,
 ) -> anyhow::Result<ViewServer> {
     let name = select::existing_block(catalog, &args.pair).await?;
-    let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
-    let view = match block_sheet::read(&args.pair, metric, project, catalog, context).await {
+    let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
         Ok(view) => Some(view),
         Err(error) => {
             let Some(why) = refusal(catalog, &name).await? else {

@@ -1,5 +1,7 @@
 //! Whole blocks: the scan of a carved face with the image of its page, from which pairs are cut.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +30,11 @@ impl BlockName {
     /// Returns the id.
     pub fn as_str(&self) -> &str {
         self.0.as_str()
+    }
+
+    /// Returns the id as a part of file names, as for a pair.
+    pub fn file_name(&self) -> Cow<'_, str> {
+        self.0.file_name()
     }
 
     /// Returns the id of the pair that is cut from this block for a label: `BLOCK_LABEL`.
@@ -148,6 +155,16 @@ pub enum BlockCharacterState {
 
 enum_names! { pub BlockCharacterState, "a state of a character":
     Cut = "cut", Left = "left", Retired = "retired",
+}
+
+/// A character on the page of a block whose box is known to be right, for measuring boxes that were found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TrueBox {
+    /// Edges on the page in pixels, in continuous coordinates: left, top, right, bottom.
+    #[serde(rename = "box")]
+    pub bounds: [f64; 4],
+    /// Whether the page shows only a part of the character. Such a box may be found or not.
+    pub is_partial: bool,
 }
 
 #[cfg(test)]

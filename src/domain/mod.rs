@@ -32,7 +32,9 @@ mod worker_metrics;
 pub use alignment_prior::AlignmentPrior;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
-pub use block::{BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord};
+pub use block::{
+    BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
+};
 pub use control_points::{ControlPoint, ControlPoints};
 pub(crate) use enum_names::enum_names;
 pub use failure::{Failure, FailureClass};

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::block_lines::{BLOCKS_FILE, write_blocks};
 use super::export_folder::{Folder, FolderError, write_below};
 use super::export_logs::write_logs;
 use super::exporter_error::ExportError;
@@ -17,12 +18,13 @@ use super::format_writer::{ExportContext, FormatFolder};
 use super::formats;
 use super::manifest::{ExportManifest, MANIFEST, PairCounts};
 use super::options::ExportOptions;
+use super::page_labels::write_page_labels;
 use super::pair_writer::{FormatOutput, PairWriter, WrittenPair};
 use super::readme;
 use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
-use crate::catalog::{Catalog, PairResults, StoredAlignment};
-use crate::domain::PairName;
+use crate::catalog::{Catalog, CatalogError, CutOrigin, PairResults, StoredAlignment};
+use crate::domain::{BlockName, PairName};
 use crate::store::Project;
 
 /// Pairs whose rows are in memory at a time.
@@ -39,12 +41,22 @@ pub struct ExportSummary {
     pub split: Option<SplitCounts>,
     /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
-    /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs cannot be read.
+    /// Blocks whose map cannot be read although their page was accepted, and why.
+    pub unreadable_blocks: Vec<(BlockName, String)>,
+    /// Whether the new export was discarded, and the earlier one kept, because files of finished pairs or blocks cannot be
+    /// read.
     pub kept_earlier: bool,
     /// Whether nothing was written, because the options select no result. A folder at the target is kept.
     pub is_nothing_selected: bool,
     /// The path of an earlier export that could not be removed after it was replaced, and why.
     pub leftover: Option<(PathBuf, String)>,
+}
+
+impl ExportSummary {
+    /// Returns whether all files of the exported pairs and blocks could be read.
+    pub const fn is_complete(&self) -> bool {
+        self.unreadable.is_empty() && self.unreadable_blocks.is_empty()
+    }
 }
 
 /// Exports the pairs of a project to a folder, which must be new, empty or an earlier export. Replaces an earlier
@@ -86,27 +98,42 @@ pub async fn export(
     let mut run = ExportRun::begin(project, dir, formats, context, plan)?;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
-        let manual_alignments = match (page.first(), page.last()) {
-            (Some(first), Some(last)) => {
-                let [first, last] = [first, last].map(|pair| &pair.attributes.name);
-                catalog
-                    .newest_manual_alignments_between(first, last)
-                    .await?
-            }
-            _ => BTreeMap::new(),
-        };
-        let task = move || {
-            let added = run.add_page(page, manual_alignments);
-            added.map(|()| run)
-        };
+        let page = ExportedPage::read(catalog, page).await?;
+        let task = move || run.add_page(page).map(|()| run);
         run = tokio::task::spawn_blocking(task).await??;
     }
-    for (root, prefix) in run.roots_with_logs() {
-        let written = write_logs(catalog, &root).await?;
-        run.files
-            .extend(written.map(|name| format!("{prefix}{name}")));
-    }
+    run.write_unpaired(catalog, project).await?;
     Ok(tokio::task::spawn_blocking(move || run.finish()).await??)
+}
+
+/// A page of pairs with what is exported of them.
+struct ExportedPage {
+    pairs: Vec<PairResults>,
+    manual_alignments: BTreeMap<PairName, StoredAlignment>,
+    /// From where pairs were cut out of whole blocks.
+    origins: BTreeMap<PairName, CutOrigin>,
+}
+
+impl ExportedPage {
+    /// Reads what belongs to pairs, which are sorted by name.
+    async fn read(catalog: &Catalog, pairs: Vec<PairResults>) -> Result<Self, CatalogError> {
+        let (manual_alignments, origins) = match (pairs.first(), pairs.last()) {
+            (Some(first), Some(last)) => {
+                let [first, last] = [first, last].map(|pair| &pair.attributes.name);
+                let manual = catalog.newest_manual_alignments_between(first, last);
+                (
+                    manual.await?,
+                    catalog.cut_origins_between(first, last).await?,
+                )
+            }
+            _ => Default::default(),
+        };
+        Ok(Self {
+            pairs,
+            manual_alignments,
+            origins,
+        })
+    }
 }
 
 /// An export in progress.
@@ -118,6 +145,8 @@ struct ExportRun {
     plan: Option<SplitPlan>,
     /// Paths of files below the folder, with `*` in place of ids.
     files: BTreeSet<String>,
+    /// Whole blocks from which exported pairs were cut.
+    blocks: BTreeSet<String>,
     summary: ExportSummary,
 }
 
@@ -151,6 +180,7 @@ impl ExportRun {
             folder,
             outputs,
             files: BTreeSet::new(),
+            blocks: BTreeSet::new(),
             summary: ExportSummary {
                 split: context
                     .options
@@ -164,16 +194,15 @@ impl ExportRun {
     }
 
     /// Encodes a page of pairs on all cores, then appends them in order.
-    fn add_page(
-        &mut self,
-        pairs: Vec<PairResults>,
-        mut manual_alignments: BTreeMap<PairName, StoredAlignment>,
-    ) -> Result<(), FolderError> {
-        let pairs: Vec<_> = pairs
+    fn add_page(&mut self, mut page: ExportedPage) -> Result<(), FolderError> {
+        let pairs: Vec<_> = page
+            .pairs
             .into_iter()
             .map(|pair| {
-                let alignment = manual_alignments.remove(&pair.attributes.name);
-                (pair, alignment.map(ManualAlignmentFields::from))
+                let name = &pair.attributes.name;
+                let alignment = page.manual_alignments.remove(name);
+                let origin = page.origins.remove(name);
+                (pair, alignment.map(ManualAlignmentFields::from), origin)
             })
             .collect();
         for pairs in pairs.chunks(ENCODED_PER_CORE * rayon::current_num_threads()) {
@@ -186,7 +215,9 @@ impl ExportRun {
             };
             let written: Result<Vec<Option<WrittenPair>>, FolderError> = pairs
                 .par_iter()
-                .map(|(pair, alignment)| writer.write(pair, alignment.as_ref()))
+                .map(|(pair, alignment, origin)| {
+                    writer.write(pair, alignment.as_ref(), origin.as_ref())
+                })
                 .collect();
             for pair in written? {
                 match pair {
@@ -206,6 +237,9 @@ impl ExportRun {
             counts.add(part);
         }
         self.files.append(&mut pair.files);
+        let fields = &pair.record.pair;
+        let is_cut = fields.label.is_some();
+        self.blocks.extend(fields.block.clone().filter(|_| is_cut));
         if let Some(why) = pair.unreadable {
             self.summary.unreadable.push((pair.record.pair.id, why));
         } else if pair.record.metrics.is_empty() {
@@ -216,20 +250,37 @@ impl ExportRun {
         Ok(())
     }
 
-    /// Returns the folders of the formats that hold the logs of the reviewers, with their prefixes.
-    fn roots_with_logs(&self) -> Vec<(PathBuf, String)> {
-        let with_logs = self
-            .outputs
-            .iter()
-            .filter(|output| output.format == ExportFormat::Jsonl);
-        with_logs
-            .map(|output| {
-                (
-                    self.folder.path().join(&output.prefix),
-                    output.prefix.clone(),
-                )
-            })
-            .collect()
+    /// Writes what does not belong to one pair: the logs of the reviewers, and whole blocks. If results are selected, only
+    /// blocks of exported pairs are written.
+    async fn write_unpaired(
+        &mut self,
+        catalog: &Catalog,
+        project: &Project,
+    ) -> Result<(), ExportError> {
+        let options = &self.context.options;
+        let only = options.is_filtered().then_some(&self.blocks);
+        for output in &self.outputs {
+            let (format, prefix) = (output.format, &output.prefix);
+            let root = self.folder.path().join(prefix);
+            let mut files = BTreeSet::new();
+            let mut unreadable = Vec::new();
+            if format == ExportFormat::Jsonl {
+                let logs = write_logs(catalog, &root).await?;
+                files.extend(logs.map(str::to_owned));
+                let (is_written, lost) = write_blocks(catalog, project, &root, only).await?;
+                files.extend(is_written.then(|| BLOCKS_FILE[0].to_owned()));
+                unreadable = lost;
+            } else if format == ExportFormat::Annotations {
+                let limits = options.limits.image;
+                let pages = write_page_labels(catalog, project, &root, only, limits).await?;
+                files = pages.files;
+                unreadable = pages.unreadable;
+            }
+            let files = files.iter().map(|name| format!("{prefix}{name}"));
+            self.files.extend(files);
+            self.summary.unreadable_blocks.extend(unreadable);
+        }
+        Ok(())
     }
 
     /// Completes the shared files, writes the READMEs and the manifest, and replaces the target.
@@ -271,7 +322,7 @@ impl ExportRun {
         write_below(&root, MANIFEST, manifest.text().as_bytes())?;
         // Open files would keep the folder from being removed on some file systems.
         self.outputs.clear();
-        summary.kept_earlier = !summary.unreadable.is_empty() && self.folder.replaces()?;
+        summary.kept_earlier = !summary.is_complete() && self.folder.replaces()?;
         if !summary.kept_earlier {
             let leftover = self.folder.finish()?;
             summary.leftover = leftover.map(|(path, error)| (path, error.to_string()));

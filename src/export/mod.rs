@@ -1,6 +1,8 @@
 //! Exports results for other tools, and images for people.
 
 mod annotations;
+mod block_grid;
+mod block_lines;
 pub mod block_view;
 mod contact_sheet;
 mod export_folder;
@@ -15,6 +17,7 @@ mod gallery_selection;
 mod manifest;
 mod mesh;
 mod options;
+mod page_labels;
 mod pair_files;
 mod pair_pictures;
 mod pair_writer;

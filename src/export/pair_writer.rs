@@ -10,7 +10,7 @@ use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
 use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
-use crate::catalog::{MetricRecord, PairResults};
+use crate::catalog::{CutOrigin, MetricRecord, PairResults};
 use crate::domain::{Affine2, Failure, FailureClass};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::store::Project;
@@ -77,6 +77,7 @@ impl PairWriter<'_> {
         &self,
         pair: &PairResults,
         alignment: Option<&ManualAlignmentFields>,
+        origin: Option<&CutOrigin>,
     ) -> Result<Option<WrittenPair>, FolderError> {
         let options = &self.context.options;
         let kept: Vec<_> = pair
@@ -89,6 +90,9 @@ impl PairWriter<'_> {
         }
         let complete = |mut record: PairRecord| {
             record.pair.manual_alignment = alignment.cloned();
+            if let Some(origin) = origin {
+                record.pair.add_origin(origin);
+            }
             record.pair.split = self.plan.and_then(|plan| plan.part(&pair.attributes));
             record
         };

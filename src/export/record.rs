@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::stage_outcomes::StageOutcomes;
-use crate::catalog::{MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
+use crate::catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
 use crate::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
@@ -22,6 +22,17 @@ pub enum RecordStatus {
     Failed,
     /// Not aligned yet.
     Pending,
+}
+
+impl RecordStatus {
+    /// Returns the state of a job.
+    pub(super) const fn of(status: JobStatus) -> Self {
+        match status {
+            JobStatus::Done => Self::Done,
+            JobStatus::Quarantined => Self::Failed,
+            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => Self::Pending,
+        }
+    }
 }
 
 /// Part of a dataset that a pair belongs to.
@@ -66,6 +77,11 @@ pub struct PairFields {
     pub character: Option<String>,
     /// Name of the block that the character belongs to.
     pub block: Option<String>,
+    /// Label of the character in its block, if the pair was cut from the scan of a whole block.
+    pub label: Option<String>,
+    /// Edges of the box on the page: left, top, right, bottom.
+    #[serde(rename = "box")]
+    pub bounds: Option<[f64; 4]>,
     /// Unit of the mesh.
     pub unit: Option<LengthUnit>,
     /// Whether the carved side faces down in the scan.
@@ -112,6 +128,11 @@ pub struct PairFields {
     pub canvas_from_print: Option<Affine2>,
     /// Map (2 x 3) from print pixels to pixels of the exported pictures; the identity unless a canvas was requested.
     pub picture_from_print: Option<Affine2>,
+    /// Map (3 x 3) from print pixels to page pixels, if the pair was cut from a whole block.
+    pub page_from_crop: Option<[[f64; 3]; 3]>,
+    /// Map (3 x 4) near the character: rows 1 and 2 give the page pixel of a point [X, Y, Z, 1] of the scan of the block, row
+    /// 3 its height over the stroke tops.
+    pub page_from_mesh: Option<PrintFromMesh>,
     /// The newest valid manual alignment.
     pub manual_alignment: Option<ManualAlignmentFields>,
     /// BLAKE3 hash of the mesh file.
@@ -284,13 +305,15 @@ impl PairFields {
             id: attributes.name.clone(),
             character: attributes.character.clone(),
             block: attributes.block.clone(),
+            label: None,
+            bounds: None,
             unit: attributes.unit,
             scanned_face_down: attributes.scanned_face_down,
             mesh: attributes.mesh_path.clone(),
             print: attributes.print_path.clone(),
             meta: attributes.meta.clone(),
             split: None,
-            status: status(pair.status),
+            status: RecordStatus::of(pair.status),
             error_class: failure.map(|failure| failure.class),
             error: failure.map(|failure| failure.message.clone()),
             plane_from_mesh: None,
@@ -307,12 +330,22 @@ impl PairFields {
             canvas_px: None,
             canvas_from_print: None,
             picture_from_print: None,
+            page_from_crop: None,
+            page_from_mesh: None,
             manual_alignment: None,
             mesh_hash: fit.map(|record| record.mesh_hash),
             print_hash: normalize.and_then(|record| record.print_hash),
             config_hash: register.map(|record| record.fingerprint_hash),
             seconds: None,
         }
+    }
+
+    /// Adds from where the pair was cut out of its block.
+    pub(super) fn add_origin(&mut self, origin: &CutOrigin) {
+        self.label = Some(origin.label.clone());
+        self.bounds = Some(origin.bounds);
+        self.page_from_crop = origin.maps.map(|maps| maps.page_from_crop);
+        self.page_from_mesh = origin.maps.map(|maps| maps.page_from_mesh);
     }
 
     fn add_result(&mut self, outcomes: &StageOutcomes) {
@@ -407,12 +440,4 @@ impl MetricFields {
 const fn homogeneous(map: &Affine2) -> [[f64; 3]; 3] {
     let [first, second] = map.0;
     [first, second, [0.0, 0.0, 1.0]]
-}
-
-const fn status(status: JobStatus) -> RecordStatus {
-    match status {
-        JobStatus::Done => RecordStatus::Done,
-        JobStatus::Quarantined => RecordStatus::Failed,
-        JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => RecordStatus::Pending,
-    }
 }

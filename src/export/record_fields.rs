@@ -22,10 +22,12 @@ const fn field(name: &'static str, unit: &'static str, frame: &'static str) -> R
 }
 
 /// The fields of a pair, in their order.
-pub(super) const PAIR_FIELDS: [RecordField; 32] = [
+pub(super) const PAIR_FIELDS: [RecordField; 36] = [
     field("id", "", ""),
     field("character", "", ""),
     field("block", "", ""),
+    field("label", "", ""),
+    field("box", "px", "page"),
     field("unit", "", ""),
     field("scanned_face_down", "", ""),
     field("mesh", "", ""),
@@ -49,6 +51,8 @@ pub(super) const PAIR_FIELDS: [RecordField; 32] = [
     field("canvas_px", "px", "canvas"),
     field("canvas_from_print", "px", "print to canvas"),
     field("picture_from_print", "px", "print to pictures"),
+    field("page_from_crop", "px", "print to page"),
+    field("page_from_mesh", "px; mesh unit", "mesh to page and tops"),
     field("manual_alignment", "", ""),
     field("mesh_hash", "", ""),
     field("print_hash", "", ""),
@@ -86,6 +90,23 @@ pub(super) const METRIC_FIELDS: [RecordField; 23] = [
     field("verdict", "", ""),
     field("verdicts", "", ""),
     field("result_hash", "", ""),
+];
+
+/// The fields of a whole block, in their order.
+pub(super) const BLOCK_FIELDS: [RecordField; 13] = [
+    field("block", "", ""),
+    field("mesh", "", ""),
+    field("page", "", ""),
+    field("labels", "", ""),
+    field("unit", "", ""),
+    field("status", "", ""),
+    field("error_class", "", ""),
+    field("error", "", ""),
+    field("side", "", ""),
+    field("accepted", "", ""),
+    field("agreement", "0-1", ""),
+    field("characters", "", ""),
+    field("map", "mesh unit; px", "mesh and page"),
 ];
 
 /// The pictures of a pair.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::pictures::{PrintView, Rgb, eight_bits};
 use crate::catalog::PairResults;
-use crate::domain::{FileKind, Stage, ThresholdMetric};
+use crate::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use crate::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::store::{InputError, InputFile, Project, read_input};
@@ -38,6 +38,11 @@ pub struct SourcePrint {
 }
 
 impl SourcePrint {
+    /// Returns the hash of the file.
+    pub const fn hash(&self) -> ContentHash {
+        self.file.digest.hash
+    }
+
     /// Reads the print of a pair and checks that it has not changed since it was aligned.
     ///
     /// # Errors
@@ -47,11 +52,24 @@ impl SourcePrint {
         pair: &PairResults,
         limits: &ImageLimits,
     ) -> Result<Self, SourcePrintError> {
-        let input = project.input(&pair.attributes.print_path);
-        let path = input.path().to_owned();
-        let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")?;
         let normalized = pair.stage(Stage::Normalize);
         let aligned = normalized.and_then(|record| record.print_hash);
+        Self::read_stored(project, &pair.attributes.print_path, aligned, limits)
+    }
+
+    /// Reads an image by its path in the catalog, and checks that it has the hash of the aligned one, if that is known.
+    ///
+    /// # Errors
+    /// Returns an error if the image cannot be read or decoded, or has changed.
+    pub fn read_stored(
+        project: &Project,
+        path: &str,
+        aligned: Option<ContentHash>,
+        limits: &ImageLimits,
+    ) -> Result<Self, SourcePrintError> {
+        let input = project.input(path);
+        let path = input.path().to_owned();
+        let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")?;
         if aligned.is_some_and(|hash| hash != file.digest.hash) {
             return Err(SourcePrintError::Changed(path));
         }

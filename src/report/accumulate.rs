@@ -184,6 +184,7 @@ impl ReportAccumulator {
                 .filter_map(|(stage, ms)| StageTimes::of(stage, ms))
                 .collect(),
             attention_checks: self.attention_checks,
+            blocks: Vec::new(),
             unusable_truth: self.truth_problems.first,
             provenance: self.provenance.finish(),
         };

@@ -2,29 +2,16 @@
 
 use super::accumulate::ReportAccumulator;
 use super::attention_checks;
+use super::block_accuracy::BlockSums;
 use super::manual_alignment;
 use super::model::Report;
-use super::pair_artifacts::PairArtifactsError;
+use super::report_error::ReportError;
 use super::truth_evaluation::{TruthEvaluation, evaluate_pairs};
-use crate::catalog::{Catalog, CatalogError, PairResults};
+use crate::catalog::{Catalog, PairResults};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
 pub(super) const PAIRS_PER_PAGE: usize = 256;
-
-/// Why no report can be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The catalog cannot be read.
-    #[error("{0}")]
-    Catalog(#[from] CatalogError),
-    /// The result of a pair with a manual alignment cannot be read.
-    #[error(transparent)]
-    Artifacts(#[from] PairArtifactsError),
-    /// The task that evaluates pairs panicked or was cancelled.
-    #[error("comparing with the truth stopped: {0}")]
-    Stopped(#[from] tokio::task::JoinError),
-}
 
 /// Builds the report of a project from the current state of its catalog.
 ///
@@ -50,16 +37,21 @@ pub async fn build_with(
     catalog.verify_checksums().await?;
     let mut report = ReportAccumulator::default();
     report.set_attention_checks(attention_checks::project_rates(catalog).await?);
+    let mut blocks = BlockSums::of_true_boxes(catalog).await?;
     let manual_alignments = catalog.newest_manual_alignments().await?;
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {
         for (pair, truth) in evaluate_pairs(project, page).await? {
             report.add(&pair, &truth);
+            blocks.add(&pair, &truth);
             visit(&pair, &truth);
             if let Some(manual) = manual_alignments.get(&pair.attributes.name) {
                 report.add_manual_errors(&manual_alignment::errors(project, &pair, manual)?);
             }
         }
     }
-    Ok(report.finish())
+    Ok(Report {
+        blocks: blocks.finish(),
+        ..report.finish()
+    })
 }

@@ -6,6 +6,8 @@
 mod accumulate;
 mod adjudication;
 mod attention_checks;
+mod block_accuracy;
+mod box_matching;
 mod build;
 mod comparison;
 pub(crate) mod consensus;
@@ -21,6 +23,7 @@ pub mod pair_artifacts;
 mod provenance;
 pub mod quality_gate;
 mod render;
+mod report_error;
 mod reviewer_agreement;
 mod risk_coverage;
 mod score_bootstrap;
@@ -37,7 +40,8 @@ mod warnings;
 pub use accumulate::ReportAccumulator;
 pub use adjudication::AdjudicationRules;
 pub use attention_checks::AttentionCheckRates;
-pub use build::{ReportError, build, build_with};
+pub use block_accuracy::{BlockAccuracy, BoxAccuracy, PrecisionRecall};
+pub use build::{build, build_with};
 pub use comparison::{Basis, COMPARED_METRICS, Comparison};
 pub use consensus::Consensus;
 pub use fail_reasons::FailReasonCount;
@@ -45,6 +49,7 @@ pub use manual_alignment::{ManualAlignmentErrors, ManualCorrection, ManualErrors
 pub use model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
 pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render};
+pub use report_error::ReportError;
 pub use reviewer_agreement::{
     MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord, VerdictAgreement, agreement,
 };

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::adjudication::AdjudicationRules;
 use super::attention_checks::AttentionCheckRates;
+use super::block_accuracy::BlockAccuracy;
 use super::comparison::{Basis, Comparison};
 use super::fail_reasons::FailReasonCount;
 use super::manual_alignment::ManualAlignmentErrors;
@@ -55,6 +56,9 @@ pub struct Report {
     /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
+    /// Whole blocks whose true boxes are known, by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub blocks: Vec<BlockAccuracy>,
     /// The first pair whose true alignment cannot be used, with the reason.
     #[serde(skip)]
     pub unusable_truth: Option<String>,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::accumulate::ReportAccumulator;
 use super::attention_checks::AttentionCheckRates;
+use super::block_accuracy::{BlockBoxes, BlockSums};
 use super::ground_truth::TruthErrors;
 use super::manual_alignment::ManualErrors;
 use super::model::{MetricRow, Report};
@@ -16,8 +17,8 @@ use crate::catalog::{
 };
 use crate::domain::test_values::metric_outcome;
 use crate::domain::{
-    ContentHash, Failure, FailureClass, JobStatus, PairName, Reason, Stage, ThresholdMetric,
-    Verdict,
+    BlockName, ContentHash, Failure, FailureClass, JobStatus, PairName, Reason, Stage,
+    ThresholdMetric, TrueBox, Verdict,
 };
 
 /// Returns a result with an IoU, and the Dice that follows from it. The reviewers are named `r0`, `r1` and so on.
@@ -203,10 +204,35 @@ pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
     }
 }
 
+/// Returns the boxes of a block with four characters, of which the page shows three whole. Without labels, one of them was
+/// found well, one roughly and one not at all.
+pub(super) fn block_boxes(name: &str, is_found: bool) -> BlockBoxes {
+    let truth = [0.0, 20.0, 40.0, 60.0].map(|left| TrueBox {
+        bounds: [left, 0.0, left + 10.0, 10.0],
+        is_partial: left == 60.0,
+    });
+    let found = vec![
+        [0.0, 0.0, 10.0, 10.0],
+        [20.0, 0.0, 30.0, 6.0],
+        [40.0, 0.0, 50.0, 4.0],
+        [60.0, 0.0, 70.0, 9.0],
+        [90.0, 0.0, 99.0, 10.0],
+    ];
+    BlockBoxes {
+        block: BlockName::new(name).expect("test names are ids"),
+        truth: truth.to_vec(),
+        found: is_found.then_some(found),
+    }
+}
+
 /// Returns a report with something in every field: verdicts, a conflict, ground truth, blocks, confidences, attention
 /// checks, manual alignments, times and failures.
 pub(crate) fn full_report() -> Report {
     let mut report = ReportAccumulator::default();
+    let mut blocks = BlockSums::default();
+    for (block, is_found) in [("block 0", true), ("block 1", false)] {
+        blocks.add_boxes(block_boxes(block, is_found));
+    }
     for i in 0..36_u32 {
         let verdicts: &[Verdict] = match i % 12 {
             0 => &[Verdict::Pass, Verdict::Fail],
@@ -236,6 +262,7 @@ pub(crate) fn full_report() -> Report {
             errors.errors.remove(&ThresholdMetric::Density);
         }
         report.add(&pair, &errors);
+        blocks.add(&pair, &errors);
         if i < 4 {
             let errors = ManualErrors::of(f64::from(2 * i), f64::from(i), 0.5);
             report.add_manual_errors(&ThresholdMetric::ALL.map(|metric| (metric, errors)).into());
@@ -253,5 +280,8 @@ pub(crate) fn full_report() -> Report {
             ("turned", Rate::new(19, 20)),
         ]),
     });
-    report.finish()
+    Report {
+        blocks: blocks.finish(),
+        ..report.finish()
+    }
 }

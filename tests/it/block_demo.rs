@@ -66,6 +66,42 @@ fn block_is_created_once_with_page_labels_and_truth() {
 }
 
 #[test]
+fn the_report_has_the_accuracy_of_found_boxes() {
+    let dir = empty();
+    let args = [
+        "demo",
+        "d",
+        "--block=half-page",
+        "--seed",
+        "5",
+        "--spacing",
+        "0.5",
+        "--no-labels",
+        "--json",
+    ];
+    let report = mocban(dir.path(), &args).expect(0).json();
+    let truth = std::fs::read(dir.path().join("d/data/truth.json")).expect("the truth");
+    let truth: serde_json::Value = serde_json::from_slice(&truth).expect("JSON");
+    let characters = truth["characters"].as_array().expect("characters").iter();
+    let whole = characters.filter(|one| one["on_page"] == true).count();
+    let block = &report["blocks"][0];
+    assert_eq!(block["block"], "block");
+    assert_eq!(block["characters"], whole);
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let [found, right, tight] = ["found", "right", "tight"].map(|name| number(&block[name]));
+    assert!(tight <= right && right <= found, "{block}");
+    assert!(right >= 0.95 * whole as f64, "{block}");
+    let boxes = &block["boxes"];
+    let at = |iou: &str| [&boxes[iou]["precision"], &boxes[iou]["recall"]].map(number);
+    let ([p50, r50], [p70, r70]) = (at("iou_50"), at("iou_70"));
+    assert!(p50.min(r50) > 0.9 && p70 <= p50 && r70 <= r50, "{block}");
+    let matched = number(&boxes["iou_50"]["matched"]);
+    assert_eq!(r50, matched / whole as f64);
+    let text = mocban(dir.path(), &["-C", "d", "report"]).expect(0).out;
+    assert!(text.contains("Block  true  found  right %"), "{text}");
+}
+
+#[test]
 fn directory_of_a_demo_takes_no_other_demo() {
     let dir = empty();
     mocban(dir.path(), &["demo", "d", "--pairs", "1", "--no-run"]).expect(0);

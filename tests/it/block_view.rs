@@ -14,8 +14,8 @@ use crate::page::{Page, send};
 const STROKE_ONLY: [u8; 3] = [213, 94, 0];
 const INK_ONLY: [u8; 3] = [0, 114, 178];
 
-/// Creates a project `p` with a finished block `b1` of six characters.
-fn finished_block(dir: &Path) {
+/// Creates a project `p` with a finished block `b1` of six characters. The truth is in `d/data/truth.json`.
+pub(crate) fn finished_block(dir: &Path) {
     let demo = [
         "demo",
         "d",
@@ -251,4 +251,6 @@ fn a_block_without_alignment_is_refused_in_one_sentence() {
     );
     at(&["contact-sheet", "--overlay"]).expect(2);
     at(&["contact-sheet", "b1", "--block", "b1"]).expect(2);
+    let metric = ["--overlay", "--metric", "relief"];
+    at(&[&["contact-sheet", "--block", "b1"][..], &metric].concat()).expect(2);
 }

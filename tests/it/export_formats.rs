@@ -17,7 +17,7 @@ const FORMATS: &str = "jsonl,csv,parquet,huggingface,webdataset";
 const FIXED_NAMES: &str = "id character block unit mesh print meta metric status error_class error threshold_depth \
     threshold_print angle_deg scale shift_px ssim nl_ssim iou iou_box dice density_print density_depth print_from_mesh \
     plane_from_mesh depth_from_plane print_from_depth files mesh_hash print_hash result_hash config_hash confidence margin \
-    verdict seconds manual_alignment disagreements missing_ink missing_wood";
+    verdict seconds label box page_from_crop page_from_mesh manual_alignment disagreements missing_ink missing_wood";
 
 /// Returns a folder with the finished project `p` of 30 pairs of three blocks.
 fn project() -> tempfile::TempDir {
@@ -109,6 +109,10 @@ fn formats_agree_on_pairs_and_numbers() {
         assert!(rows[0].get(name).is_some(), "pairs.jsonl lacks {name}");
     }
     assert_eq!(rows[0]["meta"]["tier"], "upright");
+    for name in ["label", "box", "page_from_crop", "page_from_mesh"] {
+        assert_eq!(rows[0][name], Value::Null, "{name} of a pair from a list");
+    }
+    assert!(!out.join("jsonl/blocks.jsonl").exists());
 
     let mut table = csv::Reader::from_path(out.join("csv/pairs.csv")).expect("a table");
     let header = table.headers().expect("a header").clone();

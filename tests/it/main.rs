@@ -8,6 +8,7 @@ mod backup;
 mod bit_flips;
 mod block_correction;
 mod block_demo;
+mod block_export;
 mod block_view;
 mod blocks;
 mod browser;

@@ -1,8 +1,10 @@
 //! Rows of the characters of a block.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
-use crate::catalog::blocks::model::{NewCharacter, StoredCharacter};
+use crate::catalog::blocks::model::{CutOrigin, NewCharacter, StoredCharacter};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
@@ -33,6 +35,22 @@ SELECT c.label, c.character, c.box, c.confidence, c.state, c.reason, c.maps, p.n
 FROM block_character AS c JOIN block AS b ON b.id = c.block LEFT JOIN pair AS p ON p.id = c.pair
 WHERE b.name = ?1 ORDER BY c.state = 'retired', c.place, c.label";
 
+const ORIGINS: &str = "
+SELECT p.name, c.label, c.box, c.maps
+FROM pair AS p JOIN block_character AS c ON c.pair = p.id WHERE p.name BETWEEN ?1 AND ?2";
+
+impl FromRow for CutOrigin {
+    fn from_row(row: &Row) -> Result<Self> {
+        let Json(bounds) = row.get("box")?;
+        let maps: Option<Json<_>> = row.get("maps")?;
+        Ok(Self {
+            label: row.get("label")?,
+            bounds,
+            maps: maps.map(|Json(maps)| maps),
+        })
+    }
+}
+
 impl FromRow for StoredCharacter {
     fn from_row(row: &Row) -> Result<Self> {
         let Json(bounds) = row.get("box")?;
@@ -59,6 +77,25 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let list = query_as(LIST).bind(block.as_str());
         list.fetch_all(&mut conn).await
+    }
+
+    /// Returns from where the pairs with a name from `first` to `last` were cut. Leaves out pairs that were not cut from a
+    /// block.
+    ///
+    /// # Errors
+    /// Returns an error if a stored value is invalid or a database operation fails.
+    pub async fn cut_origins_between(
+        &self,
+        first: &PairName,
+        last: &PairName,
+    ) -> Result<BTreeMap<PairName, CutOrigin>> {
+        let mut conn = self.read_conn().await?;
+        let query = query(ORIGINS).bind(first.as_str()).bind(last.as_str());
+        let rows = query.fetch_all(&mut conn).await?;
+        let origins = rows
+            .iter()
+            .map(|row| Ok((row.get("name")?, CutOrigin::from_row(row)?)));
+        origins.collect()
     }
 }
 

@@ -22,7 +22,8 @@ pub struct BlockImportSummary {
 const SELECT: &str =
     "SELECT name, mesh_path, page_path, labels_path, unit, side FROM block WHERE name = ?1";
 
-/// Adds a block or updates it. If a path changed, clears the `stat` of that file, so that the next run reads the file.
+/// Adds a block or updates it. If a path changed, clears the `stat` of that file, so that the next run reads the file. True
+/// boxes belong to one page.
 const UPSERT: &str = "
 INSERT INTO block (name, mesh_path, page_path, labels_path, unit, side, attributes, imported)
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
@@ -30,6 +31,7 @@ ON CONFLICT (name) DO UPDATE SET
     mesh_stat = CASE WHEN block.mesh_path = excluded.mesh_path THEN block.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
     page_stat = CASE WHEN block.page_path = excluded.page_path THEN block.page_stat ELSE '' END, page_path = excluded.page_path,
     labels_stat = CASE WHEN block.labels_path = excluded.labels_path THEN block.labels_stat ELSE '' END,
+    true_boxes = CASE WHEN block.page_path = excluded.page_path THEN block.true_boxes END,
     labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
 RETURNING id";
 

@@ -5,6 +5,7 @@
 //! only under a valid lease, and a lease is valid while the worker's heartbeats are. The last step inserts pairs, which
 //! the queue of pairs then runs.
 
+pub(crate) mod block_results;
 pub(crate) mod characters;
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
@@ -17,3 +18,4 @@ pub(crate) mod records;
 pub(crate) mod recovery;
 pub(crate) mod retired;
 pub(crate) mod staleness;
+pub(crate) mod true_boxes;

@@ -7,7 +7,7 @@ use crate::catalog::db::row::from_row;
 use crate::catalog::queue::lease::InputVersion;
 use crate::domain::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
-    ControlPoints, Failure, LengthUnit, UnixMillis, WorkerId,
+    ControlPoints, Failure, LengthUnit, PrintFromMesh, UnixMillis, WorkerId,
 };
 
 /// Attributes of a block as imported.
@@ -243,6 +243,26 @@ pub struct CutPair {
     pub scanned_face_down: Option<bool>,
     /// The expected alignment, as JSON text.
     pub prior: Option<String>,
+}
+
+/// The maps of a character that was cut.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CharacterMaps {
+    /// Map (3 x 3) from pixels of its print to pixels of the page.
+    pub page_from_crop: [[f64; 3]; 3],
+    /// Map (3 x 4) from points of the scan to pixels of the page, and the height over the tops of the strokes.
+    pub page_from_mesh: PrintFromMesh,
+}
+
+/// From where a pair was cut out of its block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutOrigin {
+    /// The label of the character.
+    pub label: String,
+    /// Edges of its box on the page in pixels: left, top, right, bottom.
+    pub bounds: [f64; 4],
+    /// Its maps.
+    pub maps: Option<CharacterMaps>,
 }
 
 /// A character of a block as stored.

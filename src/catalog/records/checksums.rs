@@ -179,7 +179,7 @@ impl ChecksummedTable {
                 "(SELECT a.pair FROM manual_alignment AS a WHERE a.id = t.alignment)", false),
             Self::Block => statements!("block", "id",
                 "t.name, t.mesh_path, t.page_path, t.labels_path, t.unit, t.side, t.attributes, t.imported, \
-                 t.control_points",
+                 t.true_boxes, t.control_points",
                 "NULL", false),
         }
     }

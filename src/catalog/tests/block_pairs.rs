@@ -5,10 +5,13 @@ use serde_json::json;
 use super::blocks::{attributes, block, character, stored, version, world};
 use super::{World, name};
 use crate::catalog::{
-    BlockAttributes, BlockInputVersions, BlockReason, CheckpointOutcome, CutReply, NewVerdict,
-    ReviewContext,
+    BlockAttributes, BlockInputVersions, BlockReason, CharacterMaps, CheckpointOutcome, CutOrigin,
+    CutReply, NewCharacter, NewVerdict, ReviewContext,
 };
-use crate::domain::{BlockCharacterState, BlockStage, JobStatus, Stage, ThresholdMetric, Verdict};
+use crate::domain::{
+    BlockCharacterState, BlockStage, JobStatus, PrintFromMesh, Stage, ThresholdMetric, TrueBox,
+    Verdict,
+};
 
 #[tokio::test]
 async fn a_finished_block_leaves_pairs_that_run() {
@@ -33,6 +36,70 @@ async fn a_finished_block_leaves_pairs_that_run() {
     assert!(world.claim_block(world.worker).await.is_none());
     assert_eq!(world.claim(9).await.len(), 2);
     assert_eq!(world.requeue_blocks([1; 4]).await, []);
+}
+
+#[tokio::test]
+async fn pairs_know_from_where_they_were_cut() {
+    let world = world().await;
+    let others = ["a", "b_c01-r015", "b_z", "ba", "c_c01-r01"].map(super::row);
+    let others = world.catalog.import(others.to_vec(), 1).await;
+    assert_eq!(others.expect("imported").added, 5);
+    let maps = CharacterMaps {
+        page_from_crop: [[1.0, 0.0, 7.0], [0.0, 1.0, 9.0], [0.0, 0.0, 1.0]],
+        page_from_mesh: PrintFromMesh([[2.0; 4]; 3]),
+    };
+    let cut = ["c01-r01", "c01-r02", "c01-r03"].map(|label| NewCharacter {
+        maps: serde_json::to_value(maps).ok(),
+        ..character(label, label)
+    });
+    world.finish_block(cut.to_vec()).await;
+    let [first, last] = ["b_c01-r01", "b_c01-r02"].map(name);
+    let origins = world.catalog.cut_origins_between(&first, &last);
+    let origins = origins.await.expect("a read");
+    let names: Vec<_> = origins.keys().cloned().collect();
+    assert_eq!(names, [first.clone(), last]);
+    let expected = CutOrigin {
+        label: "c01-r01".to_owned(),
+        bounds: [1.0, 2.0, 30.5, 40.25],
+        maps: Some(maps),
+    };
+    assert_eq!(origins[&first], expected);
+    let found = world.catalog.pairs_of_block(&block("b")).await;
+    let found = found.expect("a read").into_iter();
+    let found: Vec<_> = found.map(|pair| pair.attributes.name).collect();
+    let cut = ["b_c01-r01", "b_c01-r02", "b_c01-r03"];
+    assert_eq!(found, cut.map(name));
+}
+
+#[tokio::test]
+async fn true_boxes_stay_until_the_block_gets_another_page() {
+    let world = world().await;
+    let boxes = [1.0, 2.5].map(|left| TrueBox {
+        bounds: [left, 0.0, 9.0, 9.5],
+        is_partial: left > 2.0,
+    });
+    let set = async |block| {
+        let set = world.catalog.set_true_boxes(block, boxes.to_vec());
+        set.await.expect("stored")
+    };
+    assert!(set(block("b")).await);
+    assert!(!set(block("of nobody")).await);
+    let stored = async || world.catalog.true_boxes().await.expect("a read");
+    assert_eq!(stored().await, [(block("b"), boxes.to_vec())]);
+    let other_labels = BlockAttributes {
+        labels_path: None,
+        ..attributes("b")
+    };
+    world.import_block(other_labels).await;
+    assert_eq!(stored().await.len(), 1);
+    assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
+    let other_page = BlockAttributes {
+        page_path: "other.png".to_owned(),
+        ..attributes("b")
+    };
+    world.import_block(other_page).await;
+    assert_eq!(stored().await, []);
+    assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
 }
 
 #[tokio::test]

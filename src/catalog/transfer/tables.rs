@@ -183,8 +183,9 @@ pub(super) const TABLES: [CopyTable; 23] = [
         "low_confidence",
         "at"
     ),
-    table!("block", 16, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "attributes", "mesh_hash",
-        "mesh_stat", "page_hash", "page_stat", "labels_hash", "labels_stat", "imported", "control_points"; numbered),
+    table!("block", 17, "id", "name", "mesh_path", "page_path", "labels_path", "unit", "side", "attributes", "mesh_hash",
+        "mesh_stat", "page_hash", "page_stat", "labels_hash", "labels_stat", "imported", "true_boxes",
+        "control_points"; numbered),
     table!(
         "block_job",
         14,

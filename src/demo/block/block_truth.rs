@@ -10,7 +10,7 @@ use super::solid::BlockSolid;
 use super::text_cell::TextCell;
 use super::true_map::TruePageMap;
 use crate::demo::polygon::BoundsMm;
-use crate::domain::LengthUnit;
+use crate::domain::{LengthUnit, TrueBox};
 
 /// Number of landmarks of a character.
 const LANDMARKS: usize = 12;
@@ -116,6 +116,19 @@ pub struct BlockLandmark {
     pub mesh: [f64; 3],
     /// The same point on the page, pixels; may lie outside the image. `null` if the page does not belong to the block.
     pub page: Option<[f64; 2]>,
+}
+
+impl BlockTruth {
+    /// Returns the boxes of the characters on the page.
+    pub fn true_boxes(&self) -> Vec<TrueBox> {
+        let shown = self.characters.iter().filter_map(|character| {
+            Some(TrueBox {
+                bounds: character.box_px?,
+                is_partial: !character.on_page,
+            })
+        });
+        shown.collect()
+    }
 }
 
 /// The side of which truth is recorded, and the map to its page if the page belongs to it.

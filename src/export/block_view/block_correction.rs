@@ -4,9 +4,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
-use super::block_files::{PagePicture, read_face};
 use super::page_layers::{PageRegion, jpeg, overlay, relief};
-use super::page_view::{not_aligned, outcome};
+use super::page_picture::PagePicture;
+use super::page_view::not_aligned;
+use super::registered_face::{outcome, read_face, unusable};
 use crate::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
 };
@@ -121,12 +122,9 @@ impl BlockCorrection {
         let Some(stored) = stage(BlockStage::Face) else {
             return Err(not_aligned(&name, detail));
         };
-        let unusable = |why: serde_json::Error| BlockViewError::Outcome {
-            stage: BlockStage::Face,
-            why: why.to_string(),
-        };
+        let invalid = |why: serde_json::Error| unusable(BlockStage::Face, &why.to_string());
         let files = serde_json::from_value::<ArtifactSet>(stored.files.clone());
-        let files = files.map_err(unusable)?;
+        let files = files.map_err(invalid)?;
         let mesh = serde_json::from_value(stored.made_with["mesh"].clone());
         let aligned = match stage(BlockStage::Align) {
             Some(align) => Some(outcome::<AlignOutcome>(align)?.side),
@@ -141,7 +139,7 @@ impl BlockCorrection {
         Ok(Self {
             faces: faces.collect::<Result<_, BlockViewError>>()?,
             page: PagePicture::read(project, page_path, None, limits)?,
-            mesh_hash: mesh.map_err(unusable)?,
+            mesh_hash: mesh.map_err(invalid)?,
             saved: detail.state.control_points.clone(),
             aligned,
             failure: (detail.state.failure.as_ref()).map(|stored| stored.failure.message.clone()),

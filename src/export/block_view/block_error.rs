@@ -2,7 +2,7 @@
 
 use crate::block::BlockError;
 use crate::catalog::CatalogError;
-use crate::domain::{BlockName, BlockStage};
+use crate::domain::{BlockName, BlockStage, ThresholdMetric};
 use crate::export::source_print::SourcePrintError;
 use crate::raster::PngError;
 use crate::store;
@@ -23,6 +23,16 @@ pub enum BlockViewError {
         block: BlockName,
         /// The failure, or what to do.
         why: String,
+    },
+    /// No character has a result of the metric that was asked for.
+    #[error(
+        "no character of block {block} has a result of {metric}, so there is nothing to show; leave --metric out"
+    )]
+    NoResult {
+        /// Which block.
+        block: BlockName,
+        /// Which metric.
+        metric: ThresholdMetric,
     },
     /// A stored outcome has another form.
     #[error("the stored result of {stage} cannot be read: {why}; run the block again")]

@@ -109,7 +109,7 @@ fn boxes_legend(block: &str, characters: &[CharacterView]) -> PictureLegend {
 #[cfg(test)]
 mod tests {
     use super::{boxes_legend, marked, scale};
-    use crate::domain::{BlockCharacterState, ThresholdMetric};
+    use crate::domain::BlockCharacterState;
     use crate::export::block_view::characters::tests::stored;
     use crate::export::block_view::page_layers::tests::ridges;
     use crate::export::block_view::{CharacterStatus, CharacterView};
@@ -121,10 +121,9 @@ mod tests {
         let one = stored("c1", bounds, BlockCharacterState::Cut);
         let mut left = stored("c2", bounds, BlockCharacterState::Left);
         left.confidence = Some(0.3);
-        let metric = ThresholdMetric::DEFAULT;
         vec![
-            CharacterView::new(&one, Some(&done), metric),
-            CharacterView::new(&left, None, metric),
+            CharacterView::new(&one, Some(&done), None),
+            CharacterView::new(&left, None, None),
         ]
     }
 

@@ -99,8 +99,6 @@ pub struct CharacterView {
     pub label: String,
     /// The character, if the labels name it.
     pub character: Option<String>,
-    /// Id of its pair.
-    pub pair: Option<String>,
     /// Edges of its box on the page in pixels: left, top, right, bottom.
     #[serde(rename = "box")]
     pub bounds: [f64; 4],
@@ -119,11 +117,11 @@ pub struct CharacterView {
 }
 
 impl CharacterView {
-    /// Describes a character. `pair` is its pair with the results, if it was cut.
+    /// Describes a character. `pair` is its pair with the results, if it was cut; see [`shown_record`].
     pub(super) fn new(
         stored: &StoredCharacter,
         pair: Option<&PairResults>,
-        metric: ThresholdMetric,
+        metric: Option<ThresholdMetric>,
     ) -> Self {
         let record = pair.and_then(|pair| shown_record(pair, metric));
         let failure = pair.and_then(|pair| pair.failure.as_ref());
@@ -131,7 +129,6 @@ impl CharacterView {
         Self {
             label: stored.label.clone(),
             character: stored.character.clone(),
-            pair: stored.pair.clone(),
             bounds: stored.bounds,
             position_confidence: stored.confidence,
             status: status(stored, pair, record),
@@ -143,9 +140,16 @@ impl CharacterView {
     }
 }
 
-/// Returns the result of a metric, or else the first one that the pair has.
-pub(super) fn shown_record(pair: &PairResults, metric: ThresholdMetric) -> Option<&MetricRecord> {
-    pair.metric(metric).or_else(|| pair.metrics.first())
+/// Returns the result of a metric. Without one, returns that of the default metric, or else the first that the pair has.
+pub(super) fn shown_record(
+    pair: &PairResults,
+    metric: Option<ThresholdMetric>,
+) -> Option<&MetricRecord> {
+    if let Some(metric) = metric {
+        return pair.metric(metric);
+    }
+    let default = pair.metric(ThresholdMetric::DEFAULT);
+    default.or_else(|| pair.metrics.first())
 }
 
 fn status(
@@ -192,7 +196,21 @@ pub(super) mod tests {
 
     fn status(state: BlockCharacterState, pair: Option<&PairResults>) -> CharacterView {
         let stored = stored("c1", [0.0, 0.0, 9.0, 9.0], state);
-        CharacterView::new(&stored, pair, ThresholdMetric::DEFAULT)
+        CharacterView::new(&stored, pair, None)
+    }
+
+    #[test]
+    fn a_metric_that_is_asked_for_is_not_replaced_by_another() {
+        let stored = stored("c1", [0.0, 0.0, 9.0, 9.0], BlockCharacterState::Cut);
+        let by_paper = test_fixtures::done_by_paper("b_c1", 0.8, &[]);
+        let status = |metric| CharacterView::new(&stored, Some(&by_paper), metric).status;
+        let relief = Some(ThresholdMetric::Relief);
+        assert_eq!(status(relief), CharacterStatus::Waiting);
+        assert_eq!(status(None), CharacterStatus::Done);
+        let mut only_first = by_paper.clone();
+        only_first.metrics.truncate(1);
+        let shown = CharacterView::new(&stored, Some(&only_first), None);
+        assert_eq!(shown.status, CharacterStatus::Done);
     }
 
     #[test]

@@ -3,14 +3,16 @@
 
 mod block_correction;
 mod block_error;
-mod block_files;
 mod block_sheets;
 mod characters;
 mod page_layers;
+mod page_picture;
 mod page_view;
+mod registered_face;
 
 pub use block_correction::{BlockCorrection, CorrectionError, PicturePoint, TriedAlignment};
 pub use block_error::BlockViewError;
 pub use characters::{CharacterStatus, CharacterView};
 pub use page_layers::{PageLayer, PageLayers, PageRegion};
 pub use page_view::BlockView;
+pub(super) use registered_face::RegisteredFace;

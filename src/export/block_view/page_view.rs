@@ -1,17 +1,16 @@
 //! Reads a block with its results, so that it can be shown.
 
-use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
 use super::block_error::BlockViewError;
-use super::block_files::{PagePicture, read_face};
 use super::characters::{CharacterView, shown_record};
 use super::page_layers::PageLayers;
-use crate::block::{AlignOutcome, BoxesOutcome, FaceOutcome, FoundFace, PageMap, StoredPageMap};
-use crate::catalog::{BlockDetail, BlockStageDetail, Catalog, PairResults};
-use crate::domain::{
-    ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, PairName, ThresholdMetric,
-};
+use super::page_picture::PagePicture;
+use super::registered_face::RegisteredFace;
+use crate::catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
+use crate::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
 use crate::export::pair_pictures::{InputFileLimits, PictureError};
 use crate::export::scan_view::ScanView;
 use crate::raster::ImageLimits;
@@ -29,50 +28,48 @@ pub struct BlockView {
     /// Share of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     pairs: Vec<Option<PairResults>>,
-    metric: ThresholdMetric,
+    metric: Option<ThresholdMetric>,
     limits: InputFileLimits,
     project: Project,
 }
 
-/// Outcomes of the stages of a block, and where its heights and its page are.
-struct BlockViewSources {
-    face: FoundFace,
-    files: ArtifactSet,
-    map: StoredPageMap,
-    agreement: f64,
-    page_path: String,
-    page_hash: Option<ContentHash>,
-}
-
 impl BlockView {
-    /// Reads a block with the results of a metric.
+    /// Reads a block with the results of a metric, or of the default one if `metric` is `None`.
     ///
     /// # Errors
-    /// Returns an error if the block is not aligned with its page, or if the catalog, the page or the heights cannot be read.
+    /// Returns an error if the block is not aligned with its page, if no character has a result of the metric that was asked
+    /// for, or if the catalog, the page or the heights cannot be read.
     pub async fn read(
         catalog: &Catalog,
         project: &Project,
         name: &BlockName,
-        metric: ThresholdMetric,
+        metric: Option<ThresholdMetric>,
         limits: InputFileLimits,
     ) -> Result<Self, BlockViewError> {
         let detail = catalog.block(name).await?;
         let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
-        let sources = BlockViewSources::new(name, &detail)?;
-        let (mut characters, mut pairs) = (Vec::new(), Vec::new());
-        for stored in catalog.block_characters(name).await? {
-            if stored.state == BlockCharacterState::Retired {
-                continue;
-            }
-            let pair = match stored.pair.as_deref().map(PairName::new) {
-                Some(Ok(pair)) => catalog.pair(&pair).await?.map(|detail| detail.results),
-                _ => None,
-            };
-            characters.push(CharacterView::new(&stored, pair.as_ref(), metric));
-            pairs.push(pair);
+        let registered = RegisteredFace::of(&detail)?.ok_or_else(|| not_aligned(name, &detail))?;
+        let characters = catalog.block_characters(name).await?;
+        let is_on_page = |one: &StoredCharacter| one.state != BlockCharacterState::Retired;
+        let characters: Vec<StoredCharacter> = characters.into_iter().filter(is_on_page).collect();
+        let pairs = pairs_of(catalog, name, &characters).await?;
+        let has_metric = |metric| {
+            pairs
+                .iter()
+                .flatten()
+                .any(|pair| pair.metric(metric).is_some())
+        };
+        if let Some(metric) = metric.filter(|metric| !has_metric(*metric)) {
+            let block = name.clone();
+            return Err(BlockViewError::NoResult { block, metric });
         }
-        let (agreement, own) = (sources.agreement, project.clone());
-        let read = move || sources.read(&own, &limits.image);
+        let shown = characters.iter().zip(&pairs);
+        let characters = shown
+            .map(|(stored, pair)| CharacterView::new(stored, pair.as_ref(), metric))
+            .collect();
+        let agreement = registered.agreement;
+        let (page_path, own) = (detail.state.attributes.page_path, project.clone());
+        let read = move || read_layers(&registered, &page_path, &own, &limits.image);
         Ok(Self {
             name: name.clone(),
             layers: tokio::task::spawn_blocking(read).await??,
@@ -90,7 +87,6 @@ impl BlockView {
         json!({
             "block": self.name,
             "page_size": self.layers.size(),
-            "px_per_mm": self.layers.px_per_mm(),
             "agreement": self.agreement,
             "characters": self.characters,
         })
@@ -112,50 +108,36 @@ impl BlockView {
     }
 }
 
-impl BlockViewSources {
-    /// Collects the outcomes of a block.
-    fn new(name: &BlockName, detail: &BlockDetail) -> Result<Self, BlockViewError> {
-        let stage = |stage| detail.stages.iter().find(|one| one.stage == stage);
-        let (Some(face), Some(align)) = (stage(BlockStage::Face), stage(BlockStage::Align)) else {
-            return Err(not_aligned(name, detail));
-        };
-        let faces: FaceOutcome = outcome(face)?;
-        let aligned: AlignOutcome = outcome(align)?;
-        let unusable = |why: &str| BlockViewError::Outcome {
-            stage: BlockStage::Face,
-            why: why.to_owned(),
-        };
-        let mut found = faces.faces.into_iter();
-        let shown = found.find(|face| face.side == aligned.side);
-        let map = match stage(BlockStage::Boxes) {
-            Some(boxes) => outcome::<BoxesOutcome>(boxes)?.page_from_face,
-            None => aligned.page_from_face,
-        };
-        let made_with = align.made_with["page"].clone();
-        Ok(Self {
-            face: shown.ok_or_else(|| unusable("it has no face on the aligned side"))?,
-            files: serde_json::from_value(face.files.clone())
-                .map_err(|error| unusable(&error.to_string()))?,
-            map,
-            agreement: aligned.agreement.agreeing,
-            page_path: detail.state.attributes.page_path.clone(),
-            page_hash: serde_json::from_value(made_with).unwrap_or_default(),
-        })
-    }
+/// Returns the pair of each character with its results; `None` for characters without a pair in the queue.
+async fn pairs_of(
+    catalog: &Catalog,
+    block: &BlockName,
+    characters: &[StoredCharacter],
+) -> Result<Vec<Option<PairResults>>, BlockViewError> {
+    let name = |one: &StoredCharacter| PairName::new(one.pair.as_deref()?).ok();
+    let names = characters.iter().map(name);
+    let found = catalog.pairs_of_block(block).await?.into_iter();
+    let mut by_name: BTreeMap<PairName, PairResults> = found
+        .map(|pair| (pair.attributes.name.clone(), pair))
+        .collect();
+    let pairs = names.map(|name| by_name.remove(&name?));
+    Ok(pairs.collect())
+}
 
-    /// Reads the page and the heights.
-    fn read(self, project: &Project, limits: &ImageLimits) -> Result<PageLayers, BlockViewError> {
-        let page = PagePicture::read(project, &self.page_path, self.page_hash, limits)?;
-        Ok(PageLayers {
-            page: page.picture,
-            ink: page.ink,
-            face: read_face(project, &self.files, &self.face)?,
-            map: PageMap::try_from(self.map).map_err(|why| BlockViewError::Outcome {
-                stage: BlockStage::Align,
-                why,
-            })?,
-        })
-    }
+/// Reads the page and the heights of a block.
+fn read_layers(
+    registered: &RegisteredFace,
+    page_path: &str,
+    project: &Project,
+    limits: &ImageLimits,
+) -> Result<PageLayers, BlockViewError> {
+    let page = PagePicture::read(project, page_path, registered.page_hash, limits)?;
+    Ok(PageLayers {
+        page: page.picture,
+        ink: page.ink,
+        face: registered.read_face(project)?,
+        map: registered.map()?,
+    })
 }
 
 /// Returns the error of a block without alignment, with its failure or what to do.
@@ -168,11 +150,4 @@ pub(super) fn not_aligned(name: &BlockName, detail: &BlockDetail) -> BlockViewEr
         block: name.clone(),
         why,
     }
-}
-
-pub(super) fn outcome<T: DeserializeOwned>(stage: &BlockStageDetail) -> Result<T, BlockViewError> {
-    T::deserialize(&stage.outcome).map_err(|error| BlockViewError::Outcome {
-        stage: stage.stage,
-        why: error.to_string(),
-    })
 }

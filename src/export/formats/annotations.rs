@@ -12,6 +12,7 @@ use crate::export::export_folder::{FolderError, SharedFile};
 use crate::export::format_writer::{
     EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView,
 };
+use crate::export::page_labels::PAGE_FILES;
 use crate::export::pair_pictures::{PairPictures, PictureError};
 use crate::export::record::{PairRecord, SplitName};
 
@@ -30,6 +31,10 @@ a box [x, y, width, height] begins at the corner of its first pixel. Masks are r
 counts, which `pycocotools` and all tools built on it read. `pair` names the pair, and `attributes` holds block,
 verdict, confidence and more; `pairs.jsonl` holds its complete record. Pairs without a result have a line there, but no
 annotation.
+
+`pages` has the images that whole blocks were printed as, each with the boxes of all its characters, also of those that
+were not cut. Open `pages/BLOCK.json` as a project in VIA 2 to correct them, and give the corrected file to `import --block`
+as `--labels`.
 
 `via.json` opens in VIA 2 (Annotation > Import Annotations from JSON) after the images were added.
 
@@ -203,6 +208,7 @@ impl FormatWriter for AnnotationWriter {
             "images/ID.EXT",
             "the prints, upright; a page has the id of the first of its pairs",
         ]);
+        files.extend(PAGE_FILES);
         let purpose = "Strokes of carved blocks as annotations of their prints.";
         self.results.guide(purpose, &files, USAGE)
     }

@@ -19,11 +19,14 @@ const TABLE: &str = "pairs.csv";
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// Fixed lengths of the lists that become one column per element.
-const LISTS: [(&str, &[usize]); 9] = [
+const LISTS: [(&str, &[usize]); 12] = [
+    ("box", &[4]),
     ("plane_from_mesh", &[4, 4]),
     ("depth_from_plane", &[2, 3]),
     ("canvas_from_print", &[2, 3]),
     ("picture_from_print", &[2, 3]),
+    ("page_from_crop", &[3, 3]),
+    ("page_from_mesh", &[3, 4]),
     ("depth_size_px", &[2]),
     ("curvature", &[6]),
     ("shift_px", &[2]),

@@ -5,6 +5,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::export::block_lines::{BLOCKS_FILE, fields_table};
 use crate::export::export_folder::{FolderError, SharedFile};
 use crate::export::export_logs::{LOG_FILES, json_lines};
 use crate::export::format_writer::{
@@ -102,6 +103,7 @@ impl FormatWriter for JsonlWriter {
             ],
         ];
         files.extend(LOG_FILES);
+        files.push(BLOCKS_FILE);
         let tables = [
             ("Fields of a line", &PAIR_FIELDS[..]),
             ("", &METRIC_FIELDS[..]),
@@ -111,7 +113,7 @@ impl FormatWriter for JsonlWriter {
             purpose: "Pairs of block scans and prints, aligned: one line per pair and metric, with masks and depth maps as PNG files.".to_owned(),
             files: files.iter().map(|pair| pair.map(str::to_owned)).collect(),
             usage: "```python\nimport json\nlines = [json.loads(line) for line in open(\"pairs.jsonl\", encoding=\"utf-8\")]\n```".to_owned(),
-            fields: markdown_table(&schema, &tables),
+            fields: format!("{}\n{}", markdown_table(&schema, &tables), fields_table()),
             schema: Some(schema),
             ..FormatGuide::default()
         }

@@ -1,6 +1,7 @@
 //! The formats of a report.
 
 mod agreement_text;
+mod block_table;
 mod code_spans;
 mod comparison_tables;
 mod csv;

@@ -1,5 +1,6 @@
 //! The tables of a report, in their order.
 
+use super::block_table::blocks;
 use super::comparison_tables::mean_intervals;
 use super::table::Table;
 use crate::domain::Reason;
@@ -20,6 +21,7 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
         fail_reasons(report),
         attention_checks(report),
         report.has_truth().then(|| truth(report)),
+        blocks(report),
         manual_alignments(report),
         thresholds(report),
         times(report),

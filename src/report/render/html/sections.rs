@@ -9,6 +9,7 @@ use crate::domain::one_line;
 use crate::report::comparison::Basis;
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
+use crate::report::render::block_table::blocks;
 use crate::report::render::comparison_tables::{
     comparison_sentences, comparisons, mean_intervals, score_comparisons,
 };
@@ -119,7 +120,10 @@ fn verdicts(report: &Report) -> Option<Markup> {
 }
 
 fn truth(report: &Report) -> Option<Markup> {
-    report.has_truth().then(|| table(&tables::truth(report)))
+    let of_blocks = blocks(report);
+    let pairs = report.has_truth().then(|| tables::truth(report));
+    let is_any = pairs.is_some() || of_blocks.is_some();
+    is_any.then(|| tables_of(pairs.into_iter().chain(of_blocks)))
 }
 
 fn tests(report: &Report) -> Option<Markup> {

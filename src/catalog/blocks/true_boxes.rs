@@ -1,0 +1,47 @@
+//! Boxes on the pages of blocks that are known to be right, where a dataset has them.
+
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::value::Json;
+use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::{Catalog, Result};
+use crate::domain::{BlockName, TrueBox};
+
+const SET: &str = "UPDATE block SET true_boxes = ?2 WHERE name = ?1 RETURNING id";
+
+const ALL: &str = "SELECT name, true_boxes FROM block WHERE true_boxes IS NOT NULL ORDER BY name";
+
+impl Catalog {
+    /// Stores the true boxes of a block, replacing earlier ones. Returns `false` if there is no such block.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn set_true_boxes(&self, block: BlockName, boxes: Vec<TrueBox>) -> Result<bool> {
+        self.in_transaction(move |conn| Box::pin(async move { set(conn, &block, &boxes).await }))
+            .await
+    }
+
+    /// Returns the blocks that have true boxes, sorted by name.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn true_boxes(&self) -> Result<Vec<(BlockName, Vec<TrueBox>)>> {
+        let mut conn = self.read_conn().await?;
+        let rows = query(ALL).fetch_all(&mut conn).await?;
+        let blocks = rows.iter().map(|row| {
+            let Json(boxes) = row.get("true_boxes")?;
+            Ok((row.get("name")?, boxes))
+        });
+        blocks.collect()
+    }
+}
+
+async fn set(conn: &mut Conn, block: &BlockName, boxes: &[TrueBox]) -> Result<bool> {
+    let set = query_scalar(SET).bind(block.as_str());
+    let set = set.bind(serde_json::to_string(boxes)?);
+    let id: Option<i64> = set.fetch_optional(&mut *conn).await?;
+    if let Some(id) = id {
+        checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+    }
+    Ok(id.is_some())
+}

@@ -1,0 +1,36 @@
+//! The image of a page, decoded, with its ink.
+
+use super::block_error::BlockViewError;
+use crate::block::PageInk;
+use crate::domain::ContentHash;
+use crate::export::pictures::{Rgb, eight_bits};
+use crate::export::source_print::SourcePrint;
+use crate::raster::ImageLimits;
+use crate::store::Project;
+
+/// The image of a page.
+#[derive(Debug)]
+pub(super) struct PagePicture {
+    pub(super) hash: ContentHash,
+    pub(super) picture: Rgb,
+    pub(super) ink: PageInk,
+}
+
+impl PagePicture {
+    /// Reads a page. `aligned` is the hash of the file that was aligned, if it must be the same.
+    pub(super) fn read(
+        project: &Project,
+        stored_path: &str,
+        aligned: Option<ContentHash>,
+        limits: &ImageLimits,
+    ) -> Result<Self, BlockViewError> {
+        let source = SourcePrint::read_stored(project, stored_path, aligned, limits)?;
+        let hash = source.hash();
+        let image = source.picture;
+        Ok(Self {
+            hash,
+            ink: PageInk::of(&image)?,
+            picture: eight_bits(&image),
+        })
+    }
+}

@@ -1,0 +1,18 @@
+//! Why no report can be made.
+
+use super::pair_artifacts::PairArtifactsError;
+use crate::catalog::CatalogError;
+
+/// Why no report can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The catalog cannot be read.
+    #[error("{0}")]
+    Catalog(#[from] CatalogError),
+    /// The result of a pair with a manual alignment cannot be read.
+    #[error(transparent)]
+    Artifacts(#[from] PairArtifactsError),
+    /// The task that evaluates pairs panicked or was cancelled.
+    #[error("comparing with the truth stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
