@@ -6,7 +6,7 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
-use super::table::count;
+use super::table::pairs_and_blocks;
 use crate::catalog::{BlockRetry, Catalog, RetrySelection};
 use crate::domain::FailureClass;
 
@@ -35,10 +35,8 @@ pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
         json["blocks"] = blocks.into();
     }
     context.print_json(&json)?;
-    let numbers = [(retried, "pair"), (blocks, "block")].into_iter();
-    let numbers = numbers.filter(|(number, _)| *number > 0);
-    let numbers: Vec<String> = numbers.map(|(number, what)| count(number, what)).collect();
-    context.info(&format!("{} will run again", numbers.join(" and ")));
+    let numbers = pairs_and_blocks(retried, blocks);
+    context.info(&format!("{numbers} will run again"));
     context.next("run");
     Ok(ExitCode::Done)
 }

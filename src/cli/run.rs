@@ -11,7 +11,7 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::metrics::{self, MetricsServer};
 use super::progress::ProgressReporter;
-use super::table::{columns, count};
+use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
 use super::{select, signals};
 use crate::catalog::{BlockPlanEntry, Catalog, Plan, RerunPolicy};
@@ -28,8 +28,8 @@ pub(super) struct RunArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs processed at the same time, such as 4G or 512M, estimated from the file sizes of meshes and
-    /// the image sizes of prints; a pair that needs more runs alone [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M, estimated from the file sizes of
+    /// meshes and the image sizes of prints and pages; one that needs more runs alone [default: most of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
     /// Print what would run and why, without running it
@@ -38,7 +38,7 @@ pub(super) struct RunArgs {
     /// Join a run in another process as additional workers
     #[arg(long)]
     pub(super) join: bool,
-    /// Stop after this many pairs have failed
+    /// Stop after this many pairs and blocks have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
     /// Also run these pairs again: failed, stale (settings or files changed, which every run includes) or all
@@ -225,7 +225,7 @@ fn pair_headline(summary: &RunSummary) -> String {
         return format!("stopped after {took}: {done} done, {left} left; the state is safe");
     }
     if summary.too_many_failures {
-        let failed = count(summary.failed, "pair");
+        let failed = pairs_and_blocks(summary.failed, summary.blocks.failed);
         return format!(
             "stopped after {took} because {failed} failed in this run: {done} done, {left} left"
         );

@@ -31,10 +31,10 @@ pub(super) struct WorkerArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs processed at the same time, such as 4G or 512M [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M [default: most of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = run::bytes)]
     pub(super) memory: Option<u64>,
-    /// Stop after this many pairs have failed
+    /// Stop after this many pairs and blocks have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
     /// Run only this stage and earlier ones

@@ -25,14 +25,8 @@ use crate::failpoint::{self, Point};
 /// Times that a stage may find the result of an earlier stage unusable before the block fails.
 const MAX_RERUNS: usize = 4;
 
-/// What a block's task reports at its end.
-#[derive(Debug)]
-pub(super) struct BlockReport {
-    /// How it ended, or the error that ends the run.
-    pub(super) end: Result<BlockEnd, RunError>,
-    /// Number of pairs that were added or run again.
-    pub(super) pairs: u64,
-}
+/// How a block's task ended, or the error that ends the run.
+pub(super) type BlockReport = Result<BlockEnd, RunError>;
 
 /// Runs the remaining stages of a leased block.
 pub(super) async fn process_block(
@@ -53,8 +47,7 @@ pub(super) async fn process_block(
     });
     loop {
         if context.is_draining() {
-            let end = release(&context, block.lease).await;
-            return BlockReport { end, pairs: 0 };
+            return release(&context, block.lease).await;
         }
         let after = match run_stage(&context, &mut block, stage).await {
             Ok(computed) => store_stage(&context, block, stage, computed).await,
@@ -71,25 +64,13 @@ pub(super) async fn process_block(
                 store_failure(&context, block, stage, error, ms).await
             }
             Err(Interruption::Stopped) => {
-                let end = release(&context, block.lease).await;
-                return BlockReport { end, pairs: 0 };
+                return release(&context, block.lease).await;
             }
             Err(Interruption::Run(error)) => Err(error),
         };
-        match after {
-            Ok(AfterStage::Continue(next, at)) => (block, stage) = (next, at),
-            Ok(AfterStage::End(end, pairs)) => {
-                return BlockReport {
-                    end: Ok(end),
-                    pairs,
-                };
-            }
-            Err(error) => {
-                return BlockReport {
-                    end: Err(error),
-                    pairs: 0,
-                };
-            }
+        match after? {
+            AfterStage::Continue(next, at) => (block, stage) = (next, at),
+            AfterStage::End(end) => return Ok(end),
         }
     }
 }

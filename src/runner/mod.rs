@@ -9,6 +9,7 @@
 mod block_artifacts;
 mod block_checkpoint;
 mod block_inputs;
+mod block_memory;
 mod block_pipeline;
 mod block_plan;
 mod block_progress;

@@ -12,14 +12,14 @@ use crate::{mesh, raster};
 pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
-    /// Memory limit in bytes for all pairs computed at the same time. A pair's memory is estimated from its mesh's file
-    /// size and its print's pixel count. A pair that exceeds the limit runs alone. `None` means no limit.
+    /// Memory limit in bytes for a block and all pairs computed at the same time. Their memory is estimated from the file
+    /// size of the mesh and the pixel count of print or page. One that exceeds the limit runs alone. `None` means no limit.
     pub memory: Option<u64>,
     /// What to do besides computing.
     pub part: RunPart,
     /// Join a run in progress in another process.
     pub join: bool,
-    /// Start no more pairs after this many have failed.
+    /// Start nothing more after this many pairs and blocks have failed.
     pub max_failures: Option<u64>,
     /// Only these pairs; `None` for all.
     pub pairs: Option<Vec<PairName>>,

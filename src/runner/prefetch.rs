@@ -17,7 +17,7 @@ use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWork};
-use crate::domain::{PairName, Stage, WaitReason, WorkerId};
+use crate::domain::{BlockName, PairName, Stage, WaitReason, WorkerId};
 use crate::raster;
 use crate::store::Project;
 
@@ -50,6 +50,8 @@ pub(super) struct Prefetch {
     next_slot: SlotId,
     durations: DurationEstimate,
     memory: MemoryBudget,
+    /// Memory that is reserved for the block in progress, in bytes.
+    block_bytes: u64,
     /// The next pair needs memory that a running pair has to return first.
     waits_for_memory: bool,
     /// A pair is running that no other may run beside.
@@ -91,6 +93,7 @@ impl Prefetch {
             next_slot: SlotId(0),
             durations: DurationEstimate::default(),
             memory: MemoryBudget::new(options.memory),
+            block_bytes: 0,
             waits_for_memory: false,
             is_exclusive: false,
             may_find_more: true,
@@ -138,6 +141,34 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
+    /// Returns whether the memory of pairs and blocks is limited.
+    pub(super) const fn is_memory_limited(&self) -> bool {
+        self.memory.is_limited()
+    }
+
+    /// Reserves memory for a block. Returns `false` if it needs memory that running pairs have to return first. Warns if
+    /// it needs more than the limit for all together.
+    pub(super) fn reserve_for_block(&mut self, block: &BlockName, bytes: u64) -> bool {
+        if !self.memory.reserve(bytes) {
+            return false;
+        }
+        self.block_bytes = bytes;
+        if let Some(limit) = self.memory.exceeded_by(bytes) {
+            let (need, limit) = (bytes >> 20, limit >> 20);
+            tracing::warn!(
+                "block {block} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no pair beside it"
+            );
+        }
+        true
+    }
+
+    /// Ends the reservation for a block.
+    pub(super) fn release_block_memory(&mut self) {
+        self.memory.release(std::mem::take(&mut self.block_bytes));
+        self.waits_for_memory = false;
+        self.may_find_more = true;
+    }
+
     /// Claims pairs for slots that are free or soon become free. Returns `false`, and claims nothing, if no pair is
     /// needed, if none may start yet, or if nothing has changed since the last claim.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
@@ -174,7 +205,9 @@ impl Prefetch {
         };
         if !self.memory.reserve(next.bytes) {
             self.waits_for_memory = true;
-            self.durations.disable();
+            if self.block_bytes == 0 {
+                self.durations.disable();
+            }
             // Release the whole queue, not only this pair. Otherwise smaller pairs could keep overtaking it.
             self.queue.push_front(next);
             self.release_all().await?;

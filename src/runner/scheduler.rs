@@ -73,7 +73,11 @@ impl Scheduler {
         Self {
             session: WorkerSession::new(worker, now, context.timing.lease_ms()),
             prefetch: Prefetch::new(Arc::clone(&context), selection.clone(), options),
-            block: BlockSlot::new(Arc::clone(&context), selection.is_none()),
+            block: BlockSlot::new(
+                Arc::clone(&context),
+                selection.is_none(),
+                options.image_limits,
+            ),
             context,
             selection,
             max_storing: options.workers.max(1) * MAX_STORING_PER_SLOT,
@@ -152,10 +156,11 @@ impl Scheduler {
             return Ok(self.is_idle());
         }
         self.start_pairs().await?;
-        if self.block.start(self.session.worker()).await? {
+        let worker = self.session.worker();
+        if self.block.start(worker, &mut self.prefetch).await? {
             return Ok(false);
         }
-        if !self.prefetch.claim(self.session.worker()).await? {
+        if !self.prefetch.claim(worker).await? {
             return Ok(false);
         }
         self.start_pairs().await?;
@@ -163,7 +168,7 @@ impl Scheduler {
             return Ok(false);
         }
         // This process has no pair in progress. If another process has one, the catalog refuses the claim.
-        self.prefetch.claim_exclusive(self.session.worker()).await?;
+        self.prefetch.claim_exclusive(worker).await?;
         self.start_pairs().await?;
         if !self.is_idle() {
             return Ok(false);
@@ -242,6 +247,7 @@ impl Scheduler {
 
     fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
         self.prefetch.finish(slot);
+        self.block.memory_was_freed();
         match outcome {
             PairOutcome::Ended(report) => self.count(report),
             PairOutcome::Storing(checkpointer) => {
@@ -268,9 +274,13 @@ impl Scheduler {
                 self.fatal.get_or_insert(error);
             }
         }
-        let is_over_limit = self
-            .max_failures
-            .is_some_and(|max| self.counts.failed >= max);
+        self.stop_after_too_many_failures();
+    }
+
+    /// Lets nothing more start if too many pairs and blocks have failed.
+    fn stop_after_too_many_failures(&mut self) {
+        let failed = self.counts.failed + self.block.counts.failed;
+        let is_over_limit = self.max_failures.is_some_and(|max| failed >= max);
         if is_over_limit && !self.counts.too_many_failures {
             self.counts.too_many_failures = true;
             self.drain("too many failures");
@@ -278,11 +288,12 @@ impl Scheduler {
     }
 
     fn count_block(&mut self, report: BlockReport) {
-        self.prefetch.expect_more();
+        self.prefetch.release_block_memory();
         if let Err(error) = self.block.count(report) {
             self.drain("the run cannot go on");
             self.fatal.get_or_insert(error);
         }
+        self.stop_after_too_many_failures();
     }
 
     fn drain(&self, reason: &str) {

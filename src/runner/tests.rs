@@ -1,6 +1,7 @@
 //! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
 
 mod block_kills;
+mod block_limits;
 mod blocks;
 mod fake_blocks;
 mod fake_executor;
@@ -42,6 +43,21 @@ fn fingerprints() -> Fingerprints {
     Fingerprints::new(|_| json!({ "revision": 1 }))
 }
 
+/// A pair whose files do not exist.
+fn pair_row(pair: &str) -> ImportRow {
+    ImportRow {
+        name: name(pair),
+        mesh_path: format!("{pair}.stl"),
+        print_path: format!("{pair}.png"),
+        unit: None,
+        scanned_face_down: None,
+        character: None,
+        block: None,
+        meta: Map::new(),
+        prior: None,
+    }
+}
+
 fn options(workers: usize) -> RunOptions {
     RunOptions {
         workers,
@@ -63,17 +79,7 @@ impl RunFixture {
         let project = Project::create(dir.path()).expect("a project");
         let path = project.catalog_path();
         let catalog = create(&path).await.expect("a catalog");
-        let rows = pairs.iter().map(|pair| ImportRow {
-            name: name(pair),
-            mesh_path: format!("{pair}.stl"),
-            print_path: format!("{pair}.png"),
-            unit: None,
-            scanned_face_down: None,
-            character: None,
-            block: None,
-            meta: Map::new(),
-            prior: None,
-        });
+        let rows = pairs.iter().map(|pair| pair_row(pair));
         catalog.import(rows.collect(), 1).await.expect("imported");
         Self {
             project,

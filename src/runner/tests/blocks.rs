@@ -5,7 +5,7 @@ use crate::catalog::{BlockAttributes, BlockState, RerunPolicy};
 use crate::domain::{BlockName, BlockStage, FailureClass, JobStatus, Stage};
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
-fn block(text: &str) -> BlockName {
+pub(super) fn block(text: &str) -> BlockName {
     BlockName::new(text).expect("a valid name")
 }
 
@@ -32,12 +32,12 @@ impl RunFixture {
         fixture
     }
 
-    fn write(&self, block: &str, ext: &str, content: &str) {
+    pub(super) fn write(&self, block: &str, ext: &str, content: &str) {
         let path = self.project.input_path(&format!("{block}.{ext}"));
         std::fs::write(path, content).expect("written");
     }
 
-    async fn block_state(&self, text: &str) -> BlockState {
+    pub(super) async fn block_state(&self, text: &str) -> BlockState {
         let detail = self.catalog.block(&block(text)).await.expect("a read");
         detail.expect("the block").state
     }
@@ -48,7 +48,7 @@ impl RunFixture {
     }
 
     /// Returns how often each stage of a block was computed.
-    fn counts(&self, text: &str) -> [usize; 4] {
+    pub(super) fn counts(&self, text: &str) -> [usize; 4] {
         BlockStage::ALL.map(|stage| self.blocks.count(text, stage))
     }
 }

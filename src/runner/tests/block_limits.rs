@@ -1,0 +1,63 @@
+//! Limits that blocks share with pairs: failures and memory.
+
+use super::{RunFixture, options, pair_row};
+use crate::domain::{BlockStage, JobStatus, Stage};
+use crate::runner::{RunEvent, RunOptions};
+
+#[tokio::test]
+async fn failed_blocks_count_for_the_limit_of_failures() {
+    let fixture = RunFixture::of_blocks(&["b_1", "b_2", "b_3"], "r1 a").await;
+    for block in ["b_1", "b_2"] {
+        fixture.write(block, "png", "other page");
+    }
+    let limited = |max_failures| RunOptions {
+        max_failures: Some(max_failures),
+        ..options(1)
+    };
+    let first = fixture.run(&limited(1)).await;
+    assert!(first.too_many_failures);
+    assert_eq!((first.blocks.failed, first.blocks.left), (1, 2));
+    let rest = fixture.run(&limited(2)).await;
+    assert!(!rest.too_many_failures);
+    assert_eq!((rest.blocks.failed, rest.blocks.done, rest.done), (1, 1, 1));
+}
+
+/// The block backs off once, so that a pair is running when the block is ready again.
+#[tokio::test]
+async fn a_block_waits_until_a_running_pair_returns_its_memory() {
+    let fixture = RunFixture::of_blocks(&["flaky_1"], "r1 a").await;
+    let pair = pair_row("wait_1");
+    fixture
+        .catalog
+        .import(vec![pair], 1)
+        .await
+        .expect("imported");
+    let limited = RunOptions {
+        memory: Some(1 << 20),
+        ..options(1)
+    };
+    let hold = async {
+        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
+            tokio::task::yield_now().await;
+        }
+        let claimed = fixture.catalog.block_tokens().await.expect("a read");
+        // The back-off ends, and the block is claimed and released, because the pair has all memory.
+        while fixture.catalog.block_tokens().await.expect("a read") == claimed
+            || fixture.block_state("flaky_1").await.status != JobStatus::Ready
+        {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(fixture.blocks.count("flaky_1", BlockStage::Align), 1);
+        fixture.executor.open();
+    };
+    let (summary, ()) = tokio::join!(fixture.run(&limited), hold);
+    assert_eq!((summary.blocks.done, summary.done), (1, 2));
+    let events = fixture.events.lock().expect("an unpoisoned lock");
+    let position = |wanted: fn(&RunEvent) -> bool| events.iter().rposition(wanted);
+    let started = position(
+        |event| matches!(event, RunEvent::BlockStageStarted { stage, .. } if *stage == BlockStage::Align),
+    );
+    let ended =
+        position(|event| matches!(event, RunEvent::PairDone { pair } if pair.as_str() == "wait_1"));
+    assert!(ended.is_some() && started > ended, "{events:?}");
+}
