@@ -68,7 +68,7 @@ pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
 pub use queue::worker_list::{WorkerRecord, WorkerState};
-pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
+pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
 pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};

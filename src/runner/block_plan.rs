@@ -1,19 +1,14 @@
 //! Requeues blocks at the start of a run.
 
 use super::block_inputs;
-use super::block_stages::BlockStages;
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::input_reads::ReadLimits;
 use super::options::RunOptions;
 use super::policy;
-use crate::catalog::{BlockSettings, Catalog};
+use crate::catalog::Catalog;
 use crate::domain::UnixMillis;
 use crate::store::Project;
-
-/// Returns the settings of the stages of blocks.
-pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
-    BlockSettings::new(|stage| stages.settings(stage))
-}
 
 /// Stores which input files of blocks changed, requeues blocks to run again, and ends back-offs that are due.
 ///

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
 
+use crate::catalog::BlockSettings;
 use crate::domain::{
     ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, Failure, FailureClass,
     LengthUnit,
@@ -33,6 +34,11 @@ pub trait BlockStages: Send + Sync + 'static {
         artifacts: &dyn BlockArtifacts,
         stop: &AtomicBool,
     ) -> Result<BlockStageOutput, BlockStageError>;
+}
+
+/// Returns the settings of the stages of blocks.
+pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
+    BlockSettings::new(|stage| stages.settings(stage))
 }
 
 /// The files of a stage: writes its own artifacts and reads those of earlier stages. May be used by several threads.

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 
 use super::block_pipeline::BlockPipeline;
 use super::block_plan;
-use super::block_stages::BlockStages;
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
@@ -23,7 +23,7 @@ use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
-use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection};
+use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection, WorkerSettings};
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
@@ -88,11 +88,15 @@ pub(super) async fn run_with(
     let selection = selection(catalog, options).await?;
     let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
     let mut guard = RunGuard::acquire(project, catalog, options)?;
+    let settings = WorkerSettings {
+        fingerprints: fingerprint_ids,
+        blocks: block_settings(&*executors.blocks),
+    };
     guard
-        .require_same_settings(catalog, fingerprints, fingerprint_ids, options)
+        .require_same_settings(catalog, fingerprints, &settings, options.part)
         .await?;
     let worker = catalog
-        .register_worker(this_process(), fingerprint_ids, clock.now())
+        .register_worker(this_process(), settings, clock.now())
         .await?;
     let start = RunStart {
         project,

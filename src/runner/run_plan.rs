@@ -2,7 +2,7 @@
 
 use super::block_inputs;
 use super::block_pipeline::BlockPipeline;
-use super::block_plan::block_settings;
+use super::block_stages::block_settings;
 use super::error::RunError;
 use super::input_changes;
 use super::options::RunOptions;

@@ -19,8 +19,11 @@ use fake_blocks::FakeBlocks;
 use fake_executor::FakeExecutor;
 
 use super::run::{Executors, run_with};
-use super::{RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
-use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo};
+use super::{BlockStages as _, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
+use crate::catalog::{
+    BlockSettings, Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo,
+    WorkerSettings,
+};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
@@ -345,9 +348,13 @@ async fn pairs_of_a_dead_process_are_recovered_at_once() {
         boot_id: None,
     };
     let ids = fixture.catalog.register_fingerprints(&fingerprints()).await;
+    let settings = WorkerSettings {
+        fingerprints: ids.expect("fingerprints"),
+        blocks: BlockSettings::new(|stage| fixture.blocks.settings(stage)),
+    };
     let dead = fixture
         .catalog
-        .register_worker(info, ids.expect("fingerprints"), 1)
+        .register_worker(info, settings, 1)
         .await
         .expect("a worker");
     let request = ClaimRequest::new(dead, 1, 1);

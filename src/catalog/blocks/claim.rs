@@ -3,6 +3,7 @@
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockLease, BlockWork};
 use crate::catalog::blocks::records::{BLOCK, input_versions, stage_records};
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow as _, from_row};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -14,13 +15,31 @@ use crate::failpoint::{self, Point};
 const HELD: &str = "
 SELECT block, worker, token, stage, attempt FROM block_job WHERE worker = ?1 AND status = 1 ORDER BY block LIMIT 1";
 
-/// Leases the most advanced ready block. No block starts while a pair must run exclusively.
-const CLAIM: &str = "
+/// Builds the text of a claim from a condition.
+macro_rules! claim {
+    ($condition:literal) => {
+        concat!(
+            "
 UPDATE block_job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
 WHERE block = (SELECT block FROM block_job WHERE status = 0 ORDER BY stage DESC, block LIMIT 1)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?3)
-    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND exclusive = 1)
-RETURNING block, worker, token, stage, attempt";
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND exclusive = 1)",
+            $condition,
+            "
+RETURNING block, worker, token, stage, attempt"
+        )
+    };
+}
+
+/// Leases the most advanced ready block. No block starts while a pair must run exclusively. In PostgreSQL, a worker whose
+/// settings are not those of the last plan gets nothing.
+const CLAIM: Sql = Sql::pair(
+    claim!(""),
+    claim!(
+        "
+    AND coalesce((SELECT s.block_settings = me.block_settings FROM run_settings AS s, worker AS me WHERE me.id = ?1), true)"
+    ),
+);
 
 /// Gives a lease back. Its attempt does not count.
 const RELEASE: &str = "

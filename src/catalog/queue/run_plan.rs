@@ -92,7 +92,11 @@ async fn plan(
         let changes = match why {
             StaleReason::Settings { stage, old } => {
                 let old = fields_of(conn, old).await?;
-                Some(differences(stage, &old, &fingerprints.of(stage).fields))
+                Some(differences(
+                    stage.name(),
+                    &old,
+                    &fingerprints.of(stage).fields,
+                ))
             }
             _ => None,
         };

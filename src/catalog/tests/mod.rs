@@ -24,6 +24,7 @@ use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
     InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
+    WorkerSettings,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
@@ -193,7 +194,11 @@ async fn enter(catalog: &Catalog, fingerprints: FingerprintIds, clock: UnixMilli
         pid: 1,
         boot_id: None,
     };
-    let entered = catalog.register_worker(info, fingerprints, clock);
+    let settings = WorkerSettings {
+        fingerprints,
+        blocks: blocks::settings([1; 4]),
+    };
+    let entered = catalog.register_worker(info, settings, clock);
     entered.await.expect("a worker")
 }
 

@@ -1,4 +1,6 @@
-//! Limits that blocks share with pairs: failures and memory.
+//! What blocks share with pairs: limits of failures and memory, and settings that joined runs must not change.
+
+use std::sync::atomic::Ordering;
 
 use super::{RunFixture, options, pair_row};
 use crate::domain::{BlockStage, JobStatus, Stage};
@@ -60,4 +62,26 @@ async fn a_block_waits_until_a_running_pair_returns_its_memory() {
     let ended =
         position(|event| matches!(event, RunEvent::PairDone { pair } if pair.as_str() == "wait_1"));
     assert!(ended.is_some() && started > ended, "{events:?}");
+}
+
+#[tokio::test]
+async fn joining_with_other_settings_of_blocks_is_refused_with_the_difference() {
+    let fixture = RunFixture::of_blocks(&["waits_1"], "r1 a").await;
+    let joined = RunOptions {
+        join: true,
+        ..options(1)
+    };
+    let join = async {
+        while fixture.blocks.count("waits_1", BlockStage::Align) == 0 {
+            tokio::task::yield_now().await;
+        }
+        fixture.blocks.revision.store(7, Ordering::SeqCst);
+        let refused = fixture.try_run(&joined).await.expect_err("refused");
+        fixture.blocks.revision.store(0, Ordering::SeqCst);
+        fixture.blocks.open();
+        refused.to_string()
+    };
+    let (summary, refused) = tokio::join!(fixture.run(&joined), join);
+    assert_eq!(summary.blocks.done, 1);
+    assert!(refused.contains("(boxes.revision: 0 -> 7)"), "{refused}");
 }
