@@ -45,6 +45,7 @@ pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
     StoredBlockFailure,
 };
+pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};

@@ -23,8 +23,9 @@ use crate::store::Project;
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]
 pub(super) struct RunArgs {
-    /// Only these pairs [default: all]
-    pub(super) pairs: Vec<String>,
+    /// Only these pairs, and these blocks with their pairs [default: all]
+    #[arg(value_name = "NAME")]
+    pub(super) names: Vec<String>,
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
@@ -117,7 +118,10 @@ pub(super) async fn options(
     catalog: &Catalog,
     part: RunPart,
 ) -> anyhow::Result<RunOptions> {
-    let pairs = select::some_or_all(catalog, &args.pairs).await?;
+    let only = match args.names.as_slice() {
+        [] => None,
+        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
+    };
     let plain = from_config(config);
     Ok(RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
@@ -125,7 +129,7 @@ pub(super) async fn options(
         part,
         join: args.join,
         max_failures: args.max_failures,
-        pairs,
+        only,
         rerun: match (args.rerun, args.stage) {
             (Some(RerunPolicy::All(_)), Some(stage)) => RerunPolicy::All(stage),
             (rerun, _) => rerun.unwrap_or(plain.rerun),

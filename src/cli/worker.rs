@@ -10,7 +10,7 @@ use super::exit::ExitCode;
 use super::metrics;
 use super::run::{self, RunArgs};
 use super::signals;
-use super::table::count;
+use super::table::pairs_and_blocks;
 use crate::catalog::RerunPolicy;
 use crate::domain::Stage;
 use crate::runner::{self, RunPart, Stop};
@@ -18,8 +18,9 @@ use crate::runner::{self, RunPart, Stop};
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Only these pairs [default: all]
-    pub(super) pairs: Vec<String>,
+    /// Only these pairs, and these blocks with their pairs [default: all]
+    #[arg(value_name = "NAME")]
+    pub(super) names: Vec<String>,
     /// Also plan these pairs again: failed, stale (settings or files changed, which every plan includes) or all
     #[arg(long, value_name = "WHICH", value_parser = run::rerun)]
     pub(super) rerun: Option<RerunPolicy>,
@@ -48,7 +49,7 @@ pub(super) struct WorkerArgs {
 
 pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let args = RunArgs {
-        pairs: args.pairs,
+        names: args.names,
         rerun: args.rerun,
         ..RunArgs::default()
     };
@@ -65,14 +66,7 @@ pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     context.print_json(&json!({
         "schema": 1, "pairs": planned.left, "blocks": blocks, "status": planned.status,
     }))?;
-    let numbers = match blocks {
-        0 => count(planned.left, "pair"),
-        blocks => format!(
-            "{} and {}",
-            count(blocks, "block"),
-            count(planned.left, "pair")
-        ),
-    };
+    let numbers = pairs_and_blocks(planned.left, blocks);
     context.info(&format!("{numbers} to run"));
     if planned.left + blocks > 0 {
         context.next("worker");

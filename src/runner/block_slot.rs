@@ -14,7 +14,7 @@ use super::policy;
 use super::prefetch::Prefetch;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{BlockAttributes, OutstandingBlocks};
+use crate::catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
 use crate::domain::WorkerId;
 use crate::raster;
 
@@ -28,8 +28,8 @@ pub(super) struct BlockRunCounts {
 /// The slot of a process for a block.
 pub(super) struct BlockSlot {
     context: Arc<RunContext>,
-    /// Whether this run works on blocks. A run of named pairs does not.
-    is_enabled: bool,
+    /// The blocks of this run; `None` for all.
+    among: Option<BlockSelection>,
     image_limits: raster::ImageLimits,
     /// Whether a claim may find a block.
     may_find_one: bool,
@@ -42,14 +42,14 @@ pub(super) struct BlockSlot {
 impl BlockSlot {
     pub(super) fn new(
         context: Arc<RunContext>,
-        is_enabled: bool,
+        among: Option<BlockSelection>,
         image_limits: raster::ImageLimits,
     ) -> Self {
         Self {
             context,
-            is_enabled,
+            may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
+            among,
             image_limits,
-            may_find_one: is_enabled,
             waits_for_memory: false,
             task: JoinSet::new(),
             counts: BlockRunCounts::default(),
@@ -81,9 +81,10 @@ impl BlockSlot {
         }
         let context = &self.context;
         let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
-        let catalog = &context.catalog;
+        let (catalog, among) = (&context.catalog, self.among.as_ref());
         let claimed = catalog.retry_while_unavailable(async || {
-            catalog.claim_block(worker, deadline, alive_since).await
+            let claim = catalog.claim_block(worker, deadline, alive_since, among);
+            claim.await
         });
         let Some((lease, work)) = claimed.await? else {
             self.may_find_one = false;
@@ -135,7 +136,7 @@ impl BlockSlot {
     /// # Errors
     /// Returns the error that ends the run.
     pub(super) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
-        self.may_find_one = self.is_enabled;
+        self.may_find_one = true;
         match ended? {
             BlockEnd::Done => self.counts.done += 1,
             BlockEnd::Failed => self.counts.failed += 1,
@@ -146,11 +147,9 @@ impl BlockSlot {
 
     /// Returns how many blocks any process has yet to finish.
     pub(super) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
-        if !self.is_enabled {
-            return Ok(OutstandingBlocks::default());
-        }
-        let catalog = &self.context.catalog;
-        let left = catalog.retry_while_unavailable(async || catalog.outstanding_blocks().await);
+        let (catalog, among) = (&self.context.catalog, self.among.as_ref());
+        let left =
+            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(among).await);
         Ok(left.await?)
     }
 
@@ -165,7 +164,7 @@ impl BlockSlot {
                 .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await)
                 .await?;
         }
-        self.may_find_one = self.is_enabled && (is_due || left.ready > 0);
+        self.may_find_one = is_due || left.ready > 0;
         Ok(())
     }
 }

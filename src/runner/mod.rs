@@ -37,6 +37,7 @@ mod run_end;
 mod run_guard;
 mod run_metrics;
 mod run_plan;
+mod run_selection;
 mod scheduler;
 mod stage_executor;
 mod stage_files;
@@ -54,7 +55,7 @@ pub use block_stages::{
 pub use error::RunError;
 pub use events::{BlockSummary, RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
-pub use options::{RunOptions, RunPart};
+pub use options::{NamedWork, RunOptions, RunPart};
 pub use run::{fingerprints, run};
 pub use run_guard::is_running;
 pub use run_metrics::RunMetrics;

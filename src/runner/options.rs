@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::run_metrics::RunMetrics;
 use crate::catalog::RerunPolicy;
-use crate::domain::{PairName, Stage};
+use crate::domain::{BlockName, PairName, Stage};
 use crate::{mesh, raster};
 
 /// Options of a run.
@@ -21,8 +21,8 @@ pub struct RunOptions {
     pub join: bool,
     /// Start nothing more after this many pairs and blocks have failed.
     pub max_failures: Option<u64>,
-    /// Only these pairs; `None` for all.
-    pub pairs: Option<Vec<PairName>>,
+    /// Only these pairs and blocks; `None` for all.
+    pub only: Option<NamedWork>,
     /// What to run besides stages without a current result.
     pub rerun: RerunPolicy,
     /// Last stage to run.
@@ -35,6 +35,15 @@ pub struct RunOptions {
     pub image_limits: raster::ImageLimits,
     /// Where the run counts pairs and times.
     pub metrics: RunMetrics,
+}
+
+/// Pairs and blocks that a user named.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NamedWork {
+    /// Pairs.
+    pub pairs: Vec<PairName>,
+    /// Blocks. Their pairs run too, including those that are yet to be cut.
+    pub blocks: Vec<BlockName>,
 }
 
 /// Which part of a run to do.
@@ -56,7 +65,7 @@ impl Default for RunOptions {
             part: RunPart::All,
             join: false,
             max_failures: None,
-            pairs: None,
+            only: None,
             rerun: RerunPolicy::Changed,
             until: Stage::Register,
             stage_timeout: Duration::from_mins(10),

@@ -141,6 +141,11 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
+    /// Replaces the pairs that may be claimed.
+    pub(super) fn select(&mut self, pairs: &PairSelection) {
+        self.selection = Some(pairs.clone());
+    }
+
     /// Returns whether the memory of pairs and blocks is limited.
     pub(super) const fn is_memory_limited(&self) -> bool {
         self.memory.is_limited()

@@ -17,8 +17,9 @@ use super::input_reads::ReadLimits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
-use super::run_end::{RunEnd, block_limits, outstanding_blocks};
+use super::run_end::{RunEnd, block_limits};
 use super::run_guard::RunGuard;
+use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
@@ -46,7 +47,7 @@ pub(super) struct Executors {
 /// Runs every stage that has no current result. Passes each event of the run to `on_event`.
 ///
 /// # Errors
-/// Returns an error if a named pair does not exist, or if the catalog or the disk cannot be used. Returns an error if
+/// Returns an error if a named pair or block does not exist, or if the catalog or the disk cannot be used. Returns an error if
 /// another process runs the project, unless this run joins it with the same settings.
 pub async fn run(
     project: &Project,
@@ -85,7 +86,7 @@ pub(super) async fn run_with(
     mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     let clock = Clock::start();
-    let selection = selection(catalog, options).await?;
+    let mut selection = RunSelection::of(catalog, options.only.as_ref()).await?;
     let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
     let mut guard = RunGuard::acquire(project, catalog, options)?;
     let settings = WorkerSettings {
@@ -115,15 +116,15 @@ pub(super) async fn run_with(
     }
     if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
-        let status = catalog.status(fingerprints).await?;
-        let left = catalog.work_left(options.until, selection.as_ref()).await?;
-        let ended = RunEnd {
-            counts: RunCounts::default(),
-            left,
-            blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
-            status,
-            compute_time: Duration::ZERO,
-        };
+        let counted = (RunCounts::default(), Duration::ZERO);
+        let ended = RunEnd::of(
+            catalog,
+            fingerprints,
+            options.until,
+            selection.as_ref(),
+            counted,
+        );
+        let ended = ended.await?;
         return Ok(ended.summary(stop, clock));
     }
     let (events, mut received) = mpsc::unbounded_channel();
@@ -164,16 +165,13 @@ pub(super) async fn run_with(
     };
     let counts = counts?;
     ended?;
-    let status = catalog.status(fingerprints).await?;
-    let left = catalog.work_left(options.until, selection.as_ref()).await?;
-    let ended = RunEnd {
-        counts,
-        left,
-        blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
-        status,
-        compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
-    };
-    Ok(ended.summary(stop, clock))
+    if let Some(selection) = &mut selection {
+        selection.refresh(catalog).await?;
+    }
+    let computed = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
+    let (counted, selection) = ((counts, computed), selection.as_ref());
+    let ended = RunEnd::of(catalog, fingerprints, options.until, selection, counted);
+    Ok(ended.await?.summary(stop, clock))
 }
 
 /// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database server.
@@ -190,7 +188,7 @@ struct RunStart<'a> {
     fingerprints: &'a Fingerprints,
     blocks: &'a dyn BlockStages,
     options: &'a RunOptions,
-    selection: Option<&'a PairSelection>,
+    selection: Option<&'a RunSelection>,
     clock: Clock,
     stop: &'a Stop,
 }
@@ -210,7 +208,7 @@ impl RunStart<'_> {
             guard.unlock_planning(catalog).await?;
             planned?;
         }
-        let left = catalog.work_left(options.until, self.selection).await?;
+        let left = catalog.work_left(options.until, self.pairs()).await?;
         on_event(RunEvent::Started {
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
@@ -227,8 +225,8 @@ impl RunStart<'_> {
     async fn plan(&self) -> Result<(), RunError> {
         let (catalog, options) = (self.catalog, self.options);
         let limits = read_limits(options, self.stop);
-        input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
-        let (fingerprints, selection) = (self.fingerprints, self.selection);
+        input_changes::store_changes(self.project, catalog, self.pairs(), &limits).await?;
+        let (fingerprints, selection) = (self.fingerprints, self.pairs());
         let requeued = async || {
             catalog
                 .requeue_stale(fingerprints, selection, options.rerun)
@@ -239,10 +237,14 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
-        if self.selection.is_none() {
-            block_plan::requeue(self.project, catalog, self.blocks, options, &limits, now).await?;
-        }
-        Ok(())
+        let among = self.selection.map(|selection| &selection.blocks);
+        let what = (options.rerun, among);
+        block_plan::requeue(self.project, catalog, self.blocks, what, &limits, now).await
+    }
+
+    /// Returns the selected pairs, or `None` for all.
+    fn pairs(&self) -> Option<&PairSelection> {
+        self.selection.map(|selection| &selection.pairs)
     }
 
     /// Recovers the leases of dead processes, then lets other processes join. Does nothing if other processes may hold
@@ -271,19 +273,4 @@ pub(super) fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
         stop: stop.clone(),
         until: StopLevel::Drain,
     }
-}
-
-/// Returns the named pairs, or `None` for all.
-pub(super) async fn selection(
-    catalog: &Catalog,
-    options: &RunOptions,
-) -> Result<Option<PairSelection>, RunError> {
-    let Some(names) = &options.pairs else {
-        return Ok(None);
-    };
-    let unknown = catalog.unknown_names(names).await?;
-    if !unknown.is_empty() {
-        return Err(RunError::NoSuchPair(unknown));
-    }
-    Ok(Some(catalog.select(names).await?))
 }

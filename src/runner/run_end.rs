@@ -6,20 +6,11 @@ use super::error::RunError;
 use super::events::{BlockSummary, RunSummary};
 use super::options::RunOptions;
 use super::policy::Clock;
+use super::run_selection::RunSelection;
 use super::scheduler::RunCounts;
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{Catalog, OutstandingBlocks, PairSelection, StatusCounts, WorkLeft};
-
-/// Counts the blocks that are left to run and the failed ones. A run of named pairs does not work on blocks.
-pub(super) async fn outstanding_blocks(
-    catalog: &Catalog,
-    selection: Option<&PairSelection>,
-) -> Result<OutstandingBlocks, RunError> {
-    match selection {
-        None => Ok(catalog.outstanding_blocks().await?),
-        Some(_) => Ok(OutstandingBlocks::default()),
-    }
-}
+use crate::catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
+use crate::domain::Stage;
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.
 pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
@@ -39,6 +30,26 @@ pub(super) struct RunEnd {
 }
 
 impl RunEnd {
+    /// Counts what is left. `counted` is what the run has counted, and for how long stages were computed.
+    pub(super) async fn of(
+        catalog: &Catalog,
+        fingerprints: &Fingerprints,
+        until: Stage,
+        selection: Option<&RunSelection>,
+        counted: (RunCounts, Duration),
+    ) -> Result<Self, RunError> {
+        let pairs = selection.map(|selection| &selection.pairs);
+        let blocks = selection.map(|selection| &selection.blocks);
+        let (counts, compute_time) = counted;
+        Ok(Self {
+            counts,
+            status: catalog.status(fingerprints).await?,
+            left: catalog.work_left(until, pairs).await?,
+            blocks: catalog.outstanding_blocks(blocks).await?,
+            compute_time,
+        })
+    }
+
     /// Returns the summary of the run.
     pub(super) fn summary(self, stop: &Stop, clock: Clock) -> RunSummary {
         let Self {

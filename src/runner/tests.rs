@@ -19,7 +19,9 @@ use fake_blocks::FakeBlocks;
 use fake_executor::FakeExecutor;
 
 use super::run::{Executors, run_with};
-use super::{BlockStages as _, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
+use super::{
+    BlockStages as _, NamedWork, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel,
+};
 use crate::catalog::{
     BlockSettings, Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo,
     WorkerSettings,
@@ -317,7 +319,10 @@ async fn too_many_failures_drain_the_run() {
 async fn only_selected_pairs_run_and_an_unknown_name_is_an_error() {
     let fixture = RunFixture::new(&["a", "b", "c"]).await;
     let some = |names: &[&str]| RunOptions {
-        pairs: Some(names.iter().map(|text| name(text)).collect()),
+        only: Some(NamedWork {
+            pairs: names.iter().map(|text| name(text)).collect(),
+            blocks: Vec::new(),
+        }),
         ..options(2)
     };
     let refused = fixture.try_run(&some(&["b", "nobody"])).await;
@@ -424,7 +429,10 @@ async fn a_disk_error_ends_the_run_and_fails_no_pair() {
 async fn a_run_up_to_a_stage_does_not_wait_for_the_retry_of_a_later_one() {
     let fixture = RunFixture::new(&["breaks_1", "a"]).await;
     let first = RunOptions {
-        pairs: Some(vec![name("breaks_1")]),
+        only: Some(NamedWork {
+            pairs: vec![name("breaks_1")],
+            blocks: Vec::new(),
+        }),
         ..options(1)
     };
     let stop = async {

@@ -15,4 +15,5 @@ pub(crate) mod model;
 pub(crate) mod records;
 pub(crate) mod recovery;
 pub(crate) mod retired;
+pub(crate) mod selection;
 pub(crate) mod staleness;

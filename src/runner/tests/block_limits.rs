@@ -36,7 +36,7 @@ async fn a_block_waits_until_a_running_pair_returns_its_memory() {
         .expect("imported");
     let limited = RunOptions {
         memory: Some(1 << 20),
-        ..options(1)
+        ..options(2)
     };
     let hold = async {
         while fixture.executor.count("wait_1", Stage::Fit) == 0 {
