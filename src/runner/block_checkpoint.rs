@@ -267,8 +267,8 @@ fn input_of(
     artifact: &ArtifactRef,
 ) -> Result<(String, InputVersion), BlockStageError> {
     let Some(path) = artifact.stored_path() else {
-        let text = "the files of characters cannot be in an object store".to_owned();
-        return Err(BlockStageError::failed(FailureClass::BadInput, text));
+        let text = "the file of a character is in a pack".to_owned();
+        return Err(BlockStageError::failed(FailureClass::Bug, text));
     };
     let stat = stat_input(&project.input(&path))?;
     let version = InputVersion {

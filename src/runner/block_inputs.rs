@@ -11,9 +11,9 @@ use crate::catalog::{
 use crate::domain::{BlockId, BlockStage, ContentHash, Failure, FailureClass};
 use crate::store::{Input, InputError, Project, hash_input, stat_input};
 
-/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans and
-/// pages that no stage has read; labels may have been added to a block that was finished without them. A file counts as
-/// unchanged if reading it fails or is ended by `limits`.
+/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
+/// and pages that no stage has read; labels may have been added to a block that was finished without them. A file
+/// counts as unchanged if reading it fails or is ended by `limits`.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
@@ -228,6 +228,7 @@ pub(super) fn as_failure(error: BlockStageError) -> (Failure, bool) {
             let text = format!("the result of {stage} is not usable");
             (Failure::new(FailureClass::Bug, text), false)
         }
+        BlockStageError::Store(error) => (Failure::new(FailureClass::Io, error.to_string()), true),
         BlockStageError::Stopped => {
             let text = "the stage ended although it was not stopped";
             (Failure::new(FailureClass::Bug, text), false)

@@ -12,8 +12,8 @@ use crate::store::{Input, Project};
 
 /// Bytes reserved for the height maps of both sides, their relief and the search for the page. Measured: 120 MB.
 pub(super) const BLOCK_BYTES: u64 = 160 << 20;
-/// Part of the length of a streamed scan that the meshes of its characters take while they are cut. Measured: 1/18, with
-/// scans of 0.25 and 1.3 GB.
+/// Part of the length of a streamed scan that the meshes of its characters take while they are cut. Measured: 1/18,
+/// with scans of 0.25 and 1.3 GB.
 const STREAMED_SHARE: u64 = 16;
 /// Bytes needed per pixel of a page. Measured: 10, with pages of 6 and 24 million pixels.
 const PAGE_PIXEL_BYTES: u64 = 16;

@@ -66,8 +66,8 @@ impl BlockSlot {
         self.waits_for_memory = false;
     }
 
-    /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now, or waits for
-    /// the memory of running pairs. In both cases no pair may be claimed.
+    /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now, or waits
+    /// for the memory of running pairs. In both cases no pair may be claimed.
     pub(super) async fn start(
         &mut self,
         worker: WorkerId,

@@ -39,8 +39,8 @@ impl MemoryBudget {
         self.limit.is_some()
     }
 
-    /// Reserves bytes for a pair or a block. Returns `false` if the limit does not allow it. One that needs more than the
-    /// limit is accepted if nothing else is reserved.
+    /// Reserves bytes for a pair or a block. Returns `false` if the limit does not allow it. One that needs more than
+    /// the limit is accepted if nothing else is reserved.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);
@@ -99,8 +99,8 @@ fn print_bytes(print: &Input, images: &raster::ImageLimits) -> u64 {
         .saturating_add(print.size())
 }
 
-/// Returns the pixel count in the header of an image, because a small file may hold many pixels. If the header cannot be
-/// read, estimates it from the file size.
+/// Returns the pixel count in the header of an image, because a small file may hold many pixels. If the header cannot
+/// be read, estimates it from the file size.
 pub(super) fn print_pixels(print: &Input) -> u64 {
     let Ok(file) = print.open() else {
         return 0;

@@ -3,8 +3,8 @@
 //! `run` prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
 //! `pair_task` and the task starts a `compute_thread`. The thread calls the stages through `stage_executor`. The task
 //! sends computed stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what
-//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task` runs
-//! its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
+//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task`
+//! runs its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
 
 mod block_artifacts;
 mod block_checkpoint;

@@ -12,8 +12,9 @@ use crate::{mesh, raster};
 pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
-    /// Memory limit in bytes for a block and all pairs computed at the same time. Their memory is estimated from the file
-    /// size of the mesh and the pixel count of print or page. One that exceeds the limit runs alone. `None` means no limit.
+    /// Memory limit in bytes for a block and all pairs computed at the same time. Their memory is estimated from the
+    /// file size of the mesh and the pixel count of print or page. One that exceeds the limit runs alone. `None` means
+    /// no limit.
     pub memory: Option<u64>,
     /// What to do besides computing.
     pub part: RunPart,

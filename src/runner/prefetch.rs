@@ -151,8 +151,8 @@ impl Prefetch {
         self.memory.is_limited()
     }
 
-    /// Reserves memory for a block. Returns `false` if it needs memory that running pairs have to return first. Warns if
-    /// it needs more than the limit for all together.
+    /// Reserves memory for a block. Returns `false` if it needs memory that running pairs have to return first. Warns
+    /// if it needs more than the limit for all together.
     pub(super) fn reserve_for_block(&mut self, block: &BlockName, bytes: u64) -> bool {
         if !self.memory.reserve(bytes) {
             return false;

@@ -47,8 +47,8 @@ pub(super) struct Executors {
 /// Runs every stage that has no current result. Passes each event of the run to `on_event`.
 ///
 /// # Errors
-/// Returns an error if a named pair or block does not exist, or if the catalog or the disk cannot be used. Returns an error if
-/// another process runs the project, unless this run joins it with the same settings.
+/// Returns an error if a named pair or block does not exist, or if the catalog or the disk cannot be used. Returns an
+/// error if another process runs the project, unless this run joins it with the same settings.
 pub async fn run(
     project: &Project,
     catalog: &Catalog,
@@ -174,7 +174,8 @@ pub(super) async fn run_with(
     Ok(ended.await?.summary(stop, clock))
 }
 
-/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database server.
+/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database
+/// server.
 async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
     stop.reached(StopLevel::Drain).await;
     tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;

@@ -198,8 +198,8 @@ impl Scheduler {
         self.prefetch.free_slots()
     }
 
-    /// Adds the time that slots waited for pairs to be stored. The commits count as the reason if most of these pairs are
-    /// being committed, and otherwise the files.
+    /// Adds the time that slots waited for pairs to be stored. The commits count as the reason if most of these pairs
+    /// are being committed, and otherwise the files.
     fn add_storage_wait(&self, slots: usize, elapsed: Duration) {
         if slots == 0 {
             return;

@@ -102,8 +102,8 @@ impl RunLock {
         self.is_exclusive
     }
 
-    /// Writes this run's settings. Joining processes compare them with their own. Call this function only while the lock is
-    /// exclusive.
+    /// Writes this run's settings. Joining processes compare them with their own. Call this function only while the
+    /// lock is exclusive.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.

@@ -63,6 +63,7 @@ mod many_reviewers;
 mod memory;
 mod names;
 mod object_store;
+mod object_store_blocks;
 mod odd;
 mod one_pair;
 mod page;
