@@ -32,7 +32,7 @@ pub use alignment_prior::AlignmentPrior;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;
 pub use block::{BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord};
-pub(crate) use enum_names::enum_names;
+pub(crate) use enum_names::{enum_names, stage_order};
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
