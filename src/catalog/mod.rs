@@ -1,10 +1,10 @@
 //! The catalog: a database of SQLite or PostgreSQL with the data of every pair and the job queue. No other module
 //! contains SQL.
 //!
-//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs, `blocks`
-//! the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another catalog. One writer task owns the only write connection of
-//! this process and commits requests in groups. Reads use separate connections, also during a run. Callers pass the
-//! current time as an argument.
+//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs,
+//! `blocks` the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another
+//! catalog. One writer task owns the only write connection of this process and commits requests in groups. Reads use
+//! separate connections, also during a run. Callers pass the current time as an argument.
 
 mod audit;
 mod blocks;

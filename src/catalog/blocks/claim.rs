@@ -35,8 +35,8 @@ RETURNING block, worker, token, stage, attempt"
     };
 }
 
-/// Leases the most advanced ready block, of all or of those with the ids `?4`. No block starts while a pair must run exclusively. In PostgreSQL, a worker whose
-/// settings are not those of the last plan gets nothing.
+/// Leases the most advanced ready block, of all or of those with the ids `?4`. No block starts while a pair must run
+/// exclusively. In PostgreSQL, a worker whose settings are not those of the last plan gets nothing.
 const CLAIM: Sql = Sql::pair(
     claim!(""),
     claim!(
@@ -84,8 +84,8 @@ impl OutstandingBlocks {
 }
 
 impl Catalog {
-    /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks. Returns `None` if no block is ready, or if the
-    /// worker has ended or its last heartbeat is before `alive_since`.
+    /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks.
+    /// Returns `None` if no block is ready, or if the worker has ended or its last heartbeat is before `alive_since`.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -131,8 +131,8 @@ impl Catalog {
         .await
     }
 
-    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only its
-    /// blocks.
+    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only
+    /// its blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -1,9 +1,9 @@
 //! Whole blocks: import, the jobs of their stages, their results, and the pairs that are cut from them.
 //!
-//! A block has its own job with the stages `face`, `align`, `boxes` and `cut`. There are few blocks and their stages take
-//! seconds, so each step is a transaction of its own. The guarantees are those of the jobs of pairs: a result is stored
-//! only under a valid lease, and a lease is valid while the worker's heartbeats are. The last step inserts pairs, which
-//! the queue of pairs then runs.
+//! A block has its own job with the stages `face`, `align`, `boxes` and `cut`. There are few blocks and their stages
+//! take seconds, so each step is a transaction of its own. The guarantees are those of the jobs of pairs: a result is
+//! stored only under a valid lease, and a lease is valid while the worker's heartbeats are. The last step inserts
+//! pairs, which the queue of pairs then runs.
 
 pub(crate) mod characters;
 pub(crate) mod checkpoint;

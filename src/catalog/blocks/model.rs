@@ -65,8 +65,8 @@ impl BlockSettings {
         Value::from(self.0.to_vec()).to_string()
     }
 
-    /// Returns the settings that differ from those of another process, which are given as [`BlockSettings::json`]. Returns
-    /// nothing if the text cannot be read.
+    /// Returns the settings that differ from those of another process, which are given as [`BlockSettings::json`].
+    /// Returns nothing if the text cannot be read.
     pub fn changes_from(&self, other: &str) -> Vec<FieldChange> {
         let other: Vec<Value> = serde_json::from_str(other).unwrap_or_default();
         let stages = BlockStage::ALL.into_iter().zip(other);

@@ -184,8 +184,8 @@ impl BlockJob {
 }
 
 impl Catalog {
-    /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only its
-    /// blocks.
+    /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
+    /// its blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -205,8 +205,8 @@ impl Catalog {
         Ok(entries.collect())
     }
 
-    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given, considers
-    /// only its blocks. Returns their number.
+    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
+    /// considers only its blocks. Returns their number.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -238,8 +238,8 @@ impl Catalog {
         .await
     }
 
-    /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files of
-    /// their results are missing or damaged.
+    /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
+    /// of their results are missing or damaged.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
