@@ -29,8 +29,9 @@ pub(super) struct RunArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M, estimated from the file sizes of
-    /// meshes and the image sizes of prints and pages; one that needs more runs alone [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M, estimated from the file sizes
+    /// of meshes and the image sizes of prints and pages; one that needs more runs alone [default: most of the free
+    /// memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
     /// Print what would run and why, without running it
@@ -48,8 +49,8 @@ pub(super) struct RunArgs {
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
-    /// others can reach, such as 10.0.0.7:9464
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
+    /// that others can reach, such as 10.0.0.7:9464
     #[arg(long, value_name = "PORT", value_parser = metrics::address, conflicts_with = "dry_run")]
     pub(super) metrics: Option<SocketAddr>,
 }

@@ -32,7 +32,8 @@ pub(super) struct WorkerArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M [default: most of the free
+    /// memory]
     #[arg(long, value_name = "SIZE", value_parser = run::bytes)]
     pub(super) memory: Option<u64>,
     /// Stop after this many pairs and blocks have failed
@@ -41,8 +42,8 @@ pub(super) struct WorkerArgs {
     /// Run only this stage and earlier ones
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
-    /// others can reach, such as 10.0.0.7:9464
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
+    /// that others can reach, such as 10.0.0.7:9464
     #[arg(long, value_name = "PORT", value_parser = metrics::address)]
     pub(super) metrics: Option<SocketAddr>,
 }
