@@ -59,9 +59,11 @@ async fn a_block_waits_until_a_running_pair_returns_its_memory() {
     let started = position(
         |event| matches!(event, RunEvent::BlockStageStarted { stage, .. } if *stage == BlockStage::Align),
     );
-    let ended =
-        position(|event| matches!(event, RunEvent::PairDone { pair } if pair.as_str() == "wait_1"));
-    assert!(ended.is_some() && started > ended, "{events:?}");
+    // The pair returns its memory when its last stage is computed, before that is stored.
+    let last = position(
+        |event| matches!(event, RunEvent::StageStarted { pair, stage: Stage::Register } if pair.as_str() == "wait_1"),
+    );
+    assert!(last.is_some() && started > last, "{events:?}");
 }
 
 #[tokio::test]
