@@ -313,7 +313,7 @@ async fn collect(
     let work = move || {
         let mut found = Unreferenced::default();
         let collected = named.collect(&project, age, is_idle, |file, removed| {
-            found.count(file, removed)
+            found.count(file, removed);
         });
         collected.map(|()| found)
     };

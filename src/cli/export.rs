@@ -153,7 +153,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         shard_mib: args.shard_mib,
         license: args.license.clone(),
         settings: config.that_change_results()?,
-        limits: input_file_limits(&config),
+        limits: input_file_limits(config),
     };
     if let Err(unused) = options.check(&formats) {
         return Err(Refusal::Usage(unused.to_string()).into());

@@ -72,27 +72,28 @@ pub(super) async fn pairs_and_blocks(
 ) -> anyhow::Result<NamedWork> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
-    let all_blocks = match unknown.is_empty() && names.len() == typed.len() {
-        true => Vec::new(),
-        false => catalog.block_names().await?,
+    let are_all_pairs = unknown.is_empty() && names.len() == typed.len();
+    let all_blocks = if are_all_pairs {
+        Vec::new()
+    } else {
+        catalog.block_names().await?
     };
     let mut found = NamedWork::default();
     for text in typed {
         let pair = text.parse::<PairName>().ok();
-        let pair = pair.filter(|name| !unknown.contains(name));
-        let block = || all_blocks.iter().find(|name| name.as_str() == text);
-        match (pair, block) {
-            (Some(pair), _) => found.pairs.push(pair),
-            (None, block) => match block() {
-                Some(block) => found.blocks.push(block.clone()),
-                None => {
-                    let pairs = catalog.pair_names().await?;
-                    let names = pairs.iter().map(PairName::as_str);
-                    let names = names.chain(all_blocks.iter().map(BlockName::as_str));
-                    return Err(no_such("pair or block", text, names).into());
-                }
-            },
+        if let Some(pair) = pair.filter(|name| !unknown.contains(name)) {
+            found.pairs.push(pair);
+            continue;
         }
+        let block = text.parse::<BlockName>().ok();
+        if let Some(block) = block.filter(|name| all_blocks.contains(name)) {
+            found.blocks.push(block);
+            continue;
+        }
+        let pairs = catalog.pair_names().await?;
+        let blocks = all_blocks.iter().map(BlockName::as_str);
+        let all = pairs.iter().map(PairName::as_str).chain(blocks);
+        return Err(no_such("pair or block", text, all).into());
     }
     Ok(found)
 }

@@ -1,8 +1,10 @@
 //! Limits the memory of a block and all running pairs together. The memory of a pair is estimated from its input files.
 
+use std::fmt;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use super::input_reads::ReadItem;
 use crate::catalog::PairAttributes;
 use crate::domain::Stage;
 use crate::raster;
@@ -51,8 +53,18 @@ impl MemoryBudget {
     }
 
     /// Returns the limit, if a pair or a block needs more than it allows in total.
-    pub(super) fn exceeded_by(&self, bytes: u64) -> Option<u64> {
+    fn exceeded_by(&self, bytes: u64) -> Option<u64> {
         self.limit.filter(|limit| bytes > *limit)
+    }
+
+    /// Warns if a pair or a block needs more than the limit allows in total.
+    pub(super) fn warn_if_exceeded(&self, what: fmt::Arguments<'_>, bytes: u64) {
+        if let Some(limit) = self.exceeded_by(bytes) {
+            let (need, limit) = (bytes >> 20, limit >> 20);
+            tracing::warn!(
+                "{what} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
+            );
+        }
     }
 
     /// Ends a reservation.
@@ -61,9 +73,30 @@ impl MemoryBudget {
     }
 }
 
+/// A pair whose memory is estimated.
+pub(super) struct EstimatedPair {
+    pub(super) project: Project,
+    pub(super) attributes: PairAttributes,
+    /// Next stage.
+    pub(super) from: Stage,
+    pub(super) limits: raster::ImageLimits,
+}
+
+impl ReadItem for EstimatedPair {
+    type Output = u64;
+
+    fn read(&self) -> u64 {
+        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.attributes.mesh_path)
+    }
+}
+
 /// Estimates the memory in bytes that a pair needs if it continues at stage `from`. A missing file counts as empty,
 /// because its pair soon fails.
-pub(super) fn estimated_bytes(
+fn estimated_bytes(
     project: &Project,
     pair: &PairAttributes,
     from: Stage,

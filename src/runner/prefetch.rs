@@ -2,7 +2,6 @@
 //! With the queue, no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,15 +10,14 @@ use tokio::task::JoinHandle;
 use super::claim_size::{CLAIM_AHEAD, DurationEstimate, FETCH_AHEAD, Load};
 use super::error::RunError;
 use super::events::RunEvent;
-use super::input_reads::{ReadItem, ReadLimits, read_each};
-use super::memory_budget::{MemoryBudget, PAIR_BYTES, estimated_bytes};
+use super::input_reads::{ReadLimits, read_each};
+use super::memory_budget::{EstimatedPair, MemoryBudget, PAIR_BYTES};
 use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWork};
-use crate::domain::{BlockName, PairName, Stage, WaitReason, WorkerId};
+use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
+use crate::domain::{BlockName, PairName, WaitReason, WorkerId};
 use crate::raster;
-use crate::store::Project;
 
 /// Identifies a task that occupies a slot. A pair may occupy two slots: after its lease was lost, the process may lease
 /// the pair again while the earlier task still computes.
@@ -158,12 +156,8 @@ impl Prefetch {
             return false;
         }
         self.block_bytes = bytes;
-        if let Some(limit) = self.memory.exceeded_by(bytes) {
-            let (need, limit) = (bytes >> 20, limit >> 20);
-            tracing::warn!(
-                "block {block} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no pair beside it"
-            );
-        }
+        self.memory
+            .warn_if_exceeded(format_args!("block {block}"), bytes);
         true
     }
 
@@ -218,7 +212,9 @@ impl Prefetch {
             self.release_all().await?;
             return Ok(None);
         }
-        self.warn_if_oversized(&next);
+        let name = &next.work.attributes.name;
+        self.memory
+            .warn_if_exceeded(format_args!("{name}"), next.bytes);
         let running = RunningPair {
             name: next.work.attributes.name.clone(),
             since: Instant::now(),
@@ -349,36 +345,5 @@ impl Prefetch {
             until: StopLevel::Drain,
         };
         async move { [read_each(estimated, &limits).await, others].concat() }
-    }
-
-    /// Warns if the memory estimate of a pair exceeds the limit for all running pairs together.
-    fn warn_if_oversized(&self, pair: &LeasedPair) {
-        if let Some(limit) = self.memory.exceeded_by(pair.bytes) {
-            let (need, limit) = (pair.bytes >> 20, limit >> 20);
-            let pair = &pair.work.attributes.name;
-            tracing::warn!(
-                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
-            );
-        }
-    }
-}
-
-/// A pair whose memory is estimated.
-struct EstimatedPair {
-    project: Project,
-    attributes: PairAttributes,
-    from: Stage,
-    limits: raster::ImageLimits,
-}
-
-impl ReadItem for EstimatedPair {
-    type Output = u64;
-
-    fn read(&self) -> u64 {
-        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
-    }
-
-    fn path(&self) -> PathBuf {
-        self.project.input_path(&self.attributes.mesh_path)
     }
 }

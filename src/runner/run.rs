@@ -24,7 +24,9 @@ use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
-use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection, WorkerSettings};
+use crate::catalog::{
+    Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
+};
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
@@ -103,7 +105,7 @@ pub(super) async fn run_with(
         project,
         catalog,
         fingerprints,
-        blocks: &*executors.blocks,
+        blocks: &executors.blocks,
         options,
         selection: selection.as_ref(),
         clock,
@@ -114,47 +116,39 @@ pub(super) async fn run_with(
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
-    if options.part == RunPart::Plan {
+    let counted = if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
-        let counted = (RunCounts::default(), Duration::ZERO);
-        let ended = RunEnd::of(
-            catalog,
-            fingerprints,
-            options.until,
-            selection.as_ref(),
-            counted,
-        );
-        let ended = ended.await?;
-        return Ok(ended.summary(stop, clock));
+        (RunCounts::default(), Duration::ZERO)
+    } else {
+        let (events, received) = mpsc::unbounded_channel();
+        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, events));
+        let scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+        compute(&context, scheduler, received, &mut on_event).await?
+    };
+    if let Some(selection) = &mut selection {
+        selection.refresh(catalog).await?;
     }
-    let (events, mut received) = mpsc::unbounded_channel();
-    let context = Arc::new(RunContext {
-        catalog: catalog.clone(),
-        project: project.clone(),
-        executor: executors.pairs,
-        blocks: executors.blocks,
-        block_limits: block_limits(options),
-        fingerprints: fingerprint_ids,
-        clock,
-        timing: Timing::of_this_build(),
-        stop: stop.clone(),
-        drain: Stop::new(),
-        until: options.until,
-        stage_timeout: options.stage_timeout,
-        events,
-        compute_us: AtomicU64::new(0),
-        metrics: options.metrics.clone(),
-    });
-    let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
-    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
-    let counts = scheduler.run(&mut received, &mut on_event).await;
+    let (until, selection) = (options.until, selection.as_ref());
+    let ended = RunEnd::of(catalog, fingerprints, until, selection, counted);
+    Ok(ended.await?.summary(stop, clock))
+}
+
+/// Runs the scheduler and ends the worker. Returns what was counted, and for how long stages were computed.
+async fn compute(
+    context: &RunContext,
+    mut scheduler: Scheduler,
+    mut events: mpsc::UnboundedReceiver<RunEvent>,
+    on_event: &mut (impl FnMut(RunEvent) + Send),
+) -> Result<(RunCounts, Duration), RunError> {
+    let (catalog, stop) = (&context.catalog, context.stop.clone());
+    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop));
+    let counts = scheduler.run(&mut events, on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let worker = scheduler.worker();
+    let (worker, now) = (scheduler.worker(), context.clock.now());
     let metrics = context.worker_metrics();
     let ended = catalog.retry_while_unavailable(async || {
-        catalog
-            .end_worker(worker, clock.now(), Some(&metrics))
-            .await
+        let ended = catalog.end_worker(worker, now, Some(&metrics));
+        ended.await
     });
     let ended = ended.await;
     stop_waiting.abort();
@@ -165,13 +159,8 @@ pub(super) async fn run_with(
     };
     let counts = counts?;
     ended?;
-    if let Some(selection) = &mut selection {
-        selection.refresh(catalog).await?;
-    }
     let computed = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
-    let (counted, selection) = ((counts, computed), selection.as_ref());
-    let ended = RunEnd::of(catalog, fingerprints, options.until, selection, counted);
-    Ok(ended.await?.summary(stop, clock))
+    Ok((counts, computed))
 }
 
 /// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database
@@ -187,7 +176,7 @@ struct RunStart<'a> {
     project: &'a Project,
     catalog: &'a Catalog,
     fingerprints: &'a Fingerprints,
-    blocks: &'a dyn BlockStages,
+    blocks: &'a Arc<dyn BlockStages>,
     options: &'a RunOptions,
     selection: Option<&'a RunSelection>,
     clock: Clock,
@@ -240,7 +229,34 @@ impl RunStart<'_> {
         ended.await?;
         let among = self.selection.map(|selection| &selection.blocks);
         let what = (options.rerun, among);
-        block_plan::requeue(self.project, catalog, self.blocks, what, &limits, now).await
+        block_plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+    }
+
+    /// Returns what the tasks of the run share.
+    fn context(
+        &self,
+        pairs: Arc<dyn StageExecutor>,
+        fingerprints: FingerprintIds,
+        events: mpsc::UnboundedSender<RunEvent>,
+    ) -> RunContext {
+        let options = self.options;
+        RunContext {
+            catalog: self.catalog.clone(),
+            project: self.project.clone(),
+            executor: pairs,
+            blocks: Arc::clone(self.blocks),
+            block_limits: block_limits(options),
+            fingerprints,
+            clock: self.clock,
+            timing: Timing::of_this_build(),
+            stop: self.stop.clone(),
+            drain: Stop::new(),
+            until: options.until,
+            stage_timeout: options.stage_timeout,
+            events,
+            compute_us: AtomicU64::new(0),
+            metrics: options.metrics.clone(),
+        }
     }
 
     /// Returns the selected pairs, or `None` for all.
