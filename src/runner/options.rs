@@ -43,7 +43,7 @@ pub struct RunOptions {
 pub struct NamedWork {
     /// Pairs.
     pub pairs: Vec<PairName>,
-    /// Blocks. Their pairs run too, including those that are yet to be cut.
+    /// Blocks. Their pairs run too, also pairs that are yet to be cut.
     pub blocks: Vec<BlockName>,
 }
 

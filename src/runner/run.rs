@@ -2,7 +2,7 @@
 //! scheduler.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
@@ -13,16 +13,16 @@ use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::input_reads::ReadLimits;
+use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
-use super::run_end::{RunEnd, block_limits};
+use super::run_end::{RunEnd, block_limits, compute};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
-use super::stop::{Stop, StopLevel};
+use super::stop::Stop;
 use super::worker_session::this_process;
 use crate::catalog::{
     Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
@@ -31,9 +31,6 @@ use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::Project;
-
-/// Time after a stop request during which a run still waits for an unavailable database server.
-const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
@@ -131,44 +128,6 @@ pub(super) async fn run_with(
     let (until, selection) = (options.until, selection.as_ref());
     let ended = RunEnd::of(catalog, fingerprints, until, selection, counted);
     Ok(ended.await?.summary(stop, clock))
-}
-
-/// Runs the scheduler and ends the worker. Returns what was counted, and for how long stages were computed.
-async fn compute(
-    context: &RunContext,
-    mut scheduler: Scheduler,
-    mut events: mpsc::UnboundedReceiver<RunEvent>,
-    on_event: &mut (impl FnMut(RunEvent) + Send),
-) -> Result<(RunCounts, Duration), RunError> {
-    let (catalog, stop) = (&context.catalog, context.stop.clone());
-    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop));
-    let counts = scheduler.run(&mut events, on_event).await;
-    // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let (worker, now) = (scheduler.worker(), context.clock.now());
-    let metrics = context.worker_metrics();
-    let ended = catalog.retry_while_unavailable(async || {
-        let ended = catalog.end_worker(worker, now, Some(&metrics));
-        ended.await
-    });
-    let ended = ended.await;
-    stop_waiting.abort();
-    // A lost log explains other errors.
-    let ended = match ended {
-        Err(error) if error.log_loss().is_some() => return Err(error.into()),
-        ended => ended,
-    };
-    let counts = counts?;
-    ended?;
-    let computed = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
-    Ok((counts, computed))
-}
-
-/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database
-/// server.
-async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
-    stop.reached(StopLevel::Drain).await;
-    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
-    catalog.stop_waiting();
 }
 
 /// What a run works on, before its scheduler starts.
@@ -279,15 +238,5 @@ impl RunStart<'_> {
         self.project.clear_temporary()?;
         lock.downgrade()?;
         Ok(recovered.ready)
-    }
-}
-
-/// Returns the limits for reads that take place before the first stage. Any stop request ends these reads, because no
-/// stage is in progress.
-pub(super) fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
-    ReadLimits {
-        timeout: options.stage_timeout,
-        stop: stop.clone(),
-        until: StopLevel::Drain,
     }
 }

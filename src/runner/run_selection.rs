@@ -11,7 +11,7 @@ pub(super) struct RunSelection {
     named: PairSelection,
     /// The blocks that were named.
     pub(super) blocks: BlockSelection,
-    /// The named pairs and those that have been cut from the blocks so far.
+    /// The named pairs, and the pairs that have been cut from the blocks so far.
     pub(super) pairs: PairSelection,
 }
 
@@ -45,7 +45,7 @@ impl RunSelection {
         Ok(Some(selection))
     }
 
-    /// Adds the pairs that were cut from the blocks since the last call, and removes those that were retired.
+    /// Adds the pairs that were cut from the blocks since the last call, and removes retired ones.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.

@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use serde_json::{Map, json};
+use serde_json::json;
 
 use fake_blocks::FakeBlocks;
 use fake_executor::FakeExecutor;
@@ -23,8 +23,7 @@ use super::{
     BlockStages as _, NamedWork, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel,
 };
 use crate::catalog::{
-    BlockSettings, Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo,
-    WorkerSettings,
+    BlockSettings, Catalog, ClaimRequest, Fingerprints, RerunPolicy, WorkerInfo, WorkerSettings,
 };
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
@@ -48,21 +47,6 @@ fn fingerprints() -> Fingerprints {
     Fingerprints::new(|_| json!({ "revision": 1 }))
 }
 
-/// A pair whose files do not exist.
-fn pair_row(pair: &str) -> ImportRow {
-    ImportRow {
-        name: name(pair),
-        mesh_path: format!("{pair}.stl"),
-        print_path: format!("{pair}.png"),
-        unit: None,
-        scanned_face_down: None,
-        character: None,
-        block: None,
-        meta: Map::new(),
-        prior: None,
-    }
-}
-
 fn options(workers: usize) -> RunOptions {
     RunOptions {
         workers,
@@ -84,7 +68,7 @@ impl RunFixture {
         let project = Project::create(dir.path()).expect("a project");
         let path = project.catalog_path();
         let catalog = create(&path).await.expect("a catalog");
-        let rows = pairs.iter().map(|pair| pair_row(pair));
+        let rows = pairs.iter().map(|pair| values::pair_row(pair));
         catalog.import(rows.collect(), 1).await.expect("imported");
         Self {
             project,

@@ -2,6 +2,7 @@
 
 mod answers;
 mod block_pairs;
+mod block_settings;
 mod blocks;
 mod claim_order;
 mod guards;

@@ -2,7 +2,8 @@
 
 use std::sync::atomic::Ordering;
 
-use super::{RunFixture, options, pair_row};
+use super::values::pair_row;
+use super::{RunFixture, options};
 use crate::domain::{BlockStage, JobStatus, Stage};
 use crate::runner::{RunEvent, RunOptions};
 

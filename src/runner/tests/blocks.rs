@@ -1,6 +1,7 @@
 //! Runs of blocks with fake stages: pairs that are cut, refusals, changed files and stops.
 
-use super::{RunFixture, name, options, pair_row};
+use super::values::pair_row;
+use super::{RunFixture, name, options};
 use crate::catalog::{BlockAttributes, BlockState, RerunPolicy};
 use crate::domain::{BlockName, BlockStage, FailureClass, JobStatus, Stage};
 use crate::runner::{NamedWork, RunError, RunEvent, RunOptions, StopLevel};

@@ -2,7 +2,7 @@
 
 use serde_json::Map;
 
-use crate::catalog::{BlockAttributes, PairAttributes};
+use crate::catalog::{BlockAttributes, ImportRow, PairAttributes};
 use crate::domain::{BlockName, MetricOutcome, PairName, ThresholdMetric, test_values};
 
 /// Returns a pair without optional attributes.
@@ -11,6 +11,21 @@ pub(in crate::runner) fn pair_attributes(mesh_path: &str, print_path: &str) -> P
         name: PairName::new("1").expect("a pair's name"),
         mesh_path: mesh_path.to_owned(),
         print_path: print_path.to_owned(),
+        unit: None,
+        scanned_face_down: None,
+        character: None,
+        block: None,
+        meta: Map::new(),
+        prior: None,
+    }
+}
+
+/// Returns a pair whose files do not exist.
+pub(super) fn pair_row(pair: &str) -> ImportRow {
+    ImportRow {
+        name: PairName::new(pair).expect("a pair's name"),
+        mesh_path: format!("{pair}.stl"),
+        print_path: format!("{pair}.png"),
         unit: None,
         scanned_face_down: None,
         character: None,
