@@ -60,7 +60,8 @@
 //! A whole **block** is the scan of a carved face with the image of its page. Its job has the stages `face`, `align`,
 //! `boxes` and `cut`, and rows of its own in the catalog (`catalog/blocks`). A process works on one block at a time, and on
 //! pairs only while it has no block: `block_slot.rs` in `runner` leases it, `block_task.rs` reads the versions of its
-//! files and computes a stage on a thread, and `block_checkpoint.rs` stores the result before the next stage begins. The
+//! files and computes a stage on a thread, and `block_checkpoint.rs` stores the result before the next stage begins.
+//! `run_selection.rs` selects the blocks and pairs of a run that names some. The
 //! stages are called through the trait in `block_stages.rs`. `catalog/blocks/cut.rs` stores the last stage and its pairs in
 //! one transaction: it adds new pairs, sends changed ones back to the first stage, and retires those whose boxes are gone.
 //! A retired pair has no row in `job`, only one in `retired_pair` (`catalog/blocks/retired.rs`), so that no other statement
@@ -105,8 +106,9 @@
 //!
 //! `store/input_place.rs` decides where an input is: at a path, below a named root, or in an object store. All readers take
 //! the resulting `Input`. `store/remote/` has the rest: `client.rs` and `bucket.rs` send requests, `cache.rs` keeps local
-//! copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair into one
-//! object. `runner/stage_files.rs` collects the stages of a pair for a pack, `runner/prefetch.rs` reads the inputs of leased
+//! copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair, or of a
+//! stage of a block, into one object. Meshes and prints of cut characters are inputs of pairs, so they are objects of their
+//! own (`store/artifact_object.rs`). `runner/stage_files.rs` collects the stages of a pair for a pack, `runner/prefetch.rs` reads the inputs of leased
 //! pairs before they start, and `store/collect.rs` removes packs without a row. The row of a stage names pack and offset of
 //! each artifact, but the hash of a result does not include them.
 //!

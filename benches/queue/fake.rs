@@ -1,6 +1,6 @@
 //! Checkpoints of faked stages, which compute nothing.
 
-use mocban::catalog::{Catalog, ClaimRequest, WorkerInfo};
+use mocban::catalog::{BlockSettings, Catalog, ClaimRequest, WorkerInfo, WorkerSettings};
 use mocban::catalog::{
     CheckpointOutcome, FingerprintIds, Fingerprints, InputVersion, InputVersions, Lease,
     MetricResult, StageCheckpoint,
@@ -25,6 +25,14 @@ pub(super) struct Fake {
     print: InputVersion,
 }
 
+/// Returns the settings of a worker that works on no blocks.
+fn settings(fingerprints: FingerprintIds) -> WorkerSettings {
+    WorkerSettings {
+        fingerprints,
+        blocks: BlockSettings::new(|_| json!({})),
+    }
+}
+
 impl Fake {
     /// Registers a worker.
     pub(super) async fn register(
@@ -39,7 +47,9 @@ impl Fake {
             boot_id: None,
         };
         Ok(Self {
-            worker: catalog.register_worker(info, fingerprints, 1).await?,
+            worker: catalog
+                .register_worker(info, settings(fingerprints), 1)
+                .await?,
             fingerprints,
             mesh: input(project, "mesh.stl")?,
             print: input(project, "print.png")?,
@@ -72,7 +82,7 @@ impl Fake {
             pid: std::process::id(),
             boot_id: None,
         };
-        let worker = catalog.register_worker(info, self.fingerprints, 1);
+        let worker = catalog.register_worker(info, settings(self.fingerprints), 1);
         Ok(Self {
             worker: worker.await?,
             ..self.clone()

@@ -15,6 +15,7 @@ CREATE TABLE worker (
     heartbeat INTEGER NOT NULL,
     ended INTEGER,
     fingerprints TEXT CHECK (json_valid(fingerprints)),
+    block_settings TEXT CHECK (json_valid(block_settings)),
     died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1)),
     metrics TEXT CHECK (json_valid(metrics))
 ) STRICT;

@@ -1,10 +1,10 @@
 //! The catalog: a database of SQLite or PostgreSQL with the data of every pair and the job queue. No other module
 //! contains SQL.
 //!
-//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs, `blocks`
-//! the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another catalog. One writer task owns the only write connection of
-//! this process and commits requests in groups. Reads use separate connections, also during a run. Callers pass the
-//! current time as an argument.
+//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs,
+//! `blocks` the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another
+//! catalog. One writer task owns the only write connection of this process and commits requests in groups. Reads use
+//! separate connections, also during a run. Callers pass the current time as an argument.
 
 mod audit;
 mod blocks;
@@ -46,6 +46,7 @@ pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
     StoredBlockFailure,
 };
+pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
@@ -69,7 +70,7 @@ pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
 pub use queue::worker_list::{WorkerRecord, WorkerState};
-pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
+pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
 pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};

@@ -7,6 +7,7 @@ use serde_json::Value;
 use tokio::sync::{mpsc, oneshot};
 
 use crate::catalog::db::commit_delay::CommitDelay;
+use crate::catalog::db::query::query_scalar;
 use crate::catalog::{
     Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, Lease, Result,
     StageCheckpoint,
@@ -50,6 +51,13 @@ impl Catalog {
     pub(crate) async fn create_patient(path: &Path) -> Result<Self> {
         Self::create(path).await?.close().await;
         Self::with_writer(path, false, CommitDelay::of(Duration::from_hours(1))).await
+    }
+
+    /// Returns how often leases of blocks were taken or ended by a recovery.
+    pub(crate) async fn block_tokens(&self) -> Result<i64> {
+        let mut conn = self.read_conn().await?;
+        let tokens = query_scalar("SELECT sum(token) FROM block_job");
+        tokens.fetch_one(&mut conn).await
     }
 
     /// Keeps the writer busy until the sender is used or dropped.

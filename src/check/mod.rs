@@ -174,15 +174,15 @@ async fn rows_and_files(
         return Ok(());
     }
     if let Some(age) = options.collect {
-        collect(project, named, age, summary).await?;
+        collect(project, named, (age, !options.in_use), summary).await?;
     } else if !options.in_use {
         unreferenced_files(project, named, options.repair, summary).await?;
     }
     Ok(())
 }
 
-/// Checks all blocks, and adds their artifacts to `named`. With `repair`, sends damaged blocks back to the damaged stage,
-/// so that the next run writes the files again.
+/// Checks all blocks, and adds their artifacts to `named`. With `repair`, sends damaged blocks back to the damaged
+/// stage, so that the next run writes the files again.
 async fn check_blocks(
     project: &Project,
     catalog: &Catalog,
@@ -301,17 +301,20 @@ async fn repair_pairs(
     Ok(())
 }
 
-/// Counts unreferenced files and packs, and removes those of at least this age.
+/// Counts unreferenced files and packs, and removes those of at least this age. With `is_idle`, also objects of
+/// characters in an object store.
 async fn collect(
     project: &Project,
     named: ReferencedArtifacts,
-    age: Duration,
+    (age, is_idle): (Duration, bool),
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
     let project = project.clone();
     let work = move || {
         let mut found = Unreferenced::default();
-        let collected = named.collect(&project, age, |file, removed| found.count(file, removed));
+        let collected = named.collect(&project, age, is_idle, |file, removed| {
+            found.count(file, removed);
+        });
         collected.map(|()| found)
     };
     summary.unreferenced = Some(tokio::task::spawn_blocking(work).await??);

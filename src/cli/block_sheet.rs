@@ -7,12 +7,11 @@ use serde_json::json;
 use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
-use super::files;
+use super::files::{self, input_file_limits};
 use super::select;
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::domain::ThresholdMetric;
-use crate::export::InputFileLimits;
 use crate::export::block_view::{BlockView, BlockViewError};
 use crate::raster::png_rgb8;
 use crate::store::Project;
@@ -86,11 +85,7 @@ pub(super) async fn read(
     context: &Context,
 ) -> anyhow::Result<BlockView> {
     let name = select::existing_block(catalog, typed).await?;
-    let limits = context.settings()?.config.limits;
-    let limits = InputFileLimits {
-        mesh: limits.mesh,
-        image: limits.image,
-    };
+    let limits = input_file_limits(&context.settings()?.config);
     match BlockView::read(catalog, project, &name, metric, limits).await {
         Ok(view) => Ok(view),
         Err(error @ (BlockViewError::NotAligned { .. } | BlockViewError::NoResult { .. })) => {

@@ -84,8 +84,8 @@ impl BlockStatus {
         })
     }
 
-    /// Returns `12 blocks · 9 done · 1 running · 1 failed · 2345 characters`. If no process works on the project, leased
-    /// blocks are interrupted.
+    /// Returns `12 blocks · 9 done · 1 running · 1 failed · 2345 characters`. If no process works on the project,
+    /// leased blocks are interrupted.
     pub(super) fn line(&self, is_running: bool, palette: Palette) -> String {
         let leased = self.leased();
         let characters: u64 = self.states.iter().map(|state| state.characters).sum();

@@ -13,7 +13,7 @@ use super::context::{Context, now};
 use super::error_text;
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
-use super::table::{columns, count};
+use super::table::{columns, count, pairs_and_blocks};
 use crate::catalog::{Catalog, CatalogError};
 use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
@@ -245,13 +245,10 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
             "{pairs} not queued again, because a mesh or print is missing: put it back, then run `check --repair`"
         ));
     }
-    let requeued = [(done.requeued, "pair"), (done.requeued_blocks, "block")].into_iter();
-    let requeued = requeued.filter(|(number, _)| *number > 0);
-    let requeued: Vec<String> = requeued.map(|(number, what)| count(number, what)).collect();
-    if repaired && !requeued.is_empty() {
+    if repaired && done.requeued + done.requeued_blocks > 0 {
+        let requeued = pairs_and_blocks(done.requeued, done.requeued_blocks);
         lines.push(format!(
-            "{} will run again from the stage listed above",
-            requeued.join(" and ")
+            "{requeued} will run again from the stage listed above"
         ));
     }
     lines

@@ -18,8 +18,8 @@ pub(super) enum DbCommand {
 /// Arguments of `db init`.
 #[derive(Debug, Args)]
 pub(super) struct DbInitArgs {
-    /// Also create the roles `mocban_owner`, `mocban_worker`, `mocban_reviewer` and `mocban_viewer`, or give them the rights
-    /// that this version needs; the user needs the right CREATEROLE
+    /// Also create the roles `mocban_owner`, `mocban_worker`, `mocban_reviewer` and `mocban_viewer`, or give them the
+    /// rights that this version needs; the user needs the right CREATEROLE
     #[arg(long)]
     pub(super) roles: bool,
     /// Print the SQL of --roles for an administrator, without connecting

@@ -117,8 +117,8 @@ async fn block_demo(
     align(dir, Some(&files.truth), context).await
 }
 
-/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are. `block_truth` is the file
-/// with the true alignment of a whole block.
+/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are. `block_truth` is the
+/// file with the true alignment of a whole block.
 async fn align(
     dir: &Path,
     block_truth: Option<&Path>,

@@ -10,11 +10,12 @@ use serde_json::json;
 use super::busy::Busy;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
+use super::files::input_file_limits;
 use super::table::count;
 use crate::domain::ThresholdMetric;
 use crate::export::{
-    ExportFormat, ExportOptions, ExportSummary, InputFileLimits, ResultFilter, SplitBy,
-    SplitCounts, SplitSettings, SplitShares,
+    ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
+    SplitShares,
 };
 
 /// Arguments of `export`.
@@ -152,10 +153,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
         shard_mib: args.shard_mib,
         license: args.license.clone(),
         settings: config.that_change_results()?,
-        limits: InputFileLimits {
-            mesh: config.limits.mesh,
-            image: config.limits.image,
-        },
+        limits: input_file_limits(config),
     };
     if let Err(unused) = options.check(&formats) {
         return Err(Refusal::Usage(unused.to_string()).into());

@@ -8,7 +8,9 @@ use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::catalog::Catalog;
+use crate::config::Config;
 use crate::domain::sanitize;
+use crate::export::InputFileLimits;
 use crate::store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
@@ -180,6 +182,14 @@ impl RefusedLine {
 
 fn refusal(action: &str, path: &Path, error: &std::io::Error) -> Refusal {
     Refusal::Usage(format!("cannot {action} {}: {error}", path.display()))
+}
+
+/// Returns the limits of input files in the settings.
+pub(super) const fn input_file_limits(config: &Config) -> InputFileLimits {
+    InputFileLimits {
+        mesh: config.limits.mesh,
+        image: config.limits.image,
+    }
 }
 
 #[cfg(test)]

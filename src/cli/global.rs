@@ -17,8 +17,8 @@ pub(super) struct Global {
     /// Override one setting, such as run.workers=2; may be repeated
     #[arg(long, value_name = "SECTION.KEY=VALUE", global = true, action = ArgAction::Append)]
     pub(super) set: Vec<String>,
-    /// Address of the catalog in PostgreSQL, such as <postgres://me@db.example/lab> [default: storage.catalog, or the file
-    /// catalog.sqlite in the project]
+    /// Address of the catalog in PostgreSQL, such as <postgres://me@db.example/lab> [default: storage.catalog, or the
+    /// file catalog.sqlite in the project]
     #[arg(long, value_name = "URL", global = true)]
     pub(super) catalog: Option<String>,
     /// Print only warnings and errors

@@ -1,4 +1,5 @@
-//! `import`: adds pairs of meshes and prints, or whole blocks, to the project, and creates the project if there is none.
+//! `import`: adds pairs of meshes and prints, or whole blocks, to the project, and creates the project if there is
+//! none.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,8 +37,8 @@ const NOT_IMPORTED: &str = "nothing was imported";
 #[derive(Debug, Default, Args)]
 pub(super) struct ImportArgs {
     /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
-    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels, unit,
-    /// side; paths are relative to the file
+    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels,
+    /// unit, side; paths are relative to the file
     #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(super) file: Option<PathBuf>,
     /// A directory of meshes, paired with --prints by file stem

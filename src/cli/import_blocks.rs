@@ -124,11 +124,6 @@ pub(super) async fn import_blocks(
     let mut listing = listing(source)?;
     let (storage, url) = context.data_locations()?;
     let project = Project::at(&context.dir()).with_storage(storage);
-    if project.has_packs() {
-        let text = "blocks cannot be imported into a project whose artifacts are in an object store (storage.artifacts), \
-                    because the cut characters are files of the project; use a project without this setting";
-        return Err(Refusal::Usage(text.to_owned()).into());
-    }
     let mut missing = MissingFiles::default();
     for row in &mut listing.rows {
         locate(row, &listing.label, &project, &mut missing);

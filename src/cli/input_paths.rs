@@ -5,8 +5,8 @@ use std::path::{Component, Path, PathBuf};
 use unicode_normalization::UnicodeNormalization as _;
 
 /// Returns the path of a file whose name is written differently in a list: with the other Unicode form of accented
-/// letters (macOS writes some names decomposed, Windows and Linux composed), or with the backslashes of Windows. Returns
-/// `None` if the path exists as written, or under no such name.
+/// letters (macOS writes some names decomposed, Windows and Linux composed), or with the backslashes of Windows.
+/// Returns `None` if the path exists as written, or under no such name.
 pub(super) fn on_disk(path: &Path) -> Option<PathBuf> {
     // An error, such as a folder that cannot be entered, is reported with the path as written.
     if !matches!(path.try_exists(), Ok(false)) {

@@ -34,7 +34,8 @@ pub(super) struct ReportArgs {
     /// Confidence intervals of Acc: wilson, or exact (Clopper-Pearson)
     #[arg(long, value_name = "METHOD", default_value = "wilson")]
     pub(super) ci: IntervalMethod,
-    /// Include computing times by stage and the time of the last result, as html always does; the output then differs from run to run
+    /// Include computing times by stage and the time of the last result, as html always does; the output then differs
+    /// from run to run
     #[arg(long)]
     pub(super) with_times: bool,
     /// Also print the table of another project; only with the formats text and json

@@ -6,16 +6,17 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
-use super::table::count;
+use super::table::pairs_and_blocks;
 use crate::catalog::{BlockRetry, Catalog, RetrySelection};
 use crate::domain::FailureClass;
+use crate::runner::NamedWork;
 
 /// Arguments of `retry`.
 #[derive(Debug, Args)]
 pub(super) struct RetryArgs {
     /// The pairs or blocks to retry [default: all that failed]
-    #[arg(conflicts_with = "class")]
-    pub(super) pairs: Vec<String>,
+    #[arg(value_name = "NAME", conflicts_with = "class")]
+    pub(super) names: Vec<String>,
     /// Retry the pairs and blocks that failed with this class: `bad_input`, `no_solution`, io, resource or bug
     #[arg(long)]
     pub(super) class: Option<FailureClass>,
@@ -35,10 +36,8 @@ pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
         json["blocks"] = blocks.into();
     }
     context.print_json(&json)?;
-    let numbers = [(retried, "pair"), (blocks, "block")].into_iter();
-    let numbers = numbers.filter(|(number, _)| *number > 0);
-    let numbers: Vec<String> = numbers.map(|(number, what)| count(number, what)).collect();
-    context.info(&format!("{} will run again", numbers.join(" and ")));
+    let numbers = pairs_and_blocks(retried, blocks);
+    context.info(&format!("{numbers} will run again"));
     context.next("run");
     Ok(ExitCode::Done)
 }
@@ -51,24 +50,17 @@ async fn selection(
     if let Some(class) = args.class {
         return Ok((RetrySelection::Class(class), BlockRetry::Class(class)));
     }
-    if args.pairs.is_empty() {
+    if args.names.is_empty() {
         return Ok((RetrySelection::All, BlockRetry::All));
     }
-    let (mut blocks, mut pairs) = (Vec::new(), Vec::new());
-    for typed in &args.pairs {
-        match select::block(catalog, typed).await? {
-            Some(block) => blocks.push(block),
-            None => pairs.push(typed.clone()),
-        }
-    }
-    let pairs = select::pairs(catalog, &pairs).await?;
+    let NamedWork { pairs, blocks } = select::pairs_and_blocks(catalog, &args.names).await?;
     Ok((RetrySelection::Names(pairs), BlockRetry::Names(blocks)))
 }
 
 fn no_match(selection: &RetrySelection) -> String {
     match selection {
-        RetrySelection::All => "no pair has failed".to_owned(),
-        RetrySelection::Class(class) => format!("no pair has failed with class {class}"),
-        RetrySelection::Names(_) => "none of these pairs has failed".to_owned(),
+        RetrySelection::All => "no pair or block has failed".to_owned(),
+        RetrySelection::Class(class) => format!("no pair or block has failed with class {class}"),
+        RetrySelection::Names(_) => "none of these has failed".to_owned(),
     }
 }

@@ -8,12 +8,12 @@ use serde_json::json;
 use super::browser::open;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
+use super::files::input_file_limits;
 use super::output;
 use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
-use crate::export::InputFileLimits;
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
@@ -106,10 +106,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         keys,
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
-        limits: InputFileLimits {
-            mesh: settings.config.limits.mesh,
-            image: settings.config.limits.image,
-        },
+        limits: input_file_limits(&settings.config),
         now,
         queue: queue_options(&args),
     };

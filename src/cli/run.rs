@@ -11,7 +11,7 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::metrics::{self, MetricsServer};
 use super::progress::ProgressReporter;
-use super::table::{columns, count};
+use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
 use super::{select, signals};
 use crate::catalog::{BlockPlanEntry, Catalog, Plan, RerunPolicy};
@@ -23,13 +23,15 @@ use crate::store::Project;
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]
 pub(super) struct RunArgs {
-    /// Only these pairs [default: all]
-    pub(super) pairs: Vec<String>,
+    /// Only these pairs, and these blocks with their pairs [default: all]
+    #[arg(value_name = "NAME")]
+    pub(super) names: Vec<String>,
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs processed at the same time, such as 4G or 512M, estimated from the file sizes of meshes and
-    /// the image sizes of prints; a pair that needs more runs alone [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M, estimated from the file sizes
+    /// of meshes and the image sizes of prints and pages; one that needs more runs alone [default: most of the free
+    /// memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
     /// Print what would run and why, without running it
@@ -38,7 +40,7 @@ pub(super) struct RunArgs {
     /// Join a run in another process as additional workers
     #[arg(long)]
     pub(super) join: bool,
-    /// Stop after this many pairs have failed
+    /// Stop after this many pairs and blocks have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
     /// Also run these pairs again: failed, stale (settings or files changed, which every run includes) or all
@@ -47,8 +49,8 @@ pub(super) struct RunArgs {
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
-    /// others can reach, such as 10.0.0.7:9464
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
+    /// that others can reach, such as 10.0.0.7:9464
     #[arg(long, value_name = "PORT", value_parser = metrics::address, conflicts_with = "dry_run")]
     pub(super) metrics: Option<SocketAddr>,
 }
@@ -117,7 +119,10 @@ pub(super) async fn options(
     catalog: &Catalog,
     part: RunPart,
 ) -> anyhow::Result<RunOptions> {
-    let pairs = select::some_or_all(catalog, &args.pairs).await?;
+    let only = match args.names.as_slice() {
+        [] => None,
+        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
+    };
     let plain = from_config(config);
     Ok(RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
@@ -125,7 +130,7 @@ pub(super) async fn options(
         part,
         join: args.join,
         max_failures: args.max_failures,
-        pairs,
+        only,
         rerun: match (args.rerun, args.stage) {
             (Some(RerunPolicy::All(_)), Some(stage)) => RerunPolicy::All(stage),
             (rerun, _) => rerun.unwrap_or(plain.rerun),
@@ -225,7 +230,7 @@ fn pair_headline(summary: &RunSummary) -> String {
         return format!("stopped after {took}: {done} done, {left} left; the state is safe");
     }
     if summary.too_many_failures {
-        let failed = count(summary.failed, "pair");
+        let failed = pairs_and_blocks(summary.failed, summary.blocks.failed);
         return format!(
             "stopped after {took} because {failed} failed in this run: {done} done, {left} left"
         );

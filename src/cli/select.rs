@@ -1,9 +1,10 @@
-//! Pairs named on the command line.
+//! Pairs and blocks named on the command line.
 
 use super::exit::Refusal;
 use crate::catalog::Catalog;
 use crate::config::nearest;
 use crate::domain::{BlockName, PairName};
+use crate::runner::NamedWork;
 
 /// Looks up pairs by their ids.
 ///
@@ -20,7 +21,7 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
         None => Ok(names),
         Some(text) => {
             let all = catalog.pair_names().await?;
-            Err(Refusal::NothingSelected(no_such_pair(text, &all)).into())
+            Err(no_such("pair", text, all.iter().map(PairName::as_str)).into())
         }
     }
 }
@@ -45,7 +46,7 @@ pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairN
     names
         .into_iter()
         .next()
-        .ok_or_else(|| Refusal::NothingSelected(no_such_pair(typed, &[])).into())
+        .ok_or_else(|| no_such("pair", typed, std::iter::empty()).into())
 }
 
 /// Returns the block with this id, if there is one and no pair has the same id.
@@ -61,6 +62,42 @@ pub(super) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Opti
     Ok(catalog.block_names().await?.contains(&name).then_some(name))
 }
 
+/// Looks up pairs and blocks by their ids. An id of both is that of the pair.
+///
+/// # Errors
+/// Returns an error if there is neither a pair nor a block with an id. The message suggests similar ids.
+pub(super) async fn pairs_and_blocks(
+    catalog: &Catalog,
+    typed: &[String],
+) -> anyhow::Result<NamedWork> {
+    let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    let are_all_pairs = unknown.is_empty() && names.len() == typed.len();
+    let all_blocks = if are_all_pairs {
+        Vec::new()
+    } else {
+        catalog.block_names().await?
+    };
+    let mut found = NamedWork::default();
+    for text in typed {
+        let pair = text.parse::<PairName>().ok();
+        if let Some(pair) = pair.filter(|name| !unknown.contains(name)) {
+            found.pairs.push(pair);
+            continue;
+        }
+        let block = text.parse::<BlockName>().ok();
+        if let Some(block) = block.filter(|name| all_blocks.contains(name)) {
+            found.blocks.push(block);
+            continue;
+        }
+        let pairs = catalog.pair_names().await?;
+        let blocks = all_blocks.iter().map(BlockName::as_str);
+        let all = pairs.iter().map(PairName::as_str).chain(blocks);
+        return Err(no_such("pair or block", text, all).into());
+    }
+    Ok(found)
+}
+
 /// Looks up one block.
 ///
 /// # Errors
@@ -68,41 +105,32 @@ pub(super) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Opti
 pub(super) async fn existing_block(catalog: &Catalog, typed: &str) -> anyhow::Result<BlockName> {
     let all = catalog.block_names().await?;
     let name = typed.parse::<BlockName>().ok();
-    if let Some(name) = name.filter(|name| all.contains(name)) {
-        return Ok(name);
-    }
-    let similar = nearest(typed, all.iter().map(BlockName::as_str), 3);
+    name.filter(|name| all.contains(name))
+        .ok_or_else(|| no_such("block", typed, all.iter().map(BlockName::as_str)).into())
+}
+
+/// Returns the refusal of an id that does not exist, with similar ids.
+fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str>) -> Refusal {
+    let similar = nearest(typed, all, 3);
     let hint = if similar.is_empty() {
         String::new()
     } else {
         format!("; similar ids: {}", similar.join(", "))
     };
-    Err(Refusal::NothingSelected(format!("there is no block {typed}{hint}")).into())
-}
-
-fn no_such_pair(typed: &str, all: &[PairName]) -> String {
-    let similar = nearest(typed, all.iter().map(PairName::as_str), 3);
-    if similar.is_empty() {
-        format!("there is no pair {typed}")
-    } else {
-        format!(
-            "there is no pair {typed}; similar ids: {}",
-            similar.join(", ")
-        )
-    }
+    Refusal::NothingSelected(format!("there is no {what} {typed}{hint}"))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::no_such_pair;
+    use super::no_such;
 
     #[test]
     fn similar_ids_are_suggested() {
-        let all = ["0001", "0002", "b04-0117"].map(|id| id.parse().expect("valid id"));
+        let text = |typed| no_such("pair", typed, ["0001", "0002", "b04-0117"].into_iter());
         assert_eq!(
-            no_such_pair("b4-0117", &all),
+            text("b4-0117").to_string(),
             "there is no pair b4-0117; similar ids: b04-0117"
         );
-        assert_eq!(no_such_pair("zzz", &all), "there is no pair zzz");
+        assert_eq!(text("zzz").to_string(), "there is no pair zzz");
     }
 }

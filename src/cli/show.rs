@@ -14,22 +14,26 @@ use super::verdict;
 use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, Stage, ThresholdMetric};
 use crate::report::ManualCorrection;
-use crate::runner;
+use crate::runner::{self, NamedWork};
 use crate::store::Project;
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]
 pub(super) struct ShowArgs {
-    /// The pair, or a block
-    pub(super) pair: String,
+    /// The pair or block
+    pub(super) name: String,
 }
 
 pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
-    if let Some(block) = select::block(&catalog, &args.pair).await? {
-        return show_block(&block, &project, catalog, context).await;
-    }
-    let name = select::pair(&catalog, &args.pair).await?;
+    let typed = std::slice::from_ref(&args.name);
+    let NamedWork { pairs, blocks } = select::pairs_and_blocks(&catalog, typed).await?;
+    let (pair, block) = (pairs.into_iter().next(), blocks.into_iter().next());
+    let name = match (pair, block) {
+        (_, Some(block)) => return show_block(&block, &project, catalog, context).await,
+        (Some(pair), None) => pair,
+        (None, None) => anyhow::bail!("{} was not looked up", args.name),
+    };
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     let why = catalog.why(&name, &fingerprints).await?;
     let Some(detail) = catalog.pair(&name).await? else {

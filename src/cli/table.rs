@@ -51,11 +51,21 @@ pub(super) fn count(number: u64, noun: &str) -> String {
     format!("{number} {noun}{ending}")
 }
 
+/// Formats numbers of pairs and blocks: `2 pairs and 1 block`. Leaves blocks out if there are none, and pairs if there
+/// are only blocks.
+pub(super) fn pairs_and_blocks(pairs: u64, blocks: u64) -> String {
+    match (pairs, blocks) {
+        (pairs, 0) => count(pairs, "pair"),
+        (0, blocks) => count(blocks, "block"),
+        (pairs, blocks) => format!("{} and {}", count(pairs, "pair"), count(blocks, "block")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use clap::ColorChoice;
 
-    use super::{columns, count, width};
+    use super::{columns, count, pairs_and_blocks, width};
     use crate::cli::screen::{Palette, Tone};
 
     #[test]
@@ -92,5 +102,12 @@ mod tests {
     fn one_is_singular() {
         assert_eq!(count(1, "pair"), "1 pair");
         assert_eq!(count(0, "pair"), "0 pairs");
+    }
+
+    #[test]
+    fn what_there_is_none_of_is_left_out() {
+        assert_eq!(pairs_and_blocks(1, 2), "1 pair and 2 blocks");
+        assert_eq!(pairs_and_blocks(0, 1), "1 block");
+        assert_eq!(pairs_and_blocks(0, 0), "0 pairs");
     }
 }

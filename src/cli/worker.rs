@@ -10,7 +10,7 @@ use super::exit::ExitCode;
 use super::metrics;
 use super::run::{self, RunArgs};
 use super::signals;
-use super::table::count;
+use super::table::pairs_and_blocks;
 use crate::catalog::RerunPolicy;
 use crate::domain::Stage;
 use crate::runner::{self, RunPart, Stop};
@@ -18,8 +18,9 @@ use crate::runner::{self, RunPart, Stop};
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(super) struct PlanArgs {
-    /// Only these pairs [default: all]
-    pub(super) pairs: Vec<String>,
+    /// Only these pairs, and these blocks with their pairs [default: all]
+    #[arg(value_name = "NAME")]
+    pub(super) names: Vec<String>,
     /// Also plan these pairs again: failed, stale (settings or files changed, which every plan includes) or all
     #[arg(long, value_name = "WHICH", value_parser = run::rerun)]
     pub(super) rerun: Option<RerunPolicy>,
@@ -31,24 +32,25 @@ pub(super) struct WorkerArgs {
     /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs processed at the same time, such as 4G or 512M [default: most of the free memory]
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M [default: most of the free
+    /// memory]
     #[arg(long, value_name = "SIZE", value_parser = run::bytes)]
     pub(super) memory: Option<u64>,
-    /// Stop after this many pairs have failed
+    /// Stop after this many pairs and blocks have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
     /// Run only this stage and earlier ones
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address that
-    /// others can reach, such as 10.0.0.7:9464
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
+    /// that others can reach, such as 10.0.0.7:9464
     #[arg(long, value_name = "PORT", value_parser = metrics::address)]
     pub(super) metrics: Option<SocketAddr>,
 }
 
 pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let args = RunArgs {
-        pairs: args.pairs,
+        names: args.names,
         rerun: args.rerun,
         ..RunArgs::default()
     };
@@ -65,14 +67,7 @@ pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     context.print_json(&json!({
         "schema": 1, "pairs": planned.left, "blocks": blocks, "status": planned.status,
     }))?;
-    let numbers = match blocks {
-        0 => count(planned.left, "pair"),
-        blocks => format!(
-            "{} and {}",
-            count(blocks, "block"),
-            count(planned.left, "pair")
-        ),
-    };
+    let numbers = pairs_and_blocks(planned.left, blocks);
     context.info(&format!("{numbers} to run"));
     if planned.left + blocks > 0 {
         context.next("worker");

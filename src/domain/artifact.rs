@@ -18,19 +18,22 @@ pub struct ArtifactRef {
     pub ext: String,
     /// Length in bytes.
     pub bytes: u64,
-    /// Where it is in an object store. `None` for a file of its own in the project's folder.
+    /// Its pack in an object store. `None` for a file of its own in the project's folder, or an object of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pack: Option<PackLocation>,
 }
 
 impl ArtifactRef {
-    /// Returns the path of the file below the project, with slashes. `None` for an artifact in an object store.
+    /// Returns the path of the file below the project, with slashes, or the key of its object in an object store. `None`
+    /// for an artifact in a pack.
     pub fn stored_path(&self) -> Option<String> {
-        if self.pack.is_some() {
-            return None;
-        }
+        self.pack.is_none().then(|| self.path_of_file())
+    }
+
+    /// Returns the path that the artifact has below the project if it is a file of its own, with slashes.
+    pub fn path_of_file(&self) -> String {
         let hex = self.hash.to_hex();
-        Some(format!("{ARTIFACTS}/{}/{hex}.{}", &hex[..2], self.ext))
+        format!("{ARTIFACTS}/{}/{hex}.{}", &hex[..2], self.ext)
     }
 
     /// Returns the artifact at a path below the project, of unknown length, or `None` if the path is not one of an

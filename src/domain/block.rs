@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ArtifactSet, ContentHash, PairName, PairNameError, enum_names};
+use super::{ArtifactSet, ContentHash, PairName, PairNameError, enum_names, stage_order};
 
 /// Row id of a block in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -85,23 +85,9 @@ enum_names! { pub BlockStage, "a stage of a block":
     Face = "face", Align = "align", Boxes = "boxes", Cut = "cut",
 }
 
+stage_order!(BlockStage);
+
 impl BlockStage {
-    /// Returns the position of the stage in the processing order, 0 to 3. A block job's cursor is the index of its next
-    /// stage.
-    pub const fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Returns the stage at a cursor; `None` after the last stage.
-    pub fn from_index(index: usize) -> Option<Self> {
-        Self::ALL.get(index).copied()
-    }
-
-    /// Returns the next stage, or `None` after the last.
-    pub fn next(self) -> Option<Self> {
-        Self::from_index(self.index() + 1)
-    }
-
     /// Returns whether the stage reads the image of the page.
     pub const fn reads_page(self) -> bool {
         !matches!(self, Self::Face)

@@ -1,4 +1,4 @@
-//! Names of enums without fields, in one table per enum.
+//! Names of enums without fields, in one table per enum, and the order of stages.
 
 /// Defines `ALL`, `name`, `Display` and `FromStr` of an enum from a table of its variants and their names.
 ///
@@ -37,4 +37,29 @@ macro_rules! enum_names {
     };
 }
 
+/// Defines the processing order of an enum of stages whose variants are in this order, with `index`, `from_index` and
+/// `next`.
+macro_rules! stage_order {
+    ($type:ident) => {
+        impl $type {
+            /// Returns the position of the stage in the processing order, from 0. A job's cursor is the index of its
+            /// next stage.
+            pub const fn index(self) -> usize {
+                self as usize
+            }
+
+            /// Returns the stage at a cursor; `None` after the last stage.
+            pub fn from_index(index: usize) -> Option<Self> {
+                Self::ALL.get(index).copied()
+            }
+
+            /// Returns the next stage, or `None` after the last.
+            pub fn next(self) -> Option<Self> {
+                Self::from_index(self.index() + 1)
+            }
+        }
+    };
+}
+
 pub(crate) use enum_names;
+pub(crate) use stage_order;

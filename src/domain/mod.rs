@@ -36,7 +36,7 @@ pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
 pub use control_points::{ControlPoint, ControlPoints};
-pub(crate) use enum_names::enum_names;
+pub(crate) use enum_names::{enum_names, stage_order};
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::enum_names;
+use super::{enum_names, stage_order};
 
 /// A stage of the pipeline. Variants are in processing order.
 ///
@@ -30,23 +30,7 @@ enum_names! { pub Stage, "a stage":
     Fit = "fit", Depth = "depth", Normalize = "normalize", Register = "register",
 }
 
-impl Stage {
-    /// Returns the position of the stage in the processing order, 0 to 3. A job's cursor is the index of its next
-    /// stage.
-    pub const fn index(self) -> usize {
-        self as usize
-    }
-
-    /// Returns the stage at a cursor; `None` after the last stage.
-    pub fn from_index(index: usize) -> Option<Self> {
-        Self::ALL.get(index).copied()
-    }
-
-    /// Returns the next stage, or `None` after the last.
-    pub fn next(self) -> Option<Self> {
-        Self::from_index(self.index() + 1)
-    }
-}
+stage_order!(Stage);
 
 #[cfg(test)]
 mod tests {

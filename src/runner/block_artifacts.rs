@@ -9,12 +9,15 @@ use crate::domain::{
 use crate::failpoint::{self, Point};
 use crate::store::{ArtifactError, NewArtifact, Project};
 
-/// The artifacts of a stage in progress.
+/// The artifacts of a stage in progress. In an object store, they are one pack, except for the meshes and prints of
+/// characters: pairs read these as inputs, so each is an object of its own.
 pub(super) struct StageArtifacts<'a> {
     project: &'a Project,
     block: &'a BlockName,
     stage: BlockStage,
     written: Mutex<ArtifactSet>,
+    /// Artifacts for the pack.
+    packed: Mutex<Vec<NewArtifact>>,
 }
 
 impl<'a> StageArtifacts<'a> {
@@ -25,13 +28,46 @@ impl<'a> StageArtifacts<'a> {
             block,
             stage,
             written: Mutex::default(),
+            packed: Mutex::default(),
         }
     }
 
-    /// Returns the artifacts that were written, by role.
-    pub(super) fn finish(self) -> ArtifactSet {
+    /// Returns the artifacts that were written, by role. Stores the pack.
+    ///
+    /// # Errors
+    /// Returns an error if the pack cannot be stored.
+    pub(super) fn finish(self) -> Result<ArtifactSet, BlockStageError> {
         let written = self.written.into_inner();
-        written.unwrap_or_else(PoisonError::into_inner)
+        let mut written = written.unwrap_or_else(PoisonError::into_inner);
+        let packed = self.packed.into_inner();
+        let packed = packed.unwrap_or_else(PoisonError::into_inner);
+        if packed.is_empty() {
+            return Ok(written);
+        }
+        failpoint::hit(self.stage, Point::Written, Some(self.block));
+        let locations = self.project.write_pack(&packed).map_err(failed)?;
+        for (file, location) in packed.iter().zip(locations) {
+            if let Some(artifact) = written.get_mut(file.role()) {
+                artifact.pack = Some(location);
+            }
+        }
+        Ok(written)
+    }
+
+    /// Writes an artifact, or keeps it for the pack.
+    fn store(&self, file: NewArtifact) -> Result<(), BlockStageError> {
+        let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
+        if !self.project.has_packs() {
+            let files = std::slice::from_ref(&file);
+            return (self.project.write_artifacts(files, &on_written)).map_err(failed);
+        }
+        if self.stage == BlockStage::Cut {
+            on_written();
+            return self.project.write_objects(&[file]).map_err(failed);
+        }
+        let mut packed = self.packed.lock().unwrap_or_else(PoisonError::into_inner);
+        packed.push(file);
+        Ok(())
     }
 }
 
@@ -39,10 +75,7 @@ impl BlockArtifacts for StageArtifacts<'_> {
     fn write(&self, role: &str, ext: &str, bytes: Vec<u8>) -> Result<ArtifactRef, BlockStageError> {
         let file = NewArtifact::new(role, ext, bytes);
         let reference = file.reference().clone();
-        let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
-        let files = std::slice::from_ref(&file);
-        let outcome = self.project.write_artifacts(files, &on_written);
-        outcome.map_err(|error| failed(&error))?;
+        self.store(file)?;
         let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
         let earlier = written.insert(role.to_owned(), reference.clone());
         if earlier.is_some_and(|earlier| earlier != reference) {
@@ -62,14 +95,17 @@ impl BlockArtifacts for StageArtifacts<'_> {
                     tracing::warn!(block = %self.block, stage = %record.stage, "{error}; the stage runs again");
                     rerun()
                 }
-                error => failed(&error),
+                error => failed(error),
             })
     }
 }
 
-fn failed(error: &ArtifactError) -> BlockStageError {
-    BlockStageError::Failed {
-        failure: Failure::new(FailureClass::Io, error.to_string()),
-        is_transient: !matches!(error, ArtifactError::Moved(_) | ArtifactError::NoStore(_)),
+fn failed(error: ArtifactError) -> BlockStageError {
+    match error {
+        ArtifactError::NoStore(_) | ArtifactError::Bucket(_) => BlockStageError::Store(error),
+        error => BlockStageError::Failed {
+            failure: Failure::new(FailureClass::Io, error.to_string()),
+            is_transient: !matches!(error, ArtifactError::Moved(_)),
+        },
     }
 }

@@ -73,22 +73,20 @@ pub(super) async fn store_stage(
         next_deadline: context.block_deadline(),
         alive_since: context.alive_since(),
     };
-    let after = match stage.next() {
-        Some(next) => advance(context, block, record, checkpoint, next).await?,
-        None => finish_cut(context, block, checkpoint, characters).await?,
-    };
-    if !matches!(
-        after,
-        AfterStage::End(BlockEnd::LeaseLost | BlockEnd::Failed, _)
-    ) {
-        failpoint::hit(stage, Point::Committed, Some(&name));
-        context.emit(RunEvent::BlockStageFinished {
-            block: name.clone(),
-            stage,
-            ms,
-        });
+    match stage.next() {
+        Some(next) => advance(context, block, record, checkpoint, next).await,
+        None => finish_cut(context, block, checkpoint, characters).await,
     }
-    Ok(after)
+}
+
+/// Reports a stage that is stored.
+fn finished(context: &RunContext, block: &BlockName, stage: BlockStage, ms: u64) {
+    failpoint::hit(stage, Point::Committed, Some(block));
+    context.emit(RunEvent::BlockStageFinished {
+        block: block.clone(),
+        stage,
+        ms,
+    });
 }
 
 async fn advance(
@@ -104,9 +102,10 @@ async fn advance(
         catalog.checkpoint_block(lease.clone(), checkpoint.clone())
     );
     let Some(lease) = stored? else {
-        return Ok(AfterStage::End(BlockEnd::LeaseLost, 0));
+        return Ok(AfterStage::End(BlockEnd::LeaseLost));
     };
     let stage = record.stage;
+    finished(context, &block.work.attributes.name, stage, checkpoint.ms);
     block.lease = lease;
     block.work.results.retain(|earlier| earlier.stage < stage);
     block.work.results.push(record);
@@ -126,7 +125,7 @@ async fn finish_cut(
     );
     let summary = match stored? {
         CutReply::Stored(summary) => summary,
-        CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost, 0)),
+        CutReply::LeaseLost => return Ok(AfterStage::End(BlockEnd::LeaseLost)),
         CutReply::NameTaken(taken) => {
             let text = format!(
                 "there is a pair {taken} that was not cut from this block; import the block with another --name"
@@ -142,15 +141,17 @@ async fn finish_cut(
         unchanged,
         retired,
     } = summary;
+    let block = block.work.attributes.name;
+    finished(context, &block, BlockStage::Cut, checkpoint.ms);
     context.emit(RunEvent::BlockDone {
-        block: block.work.attributes.name,
+        block,
         added,
         changed,
         unchanged,
         retired,
         stages: context.until.index() as u64 + 1,
     });
-    Ok(AfterStage::End(BlockEnd::Done, added + changed))
+    Ok(AfterStage::End(BlockEnd::Done))
 }
 
 /// Stores a failure of a stage.
@@ -178,7 +179,7 @@ pub(super) async fn store_failure(
         alive_since: context.alive_since(),
     };
     if !context.catalog.fail_block(block.lease, failed).await? {
-        return Ok(AfterStage::End(BlockEnd::LeaseLost, 0));
+        return Ok(AfterStage::End(BlockEnd::LeaseLost));
     }
     let block = block.work.attributes.name;
     let end = match action {
@@ -200,7 +201,7 @@ pub(super) async fn store_failure(
             BlockEnd::Retry
         }
     };
-    Ok(AfterStage::End(end, 0))
+    Ok(AfterStage::End(end))
 }
 
 /// Checks that the project's directory was not renamed. Otherwise, the run ends instead of failing the block.
@@ -266,8 +267,8 @@ fn input_of(
     artifact: &ArtifactRef,
 ) -> Result<(String, InputVersion), BlockStageError> {
     let Some(path) = artifact.stored_path() else {
-        let text = "the files of characters cannot be in an object store".to_owned();
-        return Err(BlockStageError::failed(FailureClass::BadInput, text));
+        let text = "the file of a character is in a pack".to_owned();
+        return Err(BlockStageError::failed(FailureClass::Bug, text));
     };
     let stat = stat_input(&project.input(&path))?;
     let version = InputVersion {

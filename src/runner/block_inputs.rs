@@ -5,19 +5,25 @@ use std::path::PathBuf;
 use super::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
-use crate::catalog::{BlockAttributes, BlockInputVersions, Catalog, InputVersion, KnownBlock};
+use crate::catalog::{
+    BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
+};
 use crate::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
 use crate::store::{Input, InputError, Project, hash_input, stat_input};
 
-/// Stores the new versions of changed input files of blocks in the catalog. Skips scans and pages that no stage has read;
-/// labels may have been added to a block that was finished without them. A file counts as unchanged if reading it fails or is ended by `limits`.
+/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
+/// and pages that no stage has read; labels may have been added to a block that was finished without them. A file
+/// counts as unchanged if reading it fails or is ended by `limits`.
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
+    among: Option<&BlockSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
     let known = catalog.retry_while_unavailable(async || catalog.known_blocks().await);
-    let compared = known.await?.into_iter().map(|known| ComparedBlock {
+    let known = known.await?.into_iter();
+    let known = known.filter(|known| among.is_none_or(|among| among.contains(known.block)));
+    let compared = known.map(|known| ComparedBlock {
         project: project.clone(),
         known,
     });
@@ -223,6 +229,7 @@ pub(super) fn as_failure(error: BlockStageError) -> (Failure, bool) {
             let text = format!("the result of {stage} is not usable");
             (Failure::new(FailureClass::Bug, text), false)
         }
+        BlockStageError::Store(error) => (Failure::new(FailureClass::Io, error.to_string()), true),
         BlockStageError::Stopped => {
             let text = "the stage ended although it was not stopped";
             (Failure::new(FailureClass::Bug, text), false)

@@ -1,21 +1,16 @@
 //! Requeues blocks at the start of a run.
 
 use super::block_inputs;
-use super::block_stages::BlockStages;
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::input_reads::ReadLimits;
-use super::options::RunOptions;
 use super::policy;
-use crate::catalog::{BlockSettings, Catalog};
+use crate::catalog::{BlockSelection, Catalog, RerunPolicy};
 use crate::domain::UnixMillis;
 use crate::store::Project;
 
-/// Returns the settings of the stages of blocks.
-pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
-    BlockSettings::new(|stage| stages.settings(stage))
-}
-
-/// Stores which input files of blocks changed, requeues blocks to run again, and ends back-offs that are due.
+/// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `among`, and ends
+/// back-offs that are due.
 ///
 /// # Errors
 /// Returns an error if a database operation fails.
@@ -23,14 +18,15 @@ pub(super) async fn requeue(
     project: &Project,
     catalog: &Catalog,
     stages: &dyn BlockStages,
-    options: &RunOptions,
+    (policy, among): (RerunPolicy, Option<&BlockSelection>),
     limits: &ReadLimits,
     now: UnixMillis,
 ) -> Result<(), RunError> {
-    block_inputs::store_changes(project, catalog, limits).await?;
-    let (settings, policy) = (block_settings(stages), options.rerun);
-    let requeued = catalog
-        .retry_while_unavailable(async || catalog.requeue_stale_blocks(&settings, policy).await);
+    block_inputs::store_changes(project, catalog, among, limits).await?;
+    let settings = block_settings(stages);
+    let requeued = catalog.retry_while_unavailable(async || {
+        catalog.requeue_stale_blocks(&settings, policy, among).await
+    });
     requeued.await?;
     let longest = policy::longest_backoff_ms();
     let ended =

@@ -60,6 +60,6 @@ pub(super) struct ComputedBlockStage {
 pub(super) enum AfterStage {
     /// The job continues with this stage.
     Continue(Box<BlockInProgress>, BlockStage),
-    /// Its task ends. The number of pairs that were added or changed.
-    End(BlockEnd, u64),
+    /// Its task ends.
+    End(BlockEnd),
 }

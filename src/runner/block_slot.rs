@@ -4,14 +4,19 @@ use std::sync::Arc;
 
 use tokio::task::JoinSet;
 
+use super::block_memory::{BLOCK_BYTES, EstimatedBlock};
 use super::block_progress::BlockEnd;
 use super::block_task::{BlockReport, process_block};
 use super::compute_thread::task_result;
 use super::error::RunError;
+use super::input_reads::{ReadLimits, read_each};
 use super::policy;
+use super::prefetch::Prefetch;
 use super::run_context::RunContext;
-use crate::catalog::OutstandingBlocks;
+use super::stop::StopLevel;
+use crate::catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
 use crate::domain::WorkerId;
+use crate::raster;
 
 /// What a run has counted about blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -23,20 +28,29 @@ pub(super) struct BlockRunCounts {
 /// The slot of a process for a block.
 pub(super) struct BlockSlot {
     context: Arc<RunContext>,
-    /// Whether this run works on blocks. A run of named pairs does not.
-    is_enabled: bool,
+    /// The blocks of this run; `None` for all.
+    among: Option<BlockSelection>,
+    image_limits: raster::ImageLimits,
     /// Whether a claim may find a block.
     may_find_one: bool,
+    /// The next block needs memory that a running pair has to return first.
+    waits_for_memory: bool,
     task: JoinSet<BlockReport>,
     pub(super) counts: BlockRunCounts,
 }
 
 impl BlockSlot {
-    pub(super) fn new(context: Arc<RunContext>, is_enabled: bool) -> Self {
+    pub(super) fn new(
+        context: Arc<RunContext>,
+        among: Option<BlockSelection>,
+        image_limits: raster::ImageLimits,
+    ) -> Self {
         Self {
             context,
-            is_enabled,
-            may_find_one: is_enabled,
+            may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
+            among,
+            image_limits,
+            waits_for_memory: false,
             task: JoinSet::new(),
             counts: BlockRunCounts::default(),
         }
@@ -47,9 +61,19 @@ impl BlockSlot {
         !self.task.is_empty()
     }
 
-    /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now.
-    pub(super) async fn start(&mut self, worker: WorkerId) -> Result<bool, RunError> {
-        if self.is_busy() {
+    /// Notes that a running pair returned its memory.
+    pub(super) const fn memory_was_freed(&mut self) {
+        self.waits_for_memory = false;
+    }
+
+    /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now, or waits
+    /// for the memory of running pairs. In both cases no pair may be claimed.
+    pub(super) async fn start(
+        &mut self,
+        worker: WorkerId,
+        pairs: &mut Prefetch,
+    ) -> Result<bool, RunError> {
+        if self.is_busy() || self.waits_for_memory {
             return Ok(true);
         }
         if !self.may_find_one {
@@ -57,17 +81,49 @@ impl BlockSlot {
         }
         let context = &self.context;
         let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
-        let catalog = &context.catalog;
+        let (catalog, among) = (&context.catalog, self.among.as_ref());
         let claimed = catalog.retry_while_unavailable(async || {
-            catalog.claim_block(worker, deadline, alive_since).await
+            let claim = catalog.claim_block(worker, deadline, alive_since, among);
+            claim.await
         });
         let Some((lease, work)) = claimed.await? else {
             self.may_find_one = false;
             return Ok(false);
         };
-        let task = process_block(Arc::clone(context), lease, work);
+        let bytes = if pairs.is_memory_limited() {
+            self.estimate(&work.attributes).await
+        } else {
+            0
+        };
+        if !pairs.reserve_for_block(&work.attributes.name, bytes) {
+            // Pairs that wait for a slot start before the block is claimed again, but no others are claimed.
+            self.waits_for_memory = true;
+            self.context.catalog.release_block(lease).await?;
+            return Ok(true);
+        }
+        let task = process_block(Arc::clone(&self.context), lease, work);
         self.task.spawn(task);
         Ok(true)
+    }
+
+    /// Estimates the memory that a block needs, in bytes. Reads the headers of its files.
+    async fn estimate(&self, attributes: &BlockAttributes) -> u64 {
+        let block = EstimatedBlock {
+            project: self.context.project.clone(),
+            attributes: attributes.clone(),
+            limits: self.image_limits,
+        };
+        let limits = ReadLimits {
+            timeout: self.context.timing.read_timeout(),
+            stop: self.context.stop.clone(),
+            until: StopLevel::Drain,
+        };
+        let estimated = read_each(vec![block], &limits).await;
+        estimated
+            .into_iter()
+            .flatten()
+            .next()
+            .unwrap_or(BLOCK_BYTES)
     }
 
     /// Waits for the end of the block in progress. Returns `None` at once if there is none.
@@ -75,27 +131,25 @@ impl BlockSlot {
         self.task.join_next().await.map(task_result)
     }
 
-    /// Counts a block that ended. Returns the number of pairs that it added or changed.
+    /// Counts a block that ended.
     ///
     /// # Errors
     /// Returns the error that ends the run.
-    pub(super) fn count(&mut self, report: BlockReport) -> Result<u64, RunError> {
-        self.may_find_one = self.is_enabled;
-        match report.end? {
+    pub(super) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
+        self.may_find_one = true;
+        match ended? {
             BlockEnd::Done => self.counts.done += 1,
             BlockEnd::Failed => self.counts.failed += 1,
             BlockEnd::Retry | BlockEnd::Released | BlockEnd::LeaseLost => {}
         }
-        Ok(report.pairs)
+        Ok(())
     }
 
     /// Returns how many blocks any process has yet to finish.
     pub(super) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
-        if !self.is_enabled {
-            return Ok(OutstandingBlocks::default());
-        }
-        let catalog = &self.context.catalog;
-        let left = catalog.retry_while_unavailable(async || catalog.outstanding_blocks().await);
+        let (catalog, among) = (&self.context.catalog, self.among.as_ref());
+        let left =
+            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(among).await);
         Ok(left.await?)
     }
 
@@ -110,7 +164,7 @@ impl BlockSlot {
                 .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await)
                 .await?;
         }
-        self.may_find_one = self.is_enabled && (is_due || left.ready > 0);
+        self.may_find_one = is_due || left.ready > 0;
         Ok(())
     }
 }

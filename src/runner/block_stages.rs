@@ -6,22 +6,23 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
 
+use crate::catalog::BlockSettings;
 use crate::domain::{
     ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, ControlPoints, Failure,
     FailureClass, LengthUnit,
 };
-use crate::store::{Input, InputError};
+use crate::store::{ArtifactError, Input, InputError};
 
 /// Computes the stages of whole blocks. In tests, fake stages fail, hang or wait.
 ///
-/// A stage is a pure function of its inputs, the results of the stages before it, and the settings: the same inputs give
-/// the same bytes. It may use several threads.
+/// A stage is a pure function of its inputs, the results of the stages before it, and the settings: the same inputs
+/// give the same bytes. It may use several threads.
 pub trait BlockStages: Send + Sync + 'static {
     /// Returns revision and settings of a stage. If they change, the stage and all later ones run again.
     fn settings(&self, stage: BlockStage) -> Value;
 
-    /// Computes a stage. `earlier` has the results of all stages before it. A long computation should look at `stop` now
-    /// and then and return [`BlockStageError::Stopped`] when it is set.
+    /// Computes a stage. `earlier` has the results of all stages before it. A long computation should look at `stop`
+    /// now and then and return [`BlockStageError::Stopped`] when it is set.
     ///
     /// # Errors
     /// Returns an error if the block is refused, a file cannot be read, or an artifact of an earlier stage is missing.
@@ -35,21 +36,26 @@ pub trait BlockStages: Send + Sync + 'static {
     ) -> Result<BlockStageOutput, BlockStageError>;
 }
 
+/// Returns the settings of the stages of blocks.
+pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
+    BlockSettings::new(|stage| stages.settings(stage))
+}
+
 /// The files of a stage: writes its own artifacts and reads those of earlier stages. May be used by several threads.
 pub trait BlockArtifacts: Sync {
-    /// Writes an artifact durably, named by its content. A file that exists already is kept. `role` is unique in the
-    /// stage, such as `front.png` or `c03-r12.ply`; `ext` is the extension without the dot. The mesh and the print of a
-    /// character that is cut are artifacts too.
+    /// Writes an artifact, named by its content. It is durable when the stage ends. A file that exists already is kept.
+    /// `role` is unique in the stage, such as `front.png` or `c03-r12.ply`; `ext` is the extension without the dot. The
+    /// mesh and the print of a character that is cut are artifacts too.
     ///
     /// # Errors
-    /// Returns an error if the disk fails.
+    /// Returns an error if the disk or the object store fails.
     fn write(&self, role: &str, ext: &str, bytes: Vec<u8>) -> Result<ArtifactRef, BlockStageError>;
 
     /// Reads an artifact of an earlier stage and checks its hash.
     ///
     /// # Errors
     /// Returns [`BlockStageError::RerunFrom`] that stage if the file is missing or was changed, or an error if the disk
-    /// fails.
+    /// or the object store fails.
     fn read(&self, record: &BlockStageRecord, role: &str) -> Result<Vec<u8>, BlockStageError>;
 }
 
@@ -200,6 +206,8 @@ pub enum BlockStageError {
     RerunFrom(BlockStage),
     /// The stage noticed that it is to stop.
     Stopped,
+    /// An object store failed, which is not the fault of the block.
+    Store(ArtifactError),
     /// The stage failed. A refusal, such as a page of another block, has the class `NoSolution`; it is not retried.
     Failed {
         /// Class and message.
@@ -221,6 +229,9 @@ impl BlockStageError {
 
 impl From<InputError> for BlockStageError {
     fn from(error: InputError) -> Self {
+        if let InputError::Store(error) = error {
+            return Self::Store(ArtifactError::Bucket(error));
+        }
         Self::Failed {
             is_transient: error.is_transient(),
             failure: Failure::new(error.class(), error.to_string()),

@@ -21,18 +21,13 @@ use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
 use crate::domain::{BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
+use crate::store::ArtifactError;
 
 /// Times that a stage may find the result of an earlier stage unusable before the block fails.
 const MAX_RERUNS: usize = 4;
 
-/// What a block's task reports at its end.
-#[derive(Debug)]
-pub(super) struct BlockReport {
-    /// How it ended, or the error that ends the run.
-    pub(super) end: Result<BlockEnd, RunError>,
-    /// Number of pairs that were added or run again.
-    pub(super) pairs: u64,
-}
+/// How a block's task ended, or the error that ends the run.
+pub(super) type BlockReport = Result<BlockEnd, RunError>;
 
 /// Runs the remaining stages of a leased block.
 pub(super) async fn process_block(
@@ -53,8 +48,7 @@ pub(super) async fn process_block(
     });
     loop {
         if context.is_draining() {
-            let end = release(&context, block.lease).await;
-            return BlockReport { end, pairs: 0 };
+            return release(&context, block.lease).await;
         }
         let after = match run_stage(&context, &mut block, stage).await {
             Ok(computed) => store_stage(&context, block, stage, computed).await,
@@ -71,27 +65,33 @@ pub(super) async fn process_block(
                 store_failure(&context, block, stage, error, ms).await
             }
             Err(Interruption::Stopped) => {
-                let end = release(&context, block.lease).await;
-                return BlockReport { end, pairs: 0 };
+                return release(&context, block.lease).await;
+            }
+            Err(Interruption::Store(error)) => {
+                return end_without_store(&context, block.lease, error).await;
             }
             Err(Interruption::Run(error)) => Err(error),
         };
-        match after {
-            Ok(AfterStage::Continue(next, at)) => (block, stage) = (next, at),
-            Ok(AfterStage::End(end, pairs)) => {
-                return BlockReport {
-                    end: Ok(end),
-                    pairs,
-                };
-            }
-            Err(error) => {
-                return BlockReport {
-                    end: Err(error),
-                    pairs: 0,
-                };
-            }
+        match after? {
+            AfterStage::Continue(next, at) => (block, stage) = (next, at),
+            AfterStage::End(end) => return Ok(end),
         }
     }
+}
+
+/// Releases a block whose files an object store did not give or take. If the store is unavailable, the block is tried
+/// again later. Any other error, such as refused credentials, concerns all blocks and ends the run.
+async fn end_without_store(
+    context: &RunContext,
+    lease: BlockLease,
+    error: ArtifactError,
+) -> BlockReport {
+    let end = release(context, lease).await?;
+    if error.is_unavailable() {
+        tracing::warn!("{error}; the block is tried again");
+        return Ok(end);
+    }
+    Err(error.into())
 }
 
 async fn release(context: &RunContext, lease: BlockLease) -> Result<BlockEnd, RunError> {
@@ -105,10 +105,23 @@ enum Interruption {
     Rerun(BlockStage),
     /// The stage failed, after this many milliseconds.
     Failed(BlockStageError, Option<u64>),
+    /// An object store failed.
+    Store(ArtifactError),
     /// The run stops at once.
     Stopped,
     /// The run cannot go on.
     Run(RunError),
+}
+
+impl Interruption {
+    /// Describes an error of a stage, which occurred after this many milliseconds.
+    fn of(error: BlockStageError, ms: Option<u64>) -> Self {
+        match error {
+            BlockStageError::RerunFrom(earlier) => Self::Rerun(earlier),
+            BlockStageError::Store(error) => Self::Store(error),
+            error => Self::Failed(error, ms),
+        }
+    }
 }
 
 /// Reads the versions of the input files and computes a stage.
@@ -123,7 +136,7 @@ async fn run_stage(
     });
     let (sources, known) = (block.sources.clone(), block.inputs.clone());
     let versions = on_thread(context, move |_| sources.versions(stage, &known)).await?;
-    let versions = versions.map_err(|error| Interruption::Failed(error, None))?;
+    let versions = versions.map_err(|error| Interruption::of(error, None))?;
     let earlier = outdated(stage, &block.inputs, &versions);
     let BlockInputVersions { mesh, page, labels } = versions;
     let seen = BlockInputVersions {
@@ -172,14 +185,13 @@ async fn compute(
             .run(stage, &inputs, &earlier, &artifacts, stop)?;
         sources.check_unchanged(&read)?;
         failpoint::hit(stage, Point::Computed, Some(&inputs.name));
-        Ok((output, artifacts.finish()))
+        Ok((output, artifacts.finish()?))
     });
     let outcome = outcome.await?;
     let ms = begun.elapsed().as_millis() as u64;
     match outcome {
         Ok((output, files)) => Ok(ComputedBlockStage { output, files, ms }),
-        Err(BlockStageError::RerunFrom(earlier)) => Err(Interruption::Rerun(earlier)),
-        Err(error) => Err(Interruption::Failed(error, Some(ms))),
+        Err(error) => Err(Interruption::of(error, Some(ms))),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Why a run cannot go on.
 
 use crate::catalog::{CatalogError, FieldChange};
-use crate::domain::PairName;
+use crate::domain::{BlockName, PairName};
 use crate::store::{ArtifactError, LockError, StoreError};
 
 /// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
@@ -22,6 +22,9 @@ pub enum RunError {
     /// Pairs were named that do not exist.
     #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
     NoSuchPair(Vec<PairName>),
+    /// A block was named that does not exist.
+    #[error("there is no block {0}")]
+    NoSuchBlock(BlockName),
     /// The catalog returned an error.
     #[error("{0}")]
     Catalog(#[from] CatalogError),

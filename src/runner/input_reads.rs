@@ -9,6 +9,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 
+use super::options::RunOptions;
 use super::stop::{Stop, StopLevel};
 
 /// Reads in progress at the same time, not counting overdue reads.
@@ -27,6 +28,16 @@ pub(super) struct ReadLimits {
     pub(super) stop: Stop,
     /// Level of the request at which waiting ends.
     pub(super) until: StopLevel,
+}
+
+/// Returns the limits for reads that take place before the first stage. Any stop request ends these reads, because no
+/// stage is in progress.
+pub(super) fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
+    ReadLimits {
+        timeout: options.stage_timeout,
+        stop: stop.clone(),
+        until: StopLevel::Drain,
+    }
 }
 
 /// Something that is read from files.

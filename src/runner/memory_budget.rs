@@ -1,8 +1,10 @@
-//! Limits the memory of all running pairs together. The memory of a pair is estimated from its input files.
+//! Limits the memory of a block and all running pairs together. The memory of a pair is estimated from its input files.
 
+use std::fmt;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use super::input_reads::ReadItem;
 use crate::catalog::PairAttributes;
 use crate::domain::Stage;
 use crate::raster;
@@ -21,7 +23,7 @@ const PIXEL_BYTES: u64 = 50;
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
 
-/// Memory that is reserved for running pairs, in estimated bytes.
+/// Memory that is reserved for running pairs and a block, in estimated bytes.
 #[derive(Debug)]
 pub(super) struct MemoryBudget {
     limit: Option<u64>,
@@ -39,8 +41,8 @@ impl MemoryBudget {
         self.limit.is_some()
     }
 
-    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. A pair that needs more than the limit
-    /// is accepted if nothing else is reserved.
+    /// Reserves bytes for a pair or a block. Returns `false` if the limit does not allow it. One that needs more than
+    /// the limit is accepted if nothing else is reserved.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);
@@ -50,9 +52,19 @@ impl MemoryBudget {
         fits
     }
 
-    /// Returns the limit, if a pair needs more than it allows in total.
-    pub(super) fn exceeded_by(&self, bytes: u64) -> Option<u64> {
+    /// Returns the limit, if a pair or a block needs more than it allows in total.
+    fn exceeded_by(&self, bytes: u64) -> Option<u64> {
         self.limit.filter(|limit| bytes > *limit)
+    }
+
+    /// Warns if a pair or a block needs more than the limit allows in total.
+    pub(super) fn warn_if_exceeded(&self, what: fmt::Arguments<'_>, bytes: u64) {
+        if let Some(limit) = self.exceeded_by(bytes) {
+            let (need, limit) = (bytes >> 20, limit >> 20);
+            tracing::warn!(
+                "{what} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
+            );
+        }
     }
 
     /// Ends a reservation.
@@ -61,9 +73,30 @@ impl MemoryBudget {
     }
 }
 
+/// A pair whose memory is estimated.
+pub(super) struct EstimatedPair {
+    pub(super) project: Project,
+    pub(super) attributes: PairAttributes,
+    /// Next stage.
+    pub(super) from: Stage,
+    pub(super) limits: raster::ImageLimits,
+}
+
+impl ReadItem for EstimatedPair {
+    type Output = u64;
+
+    fn read(&self) -> u64 {
+        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.attributes.mesh_path)
+    }
+}
+
 /// Estimates the memory in bytes that a pair needs if it continues at stage `from`. A missing file counts as empty,
 /// because its pair soon fails.
-pub(super) fn estimated_bytes(
+fn estimated_bytes(
     project: &Project,
     pair: &PairAttributes,
     from: Stage,
@@ -82,7 +115,8 @@ pub(super) fn estimated_bytes(
     PAIR_BYTES.saturating_add(mesh).saturating_add(print)
 }
 
-fn mesh_bytes(mesh: &Input) -> u64 {
+/// Estimates the memory in bytes for a mesh that is read as a whole.
+pub(super) fn mesh_bytes(mesh: &Input) -> u64 {
     let factor = match extension(mesh.path()).as_str() {
         "obj" => OBJ_FACTOR,
         _ => MESH_FACTOR,
@@ -90,23 +124,27 @@ fn mesh_bytes(mesh: &Input) -> u64 {
     (mesh.size() as f64 * factor) as u64
 }
 
-/// Estimates the memory in bytes for a print from the pixel count in its header, because a small file may hold many
-/// pixels. If the header cannot be read, the file size decides. At most `images.max_pixels` pixels count.
+/// Estimates the memory in bytes for a print. At most `images.max_pixels` pixels count.
 fn print_bytes(print: &Input, images: &raster::ImageLimits) -> u64 {
+    let pixels = print_pixels(print).min(images.max_pixels);
+    pixels
+        .saturating_mul(PIXEL_BYTES)
+        .saturating_add(print.size())
+}
+
+/// Returns the pixel count in the header of an image, because a small file may hold many pixels. If the header cannot
+/// be read, estimates it from the file size.
+pub(super) fn print_pixels(print: &Input) -> u64 {
     let Ok(file) = print.open() else {
         return 0;
     };
     let size = file.metadata().map_or(0, |meta| meta.len());
-    let pixels = Some(file)
-        .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
-        .unwrap_or_else(|| {
-            size.saturating_mul(match extension(print.path()).as_str() {
-                "jpg" | "jpeg" => JPEG_PIXELS_PER_BYTE,
-                _ => PIXELS_PER_BYTE,
-            })
-        });
-    let pixels = pixels.min(images.max_pixels);
-    pixels.saturating_mul(PIXEL_BYTES).saturating_add(size)
+    raster::header_pixel_count(BufReader::new(file)).unwrap_or_else(|| {
+        size.saturating_mul(match extension(print.path()).as_str() {
+            "jpg" | "jpeg" => JPEG_PIXELS_PER_BYTE,
+            _ => PIXELS_PER_BYTE,
+        })
+    })
 }
 
 fn extension(path: &Path) -> String {

@@ -3,12 +3,13 @@
 //! `run` prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
 //! `pair_task` and the task starts a `compute_thread`. The thread calls the stages through `stage_executor`. The task
 //! sends computed stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what
-//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task` runs
-//! its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
+//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task`
+//! runs its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
 
 mod block_artifacts;
 mod block_checkpoint;
 mod block_inputs;
+mod block_memory;
 mod block_pipeline;
 mod block_plan;
 mod block_progress;
@@ -36,6 +37,7 @@ mod run_end;
 mod run_guard;
 mod run_metrics;
 mod run_plan;
+mod run_selection;
 mod scheduler;
 mod stage_executor;
 mod stage_files;
@@ -53,7 +55,7 @@ pub use block_stages::{
 pub use error::RunError;
 pub use events::{BlockSummary, RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
-pub use options::{RunOptions, RunPart};
+pub use options::{NamedWork, RunOptions, RunPart};
 pub use run::{fingerprints, run};
 pub use run_guard::is_running;
 pub use run_metrics::RunMetrics;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::run_metrics::RunMetrics;
 use crate::catalog::RerunPolicy;
-use crate::domain::{PairName, Stage};
+use crate::domain::{BlockName, PairName, Stage};
 use crate::{mesh, raster};
 
 /// Options of a run.
@@ -12,17 +12,18 @@ use crate::{mesh, raster};
 pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
-    /// Memory limit in bytes for all pairs computed at the same time. A pair's memory is estimated from its mesh's file
-    /// size and its print's pixel count. A pair that exceeds the limit runs alone. `None` means no limit.
+    /// Memory limit in bytes for a block and all pairs computed at the same time. Their memory is estimated from the
+    /// file size of the mesh and the pixel count of print or page. One that exceeds the limit runs alone. `None` means
+    /// no limit.
     pub memory: Option<u64>,
     /// What to do besides computing.
     pub part: RunPart,
     /// Join a run in progress in another process.
     pub join: bool,
-    /// Start no more pairs after this many have failed.
+    /// Start nothing more after this many pairs and blocks have failed.
     pub max_failures: Option<u64>,
-    /// Only these pairs; `None` for all.
-    pub pairs: Option<Vec<PairName>>,
+    /// Only these pairs and blocks; `None` for all.
+    pub only: Option<NamedWork>,
     /// What to run besides stages without a current result.
     pub rerun: RerunPolicy,
     /// Last stage to run.
@@ -35,6 +36,15 @@ pub struct RunOptions {
     pub image_limits: raster::ImageLimits,
     /// Where the run counts pairs and times.
     pub metrics: RunMetrics,
+}
+
+/// Pairs and blocks that a user named.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NamedWork {
+    /// Pairs.
+    pub pairs: Vec<PairName>,
+    /// Blocks. Their pairs run too, also pairs that are yet to be cut.
+    pub blocks: Vec<BlockName>,
 }
 
 /// Which part of a run to do.
@@ -56,7 +66,7 @@ impl Default for RunOptions {
             part: RunPart::All,
             join: false,
             max_failures: None,
-            pairs: None,
+            only: None,
             rerun: RerunPolicy::Changed,
             until: Stage::Register,
             stage_timeout: Duration::from_mins(10),

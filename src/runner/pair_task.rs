@@ -123,8 +123,8 @@ fn timeout_text(stage: Stage, timeout: Duration, reading: Option<PathBuf>) -> St
     }
 }
 
-/// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again later.
-/// Any other error, such as refused credentials, concerns all pairs and ends the run.
+/// Releases a pair whose files an object store did not give. If the store is unavailable, the pair is tried again
+/// later. Any other error, such as refused credentials, concerns all pairs and ends the run.
 async fn end_without_store(checkpointer: Checkpointer, error: ArtifactError) -> PairReport {
     let report = checkpointer.finish(PairEnd::Released).await;
     if error.is_unavailable() {

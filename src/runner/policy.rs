@@ -59,8 +59,8 @@ pub(super) fn block_failure_action(
 }
 
 /// Returns the wait after an attempt in milliseconds: `min(cap, base * 2^(attempt - 1))` times a factor from 0.5 to
-/// 1.5. The factor is a hash of pair or block, and attempt. It spreads the retries of pairs that failed together, and is the same
-/// in every run.
+/// 1.5. The factor is a hash of pair or block, and attempt. It spreads the retries of pairs that failed together, and
+/// is the same in every run.
 fn backoff_ms(id: i64, attempt: u32) -> i64 {
     let doubled = BACKOFF_BASE.saturating_mul(1 << attempt.saturating_sub(1).min(16));
     let wait = doubled.min(BACKOFF_CAP).as_millis() as i64;

@@ -2,7 +2,6 @@
 //! With the queue, no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -11,15 +10,14 @@ use tokio::task::JoinHandle;
 use super::claim_size::{CLAIM_AHEAD, DurationEstimate, FETCH_AHEAD, Load};
 use super::error::RunError;
 use super::events::RunEvent;
-use super::input_reads::{ReadItem, ReadLimits, read_each};
-use super::memory_budget::{MemoryBudget, PAIR_BYTES, estimated_bytes};
+use super::input_reads::{ReadLimits, read_each};
+use super::memory_budget::{EstimatedPair, MemoryBudget, PAIR_BYTES};
 use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{ClaimRequest, Lease, PairAttributes, PairSelection, PairWork};
-use crate::domain::{PairName, Stage, WaitReason, WorkerId};
+use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
+use crate::domain::{BlockName, PairName, WaitReason, WorkerId};
 use crate::raster;
-use crate::store::Project;
 
 /// Identifies a task that occupies a slot. A pair may occupy two slots: after its lease was lost, the process may lease
 /// the pair again while the earlier task still computes.
@@ -50,6 +48,8 @@ pub(super) struct Prefetch {
     next_slot: SlotId,
     durations: DurationEstimate,
     memory: MemoryBudget,
+    /// Memory that is reserved for the block in progress, in bytes.
+    block_bytes: u64,
     /// The next pair needs memory that a running pair has to return first.
     waits_for_memory: bool,
     /// A pair is running that no other may run beside.
@@ -91,6 +91,7 @@ impl Prefetch {
             next_slot: SlotId(0),
             durations: DurationEstimate::default(),
             memory: MemoryBudget::new(options.memory),
+            block_bytes: 0,
             waits_for_memory: false,
             is_exclusive: false,
             may_find_more: true,
@@ -138,6 +139,35 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
+    /// Replaces the pairs that may be claimed.
+    pub(super) fn select(&mut self, pairs: &PairSelection) {
+        self.selection = Some(pairs.clone());
+    }
+
+    /// Returns whether the memory of pairs and blocks is limited.
+    pub(super) const fn is_memory_limited(&self) -> bool {
+        self.memory.is_limited()
+    }
+
+    /// Reserves memory for a block. Returns `false` if it needs memory that running pairs have to return first. Warns
+    /// if it needs more than the limit for all together.
+    pub(super) fn reserve_for_block(&mut self, block: &BlockName, bytes: u64) -> bool {
+        if !self.memory.reserve(bytes) {
+            return false;
+        }
+        self.block_bytes = bytes;
+        self.memory
+            .warn_if_exceeded(format_args!("block {block}"), bytes);
+        true
+    }
+
+    /// Ends the reservation for a block.
+    pub(super) fn release_block_memory(&mut self) {
+        self.memory.release(std::mem::take(&mut self.block_bytes));
+        self.waits_for_memory = false;
+        self.may_find_more = true;
+    }
+
     /// Claims pairs for slots that are free or soon become free. Returns `false`, and claims nothing, if no pair is
     /// needed, if none may start yet, or if nothing has changed since the last claim.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
@@ -174,13 +204,17 @@ impl Prefetch {
         };
         if !self.memory.reserve(next.bytes) {
             self.waits_for_memory = true;
-            self.durations.disable();
+            if self.block_bytes == 0 {
+                self.durations.disable();
+            }
             // Release the whole queue, not only this pair. Otherwise smaller pairs could keep overtaking it.
             self.queue.push_front(next);
             self.release_all().await?;
             return Ok(None);
         }
-        self.warn_if_oversized(&next);
+        let name = &next.work.attributes.name;
+        self.memory
+            .warn_if_exceeded(format_args!("{name}"), next.bytes);
         let running = RunningPair {
             name: next.work.attributes.name.clone(),
             since: Instant::now(),
@@ -311,36 +345,5 @@ impl Prefetch {
             until: StopLevel::Drain,
         };
         async move { [read_each(estimated, &limits).await, others].concat() }
-    }
-
-    /// Warns if the memory estimate of a pair exceeds the limit for all running pairs together.
-    fn warn_if_oversized(&self, pair: &LeasedPair) {
-        if let Some(limit) = self.memory.exceeded_by(pair.bytes) {
-            let (need, limit) = (pair.bytes >> 20, limit >> 20);
-            let pair = &pair.work.attributes.name;
-            tracing::warn!(
-                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
-            );
-        }
-    }
-}
-
-/// A pair whose memory is estimated.
-struct EstimatedPair {
-    project: Project,
-    attributes: PairAttributes,
-    from: Stage,
-    limits: raster::ImageLimits,
-}
-
-impl ReadItem for EstimatedPair {
-    type Output = u64;
-
-    fn read(&self) -> u64 {
-        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
-    }
-
-    fn path(&self) -> PathBuf {
-        self.project.input_path(&self.attributes.mesh_path)
     }
 }

@@ -2,35 +2,35 @@
 //! scheduler.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
 
 use super::block_pipeline::BlockPipeline;
 use super::block_plan;
-use super::block_stages::BlockStages;
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::input_reads::ReadLimits;
+use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
-use super::run_end::{RunEnd, block_limits, outstanding_blocks};
+use super::run_end::{RunEnd, block_limits, compute};
 use super::run_guard::RunGuard;
+use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
-use super::stop::{Stop, StopLevel};
+use super::stop::Stop;
 use super::worker_session::this_process;
-use crate::catalog::{Catalog, DeadWorker, Fingerprints, PairSelection};
+use crate::catalog::{
+    Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
+};
 use crate::domain::WorkerId;
 use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::Project;
-
-/// Time after a stop request during which a run still waits for an unavailable database server.
-const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {
@@ -46,8 +46,8 @@ pub(super) struct Executors {
 /// Runs every stage that has no current result. Passes each event of the run to `on_event`.
 ///
 /// # Errors
-/// Returns an error if a named pair does not exist, or if the catalog or the disk cannot be used. Returns an error if
-/// another process runs the project, unless this run joins it with the same settings.
+/// Returns an error if a named pair or block does not exist, or if the catalog or the disk cannot be used. Returns an
+/// error if another process runs the project, unless this run joins it with the same settings.
 pub async fn run(
     project: &Project,
     catalog: &Catalog,
@@ -85,20 +85,24 @@ pub(super) async fn run_with(
     mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     let clock = Clock::start();
-    let selection = selection(catalog, options).await?;
+    let mut selection = RunSelection::of(catalog, options.only.as_ref()).await?;
     let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
     let mut guard = RunGuard::acquire(project, catalog, options)?;
+    let settings = WorkerSettings {
+        fingerprints: fingerprint_ids,
+        blocks: block_settings(&*executors.blocks),
+    };
     guard
-        .require_same_settings(catalog, fingerprints, fingerprint_ids, options)
+        .require_same_settings(catalog, fingerprints, &settings, options.part)
         .await?;
     let worker = catalog
-        .register_worker(this_process(), fingerprint_ids, clock.now())
+        .register_worker(this_process(), settings, clock.now())
         .await?;
     let start = RunStart {
         project,
         catalog,
         fingerprints,
-        blocks: &*executors.blocks,
+        blocks: &executors.blocks,
         options,
         selection: selection.as_ref(),
         clock,
@@ -109,74 +113,21 @@ pub(super) async fn run_with(
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
-    if options.part == RunPart::Plan {
+    let counted = if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
-        let status = catalog.status(fingerprints).await?;
-        let left = catalog.work_left(options.until, selection.as_ref()).await?;
-        let ended = RunEnd {
-            counts: RunCounts::default(),
-            left,
-            blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
-            status,
-            compute_time: Duration::ZERO,
-        };
-        return Ok(ended.summary(stop, clock));
+        (RunCounts::default(), Duration::ZERO)
+    } else {
+        let (events, received) = mpsc::unbounded_channel();
+        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, events));
+        let scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+        compute(&context, scheduler, received, &mut on_event).await?
+    };
+    if let Some(selection) = &mut selection {
+        selection.refresh(catalog).await?;
     }
-    let (events, mut received) = mpsc::unbounded_channel();
-    let context = Arc::new(RunContext {
-        catalog: catalog.clone(),
-        project: project.clone(),
-        executor: executors.pairs,
-        blocks: executors.blocks,
-        block_limits: block_limits(options),
-        fingerprints: fingerprint_ids,
-        clock,
-        timing: Timing::of_this_build(),
-        stop: stop.clone(),
-        drain: Stop::new(),
-        until: options.until,
-        stage_timeout: options.stage_timeout,
-        events,
-        compute_us: AtomicU64::new(0),
-        metrics: options.metrics.clone(),
-    });
-    let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
-    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
-    let counts = scheduler.run(&mut received, &mut on_event).await;
-    // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let worker = scheduler.worker();
-    let metrics = context.worker_metrics();
-    let ended = catalog.retry_while_unavailable(async || {
-        catalog
-            .end_worker(worker, clock.now(), Some(&metrics))
-            .await
-    });
-    let ended = ended.await;
-    stop_waiting.abort();
-    // A lost log explains other errors.
-    let ended = match ended {
-        Err(error) if error.log_loss().is_some() => return Err(error.into()),
-        ended => ended,
-    };
-    let counts = counts?;
-    ended?;
-    let status = catalog.status(fingerprints).await?;
-    let left = catalog.work_left(options.until, selection.as_ref()).await?;
-    let ended = RunEnd {
-        counts,
-        left,
-        blocks: outstanding_blocks(catalog, selection.as_ref()).await?,
-        status,
-        compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
-    };
-    Ok(ended.summary(stop, clock))
-}
-
-/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database server.
-async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
-    stop.reached(StopLevel::Drain).await;
-    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
-    catalog.stop_waiting();
+    let (until, selection) = (options.until, selection.as_ref());
+    let ended = RunEnd::of(catalog, fingerprints, until, selection, counted);
+    Ok(ended.await?.summary(stop, clock))
 }
 
 /// What a run works on, before its scheduler starts.
@@ -184,9 +135,9 @@ struct RunStart<'a> {
     project: &'a Project,
     catalog: &'a Catalog,
     fingerprints: &'a Fingerprints,
-    blocks: &'a dyn BlockStages,
+    blocks: &'a Arc<dyn BlockStages>,
     options: &'a RunOptions,
-    selection: Option<&'a PairSelection>,
+    selection: Option<&'a RunSelection>,
     clock: Clock,
     stop: &'a Stop,
 }
@@ -206,7 +157,7 @@ impl RunStart<'_> {
             guard.unlock_planning(catalog).await?;
             planned?;
         }
-        let left = catalog.work_left(options.until, self.selection).await?;
+        let left = catalog.work_left(options.until, self.pairs()).await?;
         on_event(RunEvent::Started {
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
@@ -223,8 +174,8 @@ impl RunStart<'_> {
     async fn plan(&self) -> Result<(), RunError> {
         let (catalog, options) = (self.catalog, self.options);
         let limits = read_limits(options, self.stop);
-        input_changes::store_changes(self.project, catalog, self.selection, &limits).await?;
-        let (fingerprints, selection) = (self.fingerprints, self.selection);
+        input_changes::store_changes(self.project, catalog, self.pairs(), &limits).await?;
+        let (fingerprints, selection) = (self.fingerprints, self.pairs());
         let requeued = async || {
             catalog
                 .requeue_stale(fingerprints, selection, options.rerun)
@@ -235,10 +186,41 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
-        if self.selection.is_none() {
-            block_plan::requeue(self.project, catalog, self.blocks, options, &limits, now).await?;
+        let among = self.selection.map(|selection| &selection.blocks);
+        let what = (options.rerun, among);
+        block_plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+    }
+
+    /// Returns what the tasks of the run share.
+    fn context(
+        &self,
+        pairs: Arc<dyn StageExecutor>,
+        fingerprints: FingerprintIds,
+        events: mpsc::UnboundedSender<RunEvent>,
+    ) -> RunContext {
+        let options = self.options;
+        RunContext {
+            catalog: self.catalog.clone(),
+            project: self.project.clone(),
+            executor: pairs,
+            blocks: Arc::clone(self.blocks),
+            block_limits: block_limits(options),
+            fingerprints,
+            clock: self.clock,
+            timing: Timing::of_this_build(),
+            stop: self.stop.clone(),
+            drain: Stop::new(),
+            until: options.until,
+            stage_timeout: options.stage_timeout,
+            events,
+            compute_us: AtomicU64::new(0),
+            metrics: options.metrics.clone(),
         }
-        Ok(())
+    }
+
+    /// Returns the selected pairs, or `None` for all.
+    fn pairs(&self) -> Option<&PairSelection> {
+        self.selection.map(|selection| &selection.pairs)
     }
 
     /// Recovers the leases of dead processes, then lets other processes join. Does nothing if other processes may hold
@@ -257,29 +239,4 @@ impl RunStart<'_> {
         lock.downgrade()?;
         Ok(recovered.ready)
     }
-}
-
-/// Returns the limits for reads that take place before the first stage. Any stop request ends these reads, because no
-/// stage is in progress.
-pub(super) fn read_limits(options: &RunOptions, stop: &Stop) -> ReadLimits {
-    ReadLimits {
-        timeout: options.stage_timeout,
-        stop: stop.clone(),
-        until: StopLevel::Drain,
-    }
-}
-
-/// Returns the named pairs, or `None` for all.
-pub(super) async fn selection(
-    catalog: &Catalog,
-    options: &RunOptions,
-) -> Result<Option<PairSelection>, RunError> {
-    let Some(names) = &options.pairs else {
-        return Ok(None);
-    };
-    let unknown = catalog.unknown_names(names).await?;
-    if !unknown.is_empty() {
-        return Err(RunError::NoSuchPair(unknown));
-    }
-    Ok(Some(catalog.select(names).await?))
 }

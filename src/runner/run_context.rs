@@ -6,14 +6,14 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use super::block_stages::BlockStages;
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{Clock, Timing};
 use super::run_metrics::RunMetrics;
 use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{Catalog, FingerprintIds};
+use crate::catalog::{Catalog, FingerprintIds, WorkerSettings};
 use crate::domain::{Stage, UnixMillis, WorkerMetrics};
 use crate::store::Project;
 
@@ -84,8 +84,8 @@ impl RunContext {
         self.clock.now() + self.stage_timeout.as_millis() as i64
     }
 
-    /// Returns when a stage of a block that begins now has to be finished. Reading its files may take as long as computing
-    /// it.
+    /// Returns when a stage of a block that begins now has to be finished. Reading its files may take as long as
+    /// computing it.
     pub(super) fn block_deadline(&self) -> UnixMillis {
         self.deadline() + self.stage_timeout.as_millis() as i64
     }
@@ -100,6 +100,14 @@ impl RunContext {
         let us = elapsed.as_micros() as u64;
         self.compute_us.fetch_add(us, Ordering::Relaxed);
         self.metrics.add_stage(stage, elapsed);
+    }
+
+    /// Returns the settings of this run for the worker's row in the catalog.
+    pub(super) fn worker_settings(&self) -> WorkerSettings {
+        WorkerSettings {
+            fingerprints: self.fingerprints,
+            blocks: block_settings(&*self.blocks),
+        }
     }
 
     /// Returns the counts and times of this run for the worker's row in the catalog.

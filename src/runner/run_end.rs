@@ -1,25 +1,20 @@
-//! The end of a run: what is left, and its summary.
+//! The last part of a run: runs the scheduler, ends the worker, counts what is left, and makes the summary.
 
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use tokio::sync::mpsc;
+
 use super::error::RunError;
-use super::events::{BlockSummary, RunSummary};
+use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::options::RunOptions;
 use super::policy::Clock;
-use super::scheduler::RunCounts;
+use super::run_context::RunContext;
+use super::run_selection::RunSelection;
+use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{Catalog, OutstandingBlocks, PairSelection, StatusCounts, WorkLeft};
-
-/// Counts the blocks that are left to run and the failed ones. A run of named pairs does not work on blocks.
-pub(super) async fn outstanding_blocks(
-    catalog: &Catalog,
-    selection: Option<&PairSelection>,
-) -> Result<OutstandingBlocks, RunError> {
-    match selection {
-        None => Ok(catalog.outstanding_blocks().await?),
-        Some(_) => Ok(OutstandingBlocks::default()),
-    }
-}
+use crate::catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
+use crate::domain::Stage;
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.
 pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
@@ -27,6 +22,47 @@ pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 
         (options.mesh_limits.max_bytes, "limits.mesh.max_bytes"),
         (options.image_limits.max_bytes, "limits.image.max_bytes"),
     ]
+}
+
+/// Time after a stop request during which a run still waits for an unavailable database server.
+const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(2);
+
+/// Runs the scheduler and ends the worker. Returns what was counted, and for how long stages were computed.
+pub(super) async fn compute(
+    context: &RunContext,
+    mut scheduler: Scheduler,
+    mut events: mpsc::UnboundedReceiver<RunEvent>,
+    on_event: &mut (impl FnMut(RunEvent) + Send),
+) -> Result<(RunCounts, Duration), RunError> {
+    let (catalog, stop) = (&context.catalog, context.stop.clone());
+    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop));
+    let counts = scheduler.run(&mut events, on_event).await;
+    // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
+    let (worker, now) = (scheduler.worker(), context.clock.now());
+    let metrics = context.worker_metrics();
+    let ended = catalog.retry_while_unavailable(async || {
+        let ended = catalog.end_worker(worker, now, Some(&metrics));
+        ended.await
+    });
+    let ended = ended.await;
+    stop_waiting.abort();
+    // A lost log explains other errors.
+    let ended = match ended {
+        Err(error) if error.log_loss().is_some() => return Err(error.into()),
+        ended => ended,
+    };
+    let counts = counts?;
+    ended?;
+    let computed = Duration::from_micros(context.compute_us.load(Ordering::Relaxed));
+    Ok((counts, computed))
+}
+
+/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database
+/// server.
+async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
+    stop.reached(StopLevel::Drain).await;
+    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
+    catalog.stop_waiting();
 }
 
 /// What is known when a run has ended.
@@ -39,6 +75,26 @@ pub(super) struct RunEnd {
 }
 
 impl RunEnd {
+    /// Counts what is left. `counted` is what the run has counted, and for how long stages were computed.
+    pub(super) async fn of(
+        catalog: &Catalog,
+        fingerprints: &Fingerprints,
+        until: Stage,
+        selection: Option<&RunSelection>,
+        counted: (RunCounts, Duration),
+    ) -> Result<Self, RunError> {
+        let pairs = selection.map(|selection| &selection.pairs);
+        let blocks = selection.map(|selection| &selection.blocks);
+        let (counts, compute_time) = counted;
+        Ok(Self {
+            counts,
+            status: catalog.status(fingerprints).await?,
+            left: catalog.work_left(until, pairs).await?,
+            blocks: catalog.outstanding_blocks(blocks).await?,
+            compute_time,
+        })
+    }
+
     /// Returns the summary of the run.
     pub(super) fn summary(self, stop: &Stop, clock: Clock) -> RunSummary {
         let Self {

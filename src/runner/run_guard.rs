@@ -2,7 +2,7 @@
 
 use super::error::RunError;
 use super::options::{RunOptions, RunPart};
-use crate::catalog::{Catalog, FingerprintIds, Fingerprints, SharedSettings};
+use crate::catalog::{Catalog, Fingerprints, SharedSettings, WorkerSettings};
 use crate::domain::UnixMillis;
 use crate::store::{Project, RunLock};
 
@@ -37,15 +37,17 @@ impl RunGuard {
         &mut self,
         catalog: &Catalog,
         fingerprints: &Fingerprints,
-        ids: FingerprintIds,
-        options: &RunOptions,
+        settings: &WorkerSettings,
+        part: RunPart,
     ) -> Result<(), RunError> {
         let lock = match self {
             Self::Lock(lock) => lock,
             Self::Shared => {
-                let compared = match options.part {
-                    RunPart::All | RunPart::Plan => catalog.set_run_settings(ids).await?,
-                    RunPart::Work => catalog.compare_run_settings(ids).await?,
+                let compared = match part {
+                    RunPart::All | RunPart::Plan => {
+                        catalog.set_run_settings(settings.clone()).await?
+                    }
+                    RunPart::Work => catalog.compare_run_settings(settings).await?,
                 };
                 return match compared {
                     SharedSettings::Same => Ok(()),
@@ -53,15 +55,19 @@ impl RunGuard {
                 };
             }
         };
+        // The hashes of the settings of pairs, and in a second line the settings of blocks.
+        let mine = format!("{}\n{}", fingerprints.hash_line(), settings.blocks.json());
         if lock.is_exclusive() {
-            lock.set_fingerprints(&fingerprints.hash_line())?;
+            lock.set_settings(&mine)?;
             return Ok(());
         }
-        let running = lock.fingerprints()?;
-        if running == fingerprints.hash_line() {
+        let running = lock.settings()?;
+        if running == mine {
             return Ok(());
         }
-        let changes = catalog.changes_from(&running, fingerprints).await?;
+        let (pairs, blocks) = running.split_once('\n').unwrap_or((&running, ""));
+        let mut changes = catalog.changes_from(pairs, fingerprints).await?;
+        changes.extend(settings.blocks.changes_from(blocks));
         Err(RunError::OtherSettings(changes))
     }
 

@@ -17,9 +17,10 @@ use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
 use super::prefetch::{Prefetch, SlotId};
 use super::run_context::{PairEnd, PairReport, RunContext};
+use super::run_selection::RunSelection;
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
-use crate::catalog::{Outstanding, PairSelection, Waiting};
+use crate::catalog::{Outstanding, Waiting};
 use crate::domain::{WaitReason, WorkerId};
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.
@@ -43,7 +44,7 @@ pub(super) struct RunCounts {
 pub(super) struct Scheduler {
     context: Arc<RunContext>,
     session: WorkerSession,
-    selection: Option<PairSelection>,
+    selection: Option<RunSelection>,
     prefetch: Prefetch,
     /// The block in progress. While there is one, this process claims no pairs.
     block: BlockSlot,
@@ -65,15 +66,17 @@ impl Scheduler {
     pub(super) fn new(
         context: Arc<RunContext>,
         worker: WorkerId,
-        selection: Option<PairSelection>,
+        selection: Option<RunSelection>,
         options: &RunOptions,
     ) -> Self {
         let now = context.clock.now();
         context.metrics.set_jobs(options.workers.max(1));
+        let pairs = selection.as_ref().map(|selection| selection.pairs.clone());
+        let blocks = selection.as_ref().map(|selection| selection.blocks.clone());
         Self {
             session: WorkerSession::new(worker, now, context.timing.lease_ms()),
-            prefetch: Prefetch::new(Arc::clone(&context), selection.clone(), options),
-            block: BlockSlot::new(Arc::clone(&context), selection.is_none()),
+            prefetch: Prefetch::new(Arc::clone(&context), pairs, options),
+            block: BlockSlot::new(Arc::clone(&context), blocks, options.image_limits),
             context,
             selection,
             max_storing: options.workers.max(1) * MAX_STORING_PER_SLOT,
@@ -125,7 +128,7 @@ impl Scheduler {
                 }
                 Some(computed) = self.computing.join_next() => self.finish_computing(task_result(computed)),
                 Some(report) = self.storing.join_next() => self.count(task_result(report)),
-                Some(report) = self.block.ended() => self.count_block(report),
+                Some(report) = self.block.ended() => self.count_block(report).await?,
                 () = self.prefetch.arrive() => {}
                 _ = recoveries.tick() => self.recover().await?,
                 _ = polls.tick(), if self.prefetch.free_slots() > 0 => self.poll().await?,
@@ -152,10 +155,11 @@ impl Scheduler {
             return Ok(self.is_idle());
         }
         self.start_pairs().await?;
-        if self.block.start(self.session.worker()).await? {
+        let worker = self.session.worker();
+        if self.block.start(worker, &mut self.prefetch).await? {
             return Ok(false);
         }
-        if !self.prefetch.claim(self.session.worker()).await? {
+        if !self.prefetch.claim(worker).await? {
             return Ok(false);
         }
         self.start_pairs().await?;
@@ -163,13 +167,14 @@ impl Scheduler {
             return Ok(false);
         }
         // This process has no pair in progress. If another process has one, the catalog refuses the claim.
-        self.prefetch.claim_exclusive(self.session.worker()).await?;
+        self.prefetch.claim_exclusive(worker).await?;
         self.start_pairs().await?;
         if !self.is_idle() {
             return Ok(false);
         }
         // Blocks first: the cut of a block that another process works on may add pairs.
         let blocks = self.block.outstanding().await?.left();
+        self.refresh_selection().await?;
         let left = self.outstanding().await?;
         Ok(blocks == 0 && left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
@@ -193,8 +198,8 @@ impl Scheduler {
         self.prefetch.free_slots()
     }
 
-    /// Adds the time that slots waited for pairs to be stored. The commits count as the reason if most of these pairs are
-    /// being committed, and otherwise the files.
+    /// Adds the time that slots waited for pairs to be stored. The commits count as the reason if most of these pairs
+    /// are being committed, and otherwise the files.
     fn add_storage_wait(&self, slots: usize, elapsed: Duration) {
         if slots == 0 {
             return;
@@ -234,7 +239,7 @@ impl Scheduler {
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
         let until = self.context.until;
         let catalog = &self.context.catalog;
-        let selection = self.selection.as_ref();
+        let selection = self.selection.as_ref().map(|selection| &selection.pairs);
         let left =
             catalog.retry_while_unavailable(async || catalog.outstanding(until, selection).await);
         Ok(left.await?)
@@ -242,6 +247,7 @@ impl Scheduler {
 
     fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
         self.prefetch.finish(slot);
+        self.block.memory_was_freed();
         match outcome {
             PairOutcome::Ended(report) => self.count(report),
             PairOutcome::Storing(checkpointer) => {
@@ -268,21 +274,36 @@ impl Scheduler {
                 self.fatal.get_or_insert(error);
             }
         }
-        let is_over_limit = self
-            .max_failures
-            .is_some_and(|max| self.counts.failed >= max);
+        self.stop_after_too_many_failures();
+    }
+
+    /// Lets nothing more start if too many pairs and blocks have failed.
+    fn stop_after_too_many_failures(&mut self) {
+        let failed = self.counts.failed + self.block.counts.failed;
+        let is_over_limit = self.max_failures.is_some_and(|max| failed >= max);
         if is_over_limit && !self.counts.too_many_failures {
             self.counts.too_many_failures = true;
             self.drain("too many failures");
         }
     }
 
-    fn count_block(&mut self, report: BlockReport) {
-        self.prefetch.expect_more();
+    async fn count_block(&mut self, report: BlockReport) -> Result<(), RunError> {
+        self.prefetch.release_block_memory();
         if let Err(error) = self.block.count(report) {
             self.drain("the run cannot go on");
             self.fatal.get_or_insert(error);
         }
+        self.stop_after_too_many_failures();
+        self.refresh_selection().await
+    }
+
+    /// Selects the pairs that this or another process has cut from the selected blocks.
+    async fn refresh_selection(&mut self) -> Result<(), RunError> {
+        if let Some(selection) = &mut self.selection {
+            selection.refresh(&self.context.catalog).await?;
+            self.prefetch.select(&selection.pairs);
+        }
+        Ok(())
     }
 
     fn drain(&self, reason: &str) {

@@ -71,8 +71,8 @@ async fn write_files(
     Ok(finished(context, writing).await?.is_some())
 }
 
-/// Writes the files of `first`, and of the stages that arrive within [`PACK_WAIT`] or until the pair's last stage, as one
-/// object.
+/// Writes the files of `first`, and of the stages that arrive within [`PACK_WAIT`] or until the pair's last stage, as
+/// one object.
 async fn write_pack(
     context: &RunContext,
     pair: &PairName,

@@ -1,6 +1,7 @@
 //! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
 
 mod block_kills;
+mod block_limits;
 mod blocks;
 mod fake_blocks;
 mod fake_executor;
@@ -12,14 +13,18 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use serde_json::{Map, json};
+use serde_json::json;
 
 use fake_blocks::FakeBlocks;
 use fake_executor::FakeExecutor;
 
 use super::run::{Executors, run_with};
-use super::{RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
-use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo};
+use super::{
+    BlockStages as _, NamedWork, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel,
+};
+use crate::catalog::{
+    BlockSettings, Catalog, ClaimRequest, Fingerprints, RerunPolicy, WorkerInfo, WorkerSettings,
+};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
@@ -63,17 +68,7 @@ impl RunFixture {
         let project = Project::create(dir.path()).expect("a project");
         let path = project.catalog_path();
         let catalog = create(&path).await.expect("a catalog");
-        let rows = pairs.iter().map(|pair| ImportRow {
-            name: name(pair),
-            mesh_path: format!("{pair}.stl"),
-            print_path: format!("{pair}.png"),
-            unit: None,
-            scanned_face_down: None,
-            character: None,
-            block: None,
-            meta: Map::new(),
-            prior: None,
-        });
+        let rows = pairs.iter().map(|pair| values::pair_row(pair));
         catalog.import(rows.collect(), 1).await.expect("imported");
         Self {
             project,
@@ -308,7 +303,10 @@ async fn too_many_failures_drain_the_run() {
 async fn only_selected_pairs_run_and_an_unknown_name_is_an_error() {
     let fixture = RunFixture::new(&["a", "b", "c"]).await;
     let some = |names: &[&str]| RunOptions {
-        pairs: Some(names.iter().map(|text| name(text)).collect()),
+        only: Some(NamedWork {
+            pairs: names.iter().map(|text| name(text)).collect(),
+            blocks: Vec::new(),
+        }),
         ..options(2)
     };
     let refused = fixture.try_run(&some(&["b", "nobody"])).await;
@@ -339,9 +337,13 @@ async fn pairs_of_a_dead_process_are_recovered_at_once() {
         boot_id: None,
     };
     let ids = fixture.catalog.register_fingerprints(&fingerprints()).await;
+    let settings = WorkerSettings {
+        fingerprints: ids.expect("fingerprints"),
+        blocks: BlockSettings::new(|stage| fixture.blocks.settings(stage)),
+    };
     let dead = fixture
         .catalog
-        .register_worker(info, ids.expect("fingerprints"), 1)
+        .register_worker(info, settings, 1)
         .await
         .expect("a worker");
     let request = ClaimRequest::new(dead, 1, 1);
@@ -411,7 +413,10 @@ async fn a_disk_error_ends_the_run_and_fails_no_pair() {
 async fn a_run_up_to_a_stage_does_not_wait_for_the_retry_of_a_later_one() {
     let fixture = RunFixture::new(&["breaks_1", "a"]).await;
     let first = RunOptions {
-        pairs: Some(vec![name("breaks_1")]),
+        only: Some(NamedWork {
+            pairs: vec![name("breaks_1")],
+            blocks: Vec::new(),
+        }),
         ..options(1)
     };
     let stop = async {

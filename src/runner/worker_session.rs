@@ -82,11 +82,11 @@ impl WorkerSession {
             // The counts go on in the row of the new worker.
             .retry_while_unavailable(async || catalog.end_worker(expired, now, None).await)
             .await?;
-        let fingerprints = context.fingerprints;
+        let settings = context.worker_settings();
         self.worker = catalog
             .retry_while_unavailable(async || {
                 catalog
-                    .register_worker(this_process(), fingerprints, now)
+                    .register_worker(this_process(), settings.clone(), now)
                     .await
             })
             .await?;

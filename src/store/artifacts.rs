@@ -117,14 +117,20 @@ impl From<InputError> for ArtifactError {
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 impl Project {
-    /// Returns the path of an artifact, or the address of its pack in an object store.
+    /// Returns the path of an artifact, or in an object store the address of its pack or object.
     pub fn artifact_path(&self, artifact: &ArtifactRef) -> PathBuf {
         if let Some(location) = &artifact.pack {
             return self.pack_path(&location.name);
         }
-        let hex = artifact.hash.to_hex();
-        let name = format!("{hex}.{}", artifact.ext);
-        self.artifacts_dir().join(&hex[..2]).join(name)
+        if let Some((_, bucket, key)) = self.artifact_object(artifact) {
+            return bucket.address_of(&key).into();
+        }
+        self.local_path(artifact)
+    }
+
+    /// Returns the path of an artifact in the project's folder.
+    fn local_path(&self, artifact: &ArtifactRef) -> PathBuf {
+        self.dir().join(artifact.path_of_file())
     }
 
     /// Reads an artifact and checks its hash.
@@ -135,7 +141,15 @@ impl Project {
         if let Some(location) = &artifact.pack {
             return self.read_packed(artifact, location);
         }
-        let path = self.artifact_path(artifact);
+        if let Some((_, bucket, key)) = self.artifact_object(artifact) {
+            return Self::read_object(bucket, &key, artifact);
+        }
+        self.read_local(artifact)
+    }
+
+    /// Reads an artifact in the project's folder.
+    fn read_local(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
+        let path = self.local_path(artifact);
         let (mut file, _) = open_regular(&path)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)
@@ -155,7 +169,10 @@ impl Project {
         if let Some(location) = &artifact.pack {
             return self.check_packed(artifact, location, quick);
         }
-        let path = self.artifact_path(artifact);
+        if let Some((_, bucket, key)) = self.artifact_object(artifact) {
+            return Self::check_object(bucket, &key, artifact, quick);
+        }
+        let path = self.local_path(artifact);
         let is_complete = regular_metadata(&path)?.len() == artifact.bytes
             && (quick || has_hash(&path, &artifact.hash)?);
         if is_complete {
@@ -185,11 +202,11 @@ impl Project {
     fn write_all(&self, files: &[NewArtifact], on_written: &dyn Fn()) -> Result<(), ArtifactError> {
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
-            let path = self.artifact_path(&file.reference);
+            let path = self.local_path(&file.reference);
             let folder = parent_folder(&path);
             self.make_folder(&folder)?;
             // A file that is there already may be unreferenced, and another process may be about to remove it.
-            if self.read_artifact(&file.reference).is_err() || !set_modified_now(&path) {
+            if self.read_local(&file.reference).is_err() || !set_modified_now(&path) {
                 self.write_artifact(&path, &file.bytes, on_written)?;
             }
             folders.insert(folder);

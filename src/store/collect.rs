@@ -2,9 +2,11 @@
 //! given age.
 //!
 //! A worker names new files in a row within the time limit of a stage, so an older file without a row will never have
-//! one. A pack has a name that is never used again. A file in the project's folder is named by its content, and a worker
-//! may find that an unreferenced file holds just the bytes that it wants to write. It then sets the file's time of
-//! change, and the collector looks at this time again after it has moved the file aside.
+//! one. A pack has a name that is never used again. An object that is named by its content, such as the mesh of a cut
+//! character, may be written again at the moment when it is removed, so it is removed only while no run is active. A
+//! file in the project's folder is named by its content, and a worker may find that an unreferenced file holds just the
+//! bytes that it wants to write. It then sets the file's time of change, and the collector looks at this time again
+//! after it has moved the file aside.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -13,13 +15,15 @@ use super::Project;
 use super::artifacts::ArtifactError;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 use super::remote::{Bucket, PACKS, pack_number};
+use crate::domain::{ARTIFACTS, ArtifactRef};
 
 /// Key of an object whose time of change is the present time of the store.
 const MARKER: &str = "collect-marker";
 
 impl ReferencedArtifacts {
     /// Removes unreferenced files and packs that are older than `age` by the clock of their file system or store. Calls
-    /// `each` for every unreferenced one, with whether it was removed.
+    /// `each` for every unreferenced one, with whether it was removed. With `is_idle`, does the same with objects that
+    /// are named by their content; otherwise, these are not listed.
     ///
     /// # Errors
     /// Returns an error if a folder cannot be listed or a request fails.
@@ -27,11 +31,13 @@ impl ReferencedArtifacts {
         mut self,
         project: &Project,
         age: Duration,
+        is_idle: bool,
         mut each: impl FnMut(&UnreferencedFile, bool),
     ) -> Result<(), ArtifactError> {
         if let Some(bucket) = project.storage().and_then(|storage| storage.artifacts()) {
-            self.collect_packs(bucket, age, &mut each)
-                .map_err(ArtifactError::Bucket)?;
+            self.sort();
+            let collected = self.collect_objects(bucket, age, is_idle, &mut each);
+            collected.map_err(ArtifactError::Bucket)?;
         }
         if !project.artifacts_dir().exists() {
             return Ok(());
@@ -57,11 +63,12 @@ impl ReferencedArtifacts {
         listed.map_err(failed)
     }
 
-    /// Removes unreferenced packs.
-    fn collect_packs(
-        &mut self,
+    /// Removes unreferenced packs and, with `is_idle`, unreferenced objects of cut characters.
+    fn collect_objects(
+        &self,
         bucket: &Bucket,
         age: Duration,
+        is_idle: bool,
         each: &mut impl FnMut(&UnreferencedFile, bool),
     ) -> Result<(), super::BucketError> {
         bucket.write(MARKER, Vec::new())?;
@@ -73,6 +80,17 @@ impl ReferencedArtifacts {
                 found.push((key, stat, number.is_some()));
             }
         })?;
+        if is_idle {
+            bucket.list(ARTIFACTS, |key, stat| {
+                let artifact = ArtifactRef::at_path(&key);
+                if artifact
+                    .as_ref()
+                    .is_none_or(|artifact| !self.has_file(artifact))
+                {
+                    found.push((key, stat, artifact.is_some()));
+                }
+            })?;
+        }
         for (key, stat, is_ours) in found {
             let is_old = is_ours && stat.modified < before;
             if is_old {
@@ -155,7 +173,7 @@ mod tests {
         let mut referenced = ReferencedArtifacts::default();
         referenced.add(&kept);
         let mut seen = Vec::new();
-        let collected = referenced.collect(&project, DAY, |file, removed| {
+        let collected = referenced.collect(&project, DAY, false, |file, removed| {
             assert_eq!(file.kind, UnreferencedKind::Orphan);
             seen.push(removed);
         });
@@ -188,7 +206,7 @@ mod tests {
             let mut referenced = ReferencedArtifacts::default();
             referenced.add(&artifacts[0]);
             let mut seen = Vec::new();
-            let collected = referenced.collect(&project, age, |file, removed| {
+            let collected = referenced.collect(&project, age, false, |file, removed| {
                 seen.push((file.kind, removed));
             });
             collected.expect("collected");
@@ -204,5 +222,33 @@ mod tests {
         }
         assert_eq!(project.read_artifact(&artifacts[0]).expect("kept"), b"same");
         assert!(bucket.stat("packs/notes.txt").is_ok());
+    }
+
+    #[test]
+    fn objects_of_characters_are_removed_only_while_no_run_is_active() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (storage, bucket) = ProjectStorage::in_memory(dir.path().join("cache"));
+        let project = Project::create(dir.path()).expect("a project");
+        let project = project.with_storage(Some(storage));
+        let files = ["kept", "gone"].map(|text| NewArtifact::new("a", "ply", text.into()));
+        project.write_objects(&files).expect("stored");
+        let collect = |is_idle| {
+            let mut referenced = ReferencedArtifacts::default();
+            referenced.add(files[0].reference());
+            let mut seen = Vec::new();
+            let collected = referenced.collect(&project, Duration::ZERO, is_idle, |_, removed| {
+                seen.push(removed);
+            });
+            collected.expect("collected");
+            seen
+        };
+        assert!(collect(false).is_empty());
+        while collect(true) != [true] {
+            // Both objects have the same time until the clock of the store advances.
+            std::thread::yield_now();
+        }
+        assert!(project.check_artifact(files[0].reference(), false).is_ok());
+        let gone = files[1].reference().stored_path().expect("no pack");
+        assert!(bucket.stat(&gone).is_err());
     }
 }

@@ -7,6 +7,7 @@ use super::Project;
 use super::input_error::InputError;
 use super::open_file::regular_metadata;
 use super::remote::{Bucket, BucketError, CachedObject, ProjectStorage, Root};
+use crate::domain::{ArtifactRef, ContentHash};
 
 /// An input file of a project.
 #[derive(Debug, Clone)]
@@ -25,6 +26,8 @@ pub(super) enum InputLocation {
     SharedFile,
     /// In an object store.
     Object(RemoteInput),
+    /// In an object store, named by the hash of its content: an artifact that is an object of its own.
+    Artifact(RemoteInput, ContentHash),
 }
 
 /// An input in an object store.
@@ -55,7 +58,9 @@ impl Input {
             InputLocation::File | InputLocation::SharedFile => {
                 std::fs::metadata(&self.path).map_or(0, |meta| meta.len())
             }
-            InputLocation::Object(object) => object.open(u64::MAX).map_or(0, |copy| copy.bytes),
+            InputLocation::Object(object) | InputLocation::Artifact(object, _) => {
+                object.open(u64::MAX).map_or(0, |copy| copy.bytes)
+            }
         }
     }
 
@@ -68,7 +73,9 @@ impl Input {
             InputLocation::File | InputLocation::SharedFile => {
                 super::open_file::open_regular(&self.path).map(|(file, _)| file)
             }
-            InputLocation::Object(object) => Ok(object.open(u64::MAX)?.file),
+            InputLocation::Object(object) | InputLocation::Artifact(object, _) => {
+                Ok(object.open(u64::MAX)?.file)
+            }
         }
     }
 
@@ -81,6 +88,10 @@ impl Input {
             InputLocation::Object(object) => {
                 !matches!(object.version(), Err(BucketError::NotThere(_)))
             }
+            InputLocation::Artifact(object, _) => !matches!(
+                object.bucket.stat(&object.key),
+                Err(BucketError::NotThere(_))
+            ),
         }
     }
 }
@@ -104,8 +115,8 @@ impl RemoteInput {
 }
 
 impl Project {
-    /// Returns an input by its stored path: relative to the project, absolute, or relative to a named root, such as
-    /// `scans:1/mesh.obj`.
+    /// Returns an input by its stored path: relative to the project, absolute, relative to a named root, such as
+    /// `scans:1/mesh.obj`, or the path of an artifact, which may be in an object store.
     pub fn input(&self, stored: &str) -> Input {
         let root = self.storage_arc().and_then(|storage| {
             let (root, rest) = storage.root(stored)?;
@@ -124,8 +135,26 @@ impl Project {
                     key: key.to_owned(),
                 }),
             },
-            None => Input::file(self.dir().join(stored)),
+            None => self
+                .artifact_input(stored)
+                .unwrap_or_else(|| Input::file(self.dir().join(stored))),
         }
+    }
+
+    /// Returns the input at a stored path that is the key of an artifact in the object store.
+    fn artifact_input(&self, stored: &str) -> Option<Input> {
+        let storage = self.storage_arc()?;
+        let artifact = ArtifactRef::at_path(stored)?;
+        let (_, bucket, key) = self.artifact_object(&artifact)?;
+        let object = RemoteInput {
+            storage: Arc::clone(storage),
+            bucket: bucket.clone(),
+            key,
+        };
+        Some(Input {
+            path: PathBuf::from(bucket.address_of(&object.key)),
+            place: InputLocation::Artifact(object, artifact.hash),
+        })
     }
 
     /// Returns the path of an input, or its address in an object store, for messages.
@@ -139,7 +168,7 @@ impl Project {
             .is_some_and(|storage| storage.root(stored).is_some())
     }
 
-    /// Returns whether inputs are read from an object store.
+    /// Returns whether inputs may be read from an object store.
     pub fn has_remote_inputs(&self) -> bool {
         self.storage()
             .is_some_and(ProjectStorage::has_remote_inputs)

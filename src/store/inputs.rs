@@ -31,7 +31,9 @@ impl Input {
     fn stat(&self, meta: &std::fs::Metadata) -> String {
         match self.place {
             InputLocation::SharedFile => shared_file_stat(meta),
-            InputLocation::File | InputLocation::Object(_) => file_stat(meta),
+            InputLocation::File | InputLocation::Object(_) | InputLocation::Artifact(..) => {
+                file_stat(meta)
+            }
         }
     }
 }
@@ -121,7 +123,10 @@ impl InputReader {
     /// Returns whether the file has changed since it was opened, so that the hash may include bytes that the parser did
     /// not read. A local copy of an object is compared with the content that was received.
     fn has_changed(&self, hash: &ContentHash) -> Result<bool, InputError> {
-        if let (Some(expected), InputLocation::Object(object)) = (&self.expected, &self.input.place)
+        if let (
+            Some(expected),
+            InputLocation::Object(object) | InputLocation::Artifact(object, _),
+        ) = (&self.expected, &self.input.place)
         {
             let is_other = expected != hash;
             if is_other {
@@ -135,13 +140,15 @@ impl InputReader {
     }
 }
 
-/// Returns size, modification time and inode of a file as text, or the version of an object.
+/// Returns size, modification time and inode of a file as text, or the version of an object. Sends no request for an
+/// artifact in an object store, because its content never changes.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn stat_input(input: &Input) -> Result<String, InputError> {
     match &input.place {
         InputLocation::Object(object) => Ok(object.version()?),
+        InputLocation::Artifact(_, hash) => Ok(hash.to_hex()),
         InputLocation::File | InputLocation::SharedFile => {
             Ok(input.stat(&regular_metadata(input.path())?))
         }
@@ -163,13 +170,18 @@ pub fn open_input(
         limit,
         setting,
     };
+    let of_object = |error| match error {
+        BucketError::TooLarge { bytes, .. } => too_large(bytes),
+        error => error.into(),
+    };
     let (file, len, stat, expected) = match &input.place {
         InputLocation::Object(object) => {
-            let copy = object.open(limit).map_err(|error| match error {
-                BucketError::TooLarge { bytes, .. } => too_large(bytes),
-                error => error.into(),
-            })?;
+            let copy = object.open(limit).map_err(of_object)?;
             (copy.file, copy.bytes, copy.version, Some(copy.hash))
+        }
+        InputLocation::Artifact(object, hash) => {
+            let copy = object.open(limit).map_err(of_object)?;
+            (copy.file, copy.bytes, hash.to_hex(), Some(*hash))
         }
         InputLocation::File | InputLocation::SharedFile => {
             let (file, meta) = open_regular(input.path())?;
@@ -208,7 +220,8 @@ pub fn read_input(
     })
 }
 
-/// Hashes a file without reading it into memory.
+/// Hashes a file without reading it into memory. Does not read an artifact in an object store: its name contains the
+/// hash, which is compared when a stage reads the artifact.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
@@ -218,6 +231,12 @@ pub fn hash_input(input: &Input) -> Result<InputDigest, InputError> {
         return Ok(InputDigest {
             hash: copy.hash,
             stat: copy.version,
+        });
+    }
+    if let InputLocation::Artifact(_, hash) = &input.place {
+        return Ok(InputDigest {
+            hash: *hash,
+            stat: hash.to_hex(),
         });
     }
     let (file, meta) = open_regular(input.path())?;

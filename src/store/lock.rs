@@ -102,20 +102,20 @@ impl RunLock {
         self.is_exclusive
     }
 
-    /// Writes the fingerprints of this run's settings. Joining processes compare these with their own. Call this
-    /// function only while the lock is exclusive.
+    /// Writes this run's settings. Joining processes compare them with their own. Call this function only while the
+    /// lock is exclusive.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
-    pub fn set_fingerprints(&mut self, fingerprints: &str) -> Result<(), LockError> {
-        replace_text(&mut self.members, fingerprints).map_err(io(&self.path))
+    pub fn set_settings(&mut self, settings: &str) -> Result<(), LockError> {
+        replace_text(&mut self.members, settings).map_err(io(&self.path))
     }
 
-    /// Returns the fingerprints of the working processes' settings, or an empty text if none were written.
+    /// Returns the working processes' settings, or an empty text if none were written.
     ///
     /// # Errors
     /// Returns an error if the file cannot be read.
-    pub fn fingerprints(&mut self) -> Result<String, LockError> {
+    pub fn settings(&mut self) -> Result<String, LockError> {
         let mut text = String::new();
         self.members
             .seek(SeekFrom::Start(0))
@@ -232,12 +232,10 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
-        owner
-            .set_fingerprints("longer than the next")
-            .expect("written");
-        owner.set_fingerprints("in mm").expect("written");
+        owner.set_settings("longer than the next").expect("written");
+        owner.set_settings("in mm").expect("written");
         owner.downgrade().expect("a shared lock");
         let mut joined = RunLock::acquire(&project, true).expect("joined");
-        assert_eq!(joined.fingerprints().expect("read"), "in mm");
+        assert_eq!(joined.settings().expect("read"), "in mm");
     }
 }

@@ -1,5 +1,6 @@
 //! A project on disk: its directory, its input files, its artifacts, and the lock of its run.
 
+mod artifact_object;
 mod artifacts;
 mod atomic_write;
 mod collect;

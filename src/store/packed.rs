@@ -26,8 +26,8 @@ impl Project {
     /// there are no artifacts.
     ///
     /// # Errors
-    /// Returns an error if the settings name no object store, or the request fails. A pack of a failed request may exist.
-    /// No row names it, and `check --collect` removes it.
+    /// Returns an error if the settings name no object store, or the request fails. A pack of a failed request may
+    /// exist. No row names it, and `check --collect` removes it.
     pub fn write_pack(&self, files: &[NewArtifact]) -> Result<Vec<PackLocation>, ArtifactError> {
         if files.is_empty() {
             return Ok(Vec::new());
@@ -93,7 +93,8 @@ impl Project {
     }
 }
 
-fn of_bucket(error: BucketError) -> ArtifactError {
+/// Converts an error of a bucket. A missing object is a missing artifact.
+pub(super) fn of_bucket(error: BucketError) -> ArtifactError {
     match error {
         BucketError::NotThere(address) => ArtifactError::Missing(address.into()),
         error => ArtifactError::Bucket(error),

@@ -172,9 +172,10 @@ impl Project {
         found.map(|path| self.stored_path(&path)).transpose()
     }
 
-    /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is a
-    /// path that already has this form, such as `scans:1/mesh.obj`. A path below the project is stored relative to the project, so that
-    /// the project can be moved with its data. Any other path is stored as absolute. The file need not exist.
+    /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is
+    /// a path that already has this form, such as `scans:1/mesh.obj`. A path below the project is stored relative to
+    /// the project, so that the project can be moved with its data. Any other path is stored as absolute. The file need
+    /// not exist.
     ///
     /// # Errors
     /// Returns an error if the working directory is unknown, or the path is not UTF-8.

@@ -55,6 +55,16 @@ impl ReferencedArtifacts {
         self.packs.contains(&number)
     }
 
+    /// Sorts what was added, for [`Self::has_file`].
+    pub(super) fn sort(&mut self) {
+        self.prefixes.sort_unstable();
+    }
+
+    /// Returns whether a row names an artifact that is a file or an object of its own.
+    pub(super) fn has_file(&self, artifact: &ArtifactRef) -> bool {
+        self.prefixes.binary_search(&prefix(&artifact.hash)).is_ok()
+    }
+
     /// Calls `each` for every unreferenced file in the artifacts folder. Call this only while no process writes
     /// artifacts, because a new file exists before the row that names it.
     ///
@@ -65,7 +75,7 @@ impl ReferencedArtifacts {
         project: &Project,
         mut each: impl FnMut(UnreferencedFile),
     ) -> std::io::Result<()> {
-        self.prefixes.sort_unstable();
+        self.sort();
         for entry in Entry::list(&project.artifacts_dir())? {
             if !entry.is_dir {
                 each(entry.unreferenced(UnreferencedKind::UnknownFile));

@@ -65,6 +65,7 @@ mod many_reviewers;
 mod memory;
 mod names;
 mod object_store;
+mod object_store_blocks;
 mod odd;
 mod one_pair;
 mod page;

@@ -9,7 +9,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
-use crate::catalog::{Catalog, Result};
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{BlockCharacterState, BlockId, BlockName, PairId, PairName};
 
 const UPSERT: &str = "
@@ -99,7 +99,17 @@ impl Catalog {
     }
 }
 
-/// Stores the characters of a block. Returns the pairs of characters whose boxes are gone, or which are not cut any more.
+/// Returns the name of the pair of a character.
+///
+/// # Errors
+/// Returns an error if the label cannot be part of a name.
+pub(crate) fn pair_name(block: &BlockName, label: &str) -> Result<PairName> {
+    let name = block.pair(label);
+    name.map_err(|error| CatalogError::Corrupt(error.to_string()))
+}
+
+/// Stores the characters of a block. Returns the pairs of characters whose boxes are gone, or which are not cut any
+/// more.
 pub(crate) async fn store(
     conn: &mut Conn,
     block: BlockId,
@@ -108,7 +118,7 @@ pub(crate) async fn store(
 ) -> Result<Vec<PairId>> {
     for (place, one) in characters.iter().enumerate() {
         let pair = match &one.cut {
-            Ok(_) => name.pair(&one.label).ok(),
+            Ok(_) => Some(pair_name(name, &one.label)?),
             Err(_) => None,
         };
         let state = match pair {

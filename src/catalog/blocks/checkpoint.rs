@@ -4,7 +4,7 @@ use crate::catalog::blocks::model::{BlockCheckpoint, BlockInputVersions, BlockLe
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockId, BlockStage, UnixMillis};
+use crate::domain::{BlockId, BlockStage, UnixMillis, WorkerId};
 use crate::failpoint::{self, Point};
 
 /// Number of attempts kept per block. Older ones are deleted.
@@ -154,7 +154,7 @@ pub(crate) async fn store(
         ms: Some(stage.ms),
         at: stage.at,
     };
-    add_attempt(conn, lease, &attempt).await?;
+    add_attempt(conn, lease.block, lease.worker, &attempt).await?;
     update_inputs(conn, lease.block, &stage.inputs).await?;
     failpoint::hit(record.stage, Point::Recorded, None);
     Ok(Stored::Now)
@@ -163,20 +163,21 @@ pub(crate) async fn store(
 /// Adds an attempt to the history of a block, and deletes old ones.
 pub(crate) async fn add_attempt(
     conn: &mut Conn,
-    lease: &BlockLease,
+    block: BlockId,
+    worker: WorkerId,
     attempt: &BlockAttempt<'_>,
 ) -> Result<()> {
     query(ATTEMPT)
-        .bind(lease.block.0)
+        .bind(block.0)
         .bind(attempt.stage.index() as i64)
-        .bind(lease.worker.0)
+        .bind(worker.0)
         .bind(attempt.failure.map(|(class, _)| class))
         .bind(attempt.failure.map(|(_, message)| message))
         .bind(attempt.ms.map(|ms| ms as i64))
         .bind(attempt.at)
         .execute(&mut *conn)
         .await?;
-    let prune = query(PRUNE).bind(lease.block.0).bind(ATTEMPTS_KEPT);
+    let prune = query(PRUNE).bind(block.0).bind(ATTEMPTS_KEPT);
     prune.execute(conn).await
 }
 

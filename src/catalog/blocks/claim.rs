@@ -2,7 +2,9 @@
 
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockLease, BlockWork};
 use crate::catalog::blocks::records::{BLOCK, control_points, input_versions, stage_records};
+use crate::catalog::blocks::selection::BlockSelection;
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow as _, from_row};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -14,13 +16,34 @@ use crate::failpoint::{self, Point};
 const HELD: &str = "
 SELECT block, worker, token, stage, attempt FROM block_job WHERE worker = ?1 AND status = 1 ORDER BY block LIMIT 1";
 
-/// Leases the most advanced ready block. No block starts while a pair must run exclusively.
-const CLAIM: &str = "
+/// Builds the text of a claim from a condition.
+macro_rules! claim {
+    ($condition:literal) => {
+        concat!(
+            "
 UPDATE block_job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
-WHERE block = (SELECT block FROM block_job WHERE status = 0 ORDER BY stage DESC, block LIMIT 1)
+WHERE block = (
+        SELECT block FROM block_job
+        WHERE status = 0 AND (?4 IS NULL OR block IN (SELECT CAST(atom AS bigint) FROM json_each(?4)))
+        ORDER BY stage DESC, block LIMIT 1)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?3)
-    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND exclusive = 1)
-RETURNING block, worker, token, stage, attempt";
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND exclusive = 1)",
+            $condition,
+            "
+RETURNING block, worker, token, stage, attempt"
+        )
+    };
+}
+
+/// Leases the most advanced ready block, of all or of those with the ids `?4`. No block starts while a pair must run
+/// exclusively. In PostgreSQL, a worker whose settings are not those of the last plan gets nothing.
+const CLAIM: Sql = Sql::pair(
+    claim!(""),
+    claim!(
+        "
+    AND coalesce((SELECT s.block_settings = me.block_settings FROM run_settings AS s, worker AS me WHERE me.id = ?1), true)"
+    ),
+);
 
 /// Gives a lease back. Its attempt does not count.
 const RELEASE: &str = "
@@ -33,7 +56,8 @@ UPDATE block_job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?
 const OUTSTANDING: &str = "
 SELECT count(*) FILTER (WHERE status = 0) AS ready, count(*) FILTER (WHERE status = 1) AS leased,
     count(*) FILTER (WHERE status = 2) AS backoff, count(*) FILTER (WHERE status = 4) AS quarantined,
-    min(run_at) AS next_due FROM block_job";
+    min(run_at) AS next_due FROM block_job
+WHERE ?1 IS NULL OR block IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
 /// Numbers of blocks that have a stage to run, and of blocks that failed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -60,8 +84,8 @@ impl OutstandingBlocks {
 }
 
 impl Catalog {
-    /// Leases one ready block, with the data that its stages need. Returns `None` if no block is ready, or if the
-    /// worker has ended or its last heartbeat is before `alive_since`.
+    /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks.
+    /// Returns `None` if no block is ready, or if the worker has ended or its last heartbeat is before `alive_since`.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -70,14 +94,17 @@ impl Catalog {
         worker: WorkerId,
         deadline: UnixMillis,
         alive_since: UnixMillis,
+        among: Option<&BlockSelection>,
     ) -> Result<Option<(BlockLease, BlockWork)>> {
+        let among = among.map(BlockSelection::json);
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let held = query_as(HELD).bind(worker.0);
                 let mut lease: Option<BlockLease> = held.fetch_optional(&mut *conn).await?;
                 if lease.is_none() {
                     let claim = query_as(CLAIM).bind(worker.0).bind(deadline);
-                    lease = claim.bind(alive_since).fetch_optional(&mut *conn).await?;
+                    let claim = claim.bind(alive_since).bind(among);
+                    lease = claim.fetch_optional(&mut *conn).await?;
                 }
                 let Some(lease) = lease else { return Ok(None) };
                 failpoint::hit(lease.cursor, Point::Claiming, None);
@@ -104,13 +131,18 @@ impl Catalog {
         .await
     }
 
-    /// Counts the blocks that are ready, leased or backing off, and the failed ones.
+    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only
+    /// its blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
-    pub async fn outstanding_blocks(&self) -> Result<OutstandingBlocks> {
+    pub async fn outstanding_blocks(
+        &self,
+        among: Option<&BlockSelection>,
+    ) -> Result<OutstandingBlocks> {
         let mut conn = self.read_conn().await?;
-        query_as(OUTSTANDING).fetch_one(&mut conn).await
+        let counts = query_as(OUTSTANDING).bind(among.map(BlockSelection::json));
+        counts.fetch_one(&mut conn).await
     }
 
     /// Ends the back-offs of blocks that are due, and returns the number of blocks made ready. Also ends back-offs with

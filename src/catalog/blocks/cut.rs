@@ -15,7 +15,7 @@ use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::lease::InputVersions;
 use crate::catalog::records::import::{ImportRow, ImportSummary, SELECT, import_chunk};
 use crate::catalog::records::model::PairAttributes;
-use crate::catalog::{Catalog, CatalogError, Result};
+use crate::catalog::{Catalog, Result};
 use crate::domain::{AlignmentPrior, BlockName, PairId, PairName};
 
 /// What the cut of a block changed.
@@ -56,9 +56,9 @@ SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?
 const WITHOUT_EFFECT: [&str; 3] = ["character", "block", "metadata"];
 
 impl Catalog {
-    /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must be
-    /// on disk already. A pair whose files and attributes are the same stays as it is, a changed one runs again from the
-    /// first stage, and one whose box is gone is retired. Verdicts stay in all cases.
+    /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must
+    /// be on disk already. A pair whose files and attributes are the same stays as it is, a changed one runs again from
+    /// the first stage, and one whose box is gone is retired. Verdicts stay in all cases.
     ///
     /// # Errors
     /// Returns an error if the name of a pair is invalid, or if a database operation fails.
@@ -115,8 +115,8 @@ struct CutRow<'c> {
     size: [f64; 2],
 }
 
-/// Keeps the stored priors of pairs with the same files, if the new ones are near. When one box changes, the positions of
-/// all other characters change by a small fraction of a pixel, which is no reason to align them again.
+/// Keeps the stored priors of pairs with the same files, if the new ones are near. When one box changes, the positions
+/// of all other characters change by a small fraction of a pixel, which is no reason to align them again.
 async fn keep_near_priors(
     conn: &mut Conn,
     rows: &mut [CutRow<'_>],
@@ -155,10 +155,8 @@ fn pair_rows<'c>(block: &BlockName, found: &'c [NewCharacter]) -> Result<Vec<Cut
     let cut = found.iter();
     let cut = cut.filter_map(|one| Some((one, one.cut.as_ref().ok()?)));
     cut.map(|(one, cut)| {
-        let name = block.pair(&one.label);
-        let name = name.map_err(|error| CatalogError::Corrupt(error.to_string()))?;
         let row = ImportRow {
-            name,
+            name: characters::pair_name(block, &one.label)?,
             mesh_path: cut.mesh_path.clone(),
             print_path: cut.print_path.clone(),
             unit: cut.unit,

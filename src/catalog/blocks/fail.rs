@@ -70,7 +70,7 @@ impl Catalog {
                     ms: failed.ms,
                     at: failed.at,
                 };
-                checkpoint::add_attempt(conn, &lease, &attempt).await?;
+                checkpoint::add_attempt(conn, lease.block, lease.worker, &attempt).await?;
                 checkpoint::update_inputs(conn, lease.block, &failed.inputs).await?;
                 failpoint::hit(failed.stage, Point::Recorded, None);
                 Ok(true)

@@ -39,8 +39,8 @@ pub(crate) const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
 
 impl Catalog {
-    /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which stages
-    /// of a changed block are stale.
+    /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
+    /// stages of a changed block are stale.
     ///
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is imported.

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::catalog::db::row::from_row;
+use crate::catalog::queue::fingerprint::differences;
 use crate::catalog::queue::lease::InputVersion;
+use crate::catalog::queue::plan::FieldChange;
 use crate::domain::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
     ControlPoints, Failure, LengthUnit, PrintFromMesh, UnixMillis, WorkerId,
@@ -65,6 +67,22 @@ impl BlockSettings {
     /// Collects the settings of each stage.
     pub fn new(fields: impl Fn(BlockStage) -> Value) -> Self {
         Self(BlockStage::ALL.map(fields))
+    }
+
+    /// Returns the settings as a JSON array by stage. Another process can pass the text to
+    /// [`BlockSettings::changes_from`].
+    pub fn json(&self) -> String {
+        Value::from(self.0.to_vec()).to_string()
+    }
+
+    /// Returns the settings that differ from those of another process, which are given as [`BlockSettings::json`].
+    /// Returns nothing if the text cannot be read.
+    pub fn changes_from(&self, other: &str) -> Vec<FieldChange> {
+        let other: Vec<Value> = serde_json::from_str(other).unwrap_or_default();
+        let stages = BlockStage::ALL.into_iter().zip(other);
+        let changes =
+            stages.flat_map(|(stage, old)| differences(stage.name(), &old, self.of(stage)));
+        changes.collect()
     }
 
     /// Returns the settings of a stage.

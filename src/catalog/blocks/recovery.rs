@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use crate::catalog::Result;
+use crate::catalog::blocks::checkpoint::{self, BlockAttempt};
 use crate::catalog::blocks::model::{BlockAttributes, MadeWith};
 use crate::catalog::blocks::records::{BLOCK, control_points, input_versions};
 use crate::catalog::db::conn::Conn;
@@ -31,9 +32,6 @@ UPDATE block_job SET status = 4, worker = NULL, deadline = NULL, token = token +
     attempt = max(attempt - 1, 0), class = ?3, message = ?4, failed_stage = stage, failed_at = ?5, failed_with = ?6
 WHERE block = ?1";
 
-const ATTEMPT: &str = "
-INSERT INTO block_attempt (block, stage, worker, class, message, at) VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
-
 /// A block whose lease may be recovered.
 struct LeftBlock {
     block: BlockId,
@@ -47,8 +45,8 @@ struct LeftBlock {
 
 from_row! { LeftBlock { block, stage, crashes, worker, died, overdue, pairs } }
 
-/// Recovers the block leases of dead workers, given as a JSON array. `deaths` is the number of recent deaths. A block is
-/// blamed for a death if its worker held no pairs. Returns how many blocks are ready again.
+/// Recovers the block leases of dead workers, given as a JSON array. `deaths` is the number of recent deaths. A block
+/// is blamed for a death if its worker held no pairs. Returns how many blocks are ready again.
 pub(crate) async fn recover(
     conn: &mut Conn,
     workers: &str,
@@ -122,13 +120,11 @@ async fn end_lease(
         .bind(serde_json::to_string(&failed_with)?)
         .execute(&mut *conn)
         .await?;
-    query(ATTEMPT)
-        .bind(left.block.0)
-        .bind(stage.index() as i64)
-        .bind(left.worker.0)
-        .bind(class)
-        .bind(&message)
-        .bind(now)
-        .execute(conn)
-        .await
+    let attempt = BlockAttempt {
+        stage,
+        failure: Some((class, &message)),
+        ms: None,
+        at: now,
+    };
+    checkpoint::add_attempt(conn, left.block, left.worker, &attempt).await
 }

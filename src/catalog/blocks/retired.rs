@@ -7,7 +7,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
-use crate::catalog::db::rows::{json_array, names_json};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, PairId, PairName, UnixMillis};
@@ -78,8 +78,8 @@ impl Catalog {
     }
 }
 
-/// Retires pairs: removes their jobs and keeps their positions. Pairs without a job are left out. Returns how many pairs
-/// it retired.
+/// Retires pairs: removes their jobs and keeps their positions. Pairs without a job are left out. Returns how many
+/// pairs it retired.
 pub(crate) async fn retire(
     conn: &mut Conn,
     pairs: &[PairId],
@@ -113,13 +113,9 @@ pub(crate) async fn retire(
     Ok(removed.len() as u64)
 }
 
-/// Gives the retired pairs among these names their jobs back. Returns how many there were.
-pub(crate) async fn restore(
-    conn: &mut Conn,
-    names: &[PairName],
-    deltas: &mut Deltas,
-) -> Result<u64> {
-    let restored = query_as(RESTORE).bind(names_json(names));
+/// Gives the retired pairs among these names, a JSON array, their jobs back. Returns how many there were.
+pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -> Result<u64> {
+    let restored = query_as(RESTORE).bind(names);
     let restored: Vec<KeyedJob> = restored.fetch_all(&mut *conn).await?;
     for job in &restored {
         deltas.add(job.key, 1);

@@ -8,6 +8,7 @@ use serde_json::Value;
 use crate::catalog::blocks::import::NEW_JOB;
 use crate::catalog::blocks::model::{BlockAttributes, BlockInputVersions, BlockSettings, MadeWith};
 use crate::catalog::blocks::records::{control_points, input_versions};
+use crate::catalog::blocks::selection::BlockSelection;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
@@ -194,7 +195,8 @@ impl BlockJob {
 }
 
 impl Catalog {
-    /// Returns the blocks that a run with these settings would work on, and why.
+    /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
+    /// its blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -202,9 +204,10 @@ impl Catalog {
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
+        among: Option<&BlockSelection>,
     ) -> Result<Vec<BlockPlanEntry>> {
         let mut conn = self.snapshot().await?;
-        let planned = decisions(&mut conn, settings, policy).await?;
+        let planned = decisions(&mut conn, settings, policy, among).await?;
         let entries = planned.into_iter().map(|(job, from, why)| BlockPlanEntry {
             block: job.attributes.name,
             from,
@@ -213,7 +216,8 @@ impl Catalog {
         Ok(entries.collect())
     }
 
-    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. Returns their number.
+    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
+    /// considers only its blocks. Returns their number.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -221,12 +225,14 @@ impl Catalog {
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
+        among: Option<&BlockSelection>,
     ) -> Result<u64> {
-        let settings = settings.clone();
+        let (settings, among) = (settings.clone(), among.cloned());
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut requeued = 0;
-                for (job, from, why) in decisions(conn, &settings, policy).await? {
+                let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
+                for (job, from, why) in decided {
                     if matches!(why, BlockReason::New | BlockReason::Unfinished)
                         && job.next() == Some(from)
                     {
@@ -243,8 +249,8 @@ impl Catalog {
         .await
     }
 
-    /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files of their results are
-    /// missing or damaged.
+    /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
+    /// of their results are missing or damaged.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -269,6 +275,7 @@ async fn decisions(
     conn: &mut Conn,
     settings: &BlockSettings,
     policy: RerunPolicy,
+    among: Option<&BlockSelection>,
 ) -> Result<Vec<(BlockJob, BlockStage, BlockReason)>> {
     let jobs: Vec<BlockJob> = query_as(JOBS).fetch_all(&mut *conn).await?;
     let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, MadeWith>> = BTreeMap::new();
@@ -278,7 +285,9 @@ async fn decisions(
         of_block.insert(row.get("stage")?, made);
     }
     let none = BTreeMap::new();
-    let decided = jobs.into_iter().filter_map(|job| {
+    let wanted = jobs.into_iter();
+    let wanted = wanted.filter(|job| among.is_none_or(|among| among.contains(job.block)));
+    let decided = wanted.filter_map(|job| {
         let results = results.get(&job.block).unwrap_or(&none);
         let (from, why) = job.decide(results, settings, policy)?;
         Some((job, from, why))

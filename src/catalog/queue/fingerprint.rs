@@ -138,7 +138,11 @@ impl Catalog {
             let sql = "SELECT fields FROM fingerprint WHERE hash = unhex(?1)";
             let fields = query_scalar(sql).bind(hash);
             if let Some(Json(old)) = fields.fetch_optional(&mut conn).await? {
-                changes.extend(differences(stage, &old, &fingerprints.of(stage).fields));
+                changes.extend(differences(
+                    stage.name(),
+                    &old,
+                    &fingerprints.of(stage).fields,
+                ));
             }
         }
         Ok(changes)
@@ -212,8 +216,8 @@ impl FingerprintChains {
     }
 }
 
-/// Returns the settings that differ, by name: `register.max_scale`.
-pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
+/// Returns the settings of a stage that differ, by name: `register.max_scale`.
+pub(crate) fn differences(stage: &str, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
     let names: BTreeSet<_> = old.keys().chain(new.keys()).collect();
     let changed = names
@@ -228,9 +232,9 @@ pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldCh
 }
 
 /// Flattens nested objects. The key `settings` is left out of the names.
-fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
+fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
-    let mut open = vec![(stage.name().to_owned(), fields)];
+    let mut open = vec![(stage.to_owned(), fields)];
     while let Some((path, value)) = open.pop() {
         let Some(inner) = value.as_object() else {
             found.insert(path, value.clone());
@@ -269,7 +273,7 @@ mod tests {
     fn a_changed_setting_is_named_with_old_and_new() {
         let old = json!({ "revision": 1, "settings": { "max_scale": 1.2, "seed": 0 } });
         let new = json!({ "revision": 1, "settings": { "max_scale": 1.3, "seed": 0 } });
-        let changes = differences(Stage::Register, &old, &new);
+        let changes = differences("register", &old, &new);
         let text: Vec<_> = changes.iter().map(ToString::to_string).collect();
         assert_eq!(text, ["register.max_scale: 1.2 -> 1.3"]);
     }

@@ -15,22 +15,18 @@ use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairName, Stage};
 
 impl Catalog {
-    /// Plans a run with these settings for the named pairs. If `names` is `None`, plans a run for all pairs.
+    /// Plans a run with these settings for the selected pairs, or for all.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
-        names: Option<&[PairName]>,
+        among: Option<&PairSelection>,
         policy: RerunPolicy,
     ) -> Result<Plan> {
         let mut conn = self.snapshot().await?;
-        let among = match names {
-            Some(names) => Some(select(&mut conn, names).await?),
-            None => None,
-        };
-        plan(&mut conn, fingerprints, among.as_ref(), policy).await
+        plan(&mut conn, fingerprints, among, policy).await
     }
 
     /// Counts the pairs that have a result with outdated settings or inputs.
@@ -92,7 +88,11 @@ async fn plan(
         let changes = match why {
             StaleReason::Settings { stage, old } => {
                 let old = fields_of(conn, old).await?;
-                Some(differences(stage, &old, &fingerprints.of(stage).fields))
+                Some(differences(
+                    stage.name(),
+                    &old,
+                    &fingerprints.of(stage).fields,
+                ))
             }
             _ => None,
         };

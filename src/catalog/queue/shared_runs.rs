@@ -4,10 +4,12 @@
 use serde_json::Value;
 
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query, query_scalar};
-use crate::catalog::queue::fingerprint::{FingerprintIds, differences, fields_of};
+use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::row::from_row;
+use crate::catalog::queue::fingerprint::{differences, fields_of};
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
+use crate::catalog::queue::workers::WorkerSettings;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{Stage, UnixMillis};
 
@@ -15,13 +17,16 @@ use crate::domain::{Stage, UnixMillis};
 /// the clocks of two machines may differ.
 pub(crate) const SHOWN_ACTIVE_MS: i64 = 60_000;
 
-/// Selects the fingerprints of a worker that holds leases and has other settings.
+/// Selects the settings of a worker that holds leases and has other settings.
 const OTHERS: &str = "
-SELECT w.fingerprints FROM worker AS w
-WHERE w.fingerprints <> ?1 AND w.id IN (SELECT worker FROM job WHERE status = 1) ORDER BY w.id LIMIT 1";
+SELECT w.fingerprints, w.block_settings FROM worker AS w
+WHERE (w.fingerprints <> ?1 OR w.block_settings <> ?2) AND w.id IN (
+    SELECT worker FROM job WHERE status = 1 UNION ALL SELECT worker FROM block_job WHERE status = 1)
+ORDER BY w.id LIMIT 1";
 
 const SET: &str = "
-INSERT INTO run_settings (id, fingerprints) VALUES (1, ?1) ON CONFLICT (id) DO UPDATE SET fingerprints = excluded.fingerprints";
+INSERT INTO run_settings (id, fingerprints, block_settings) VALUES (1, ?1, ?2)
+ON CONFLICT (id) DO UPDATE SET fingerprints = excluded.fingerprints, block_settings = excluded.block_settings";
 
 const ACTIVE: &str =
     "SELECT count(*) FROM worker WHERE ended IS NULL AND died = 0 AND heartbeat > ?1";
@@ -42,20 +47,20 @@ pub enum SharedSettings {
 }
 
 impl Catalog {
-    /// Makes these the settings of all workers, unless pairs are leased by workers with other settings. Workers with
-    /// other settings get no more pairs.
+    /// Makes these the settings of all workers, unless pairs or blocks are leased by workers with other settings. Workers
+    /// with other settings get no more pairs and blocks.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
-    pub async fn set_run_settings(&self, fingerprints: FingerprintIds) -> Result<SharedSettings> {
+    pub async fn set_run_settings(&self, settings: WorkerSettings) -> Result<SharedSettings> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let mine = fingerprints.json();
-                let others = query_scalar(OTHERS).bind(&mine);
-                if let Some(others) = others.fetch_optional(conn).await? {
-                    return other(conn, others, fingerprints).await;
+                let (pairs, blocks) = (settings.fingerprints.json(), settings.blocks.json());
+                let others = query_as(OTHERS).bind(&pairs).bind(&blocks);
+                if let Some(others) = others.fetch_optional(&mut *conn).await? {
+                    return other(conn, others, &settings).await;
                 }
-                query(SET).bind(&mine).execute(conn).await?;
+                query(SET).bind(&pairs).bind(&blocks).execute(conn).await?;
                 Ok(SharedSettings::Same)
             })
         })
@@ -66,16 +71,16 @@ impl Catalog {
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
-    pub async fn compare_run_settings(
-        &self,
-        fingerprints: FingerprintIds,
-    ) -> Result<SharedSettings> {
+    pub async fn compare_run_settings(&self, settings: &WorkerSettings) -> Result<SharedSettings> {
         let mut conn = self.snapshot().await?;
-        let planned = query_scalar("SELECT fingerprints FROM run_settings");
-        let planned: Option<String> = planned.fetch_optional(&mut conn).await?;
+        let planned = query_as("SELECT fingerprints, block_settings FROM run_settings");
+        let planned: Option<StoredSettings> = planned.fetch_optional(&mut conn).await?;
+        let mine = (settings.fingerprints.json(), settings.blocks.json());
         match planned {
-            Some(planned) if planned != fingerprints.json() => {
-                other(&mut conn, planned, fingerprints).await
+            Some(planned)
+                if (&planned.fingerprints, &planned.block_settings) != (&mine.0, &mine.1) =>
+            {
+                other(&mut conn, planned, settings).await
             }
             Some(_) | None => Ok(SharedSettings::Same),
         }
@@ -110,18 +115,29 @@ impl Catalog {
     }
 }
 
-/// Returns the fields in which the fingerprints differ from others, which are a JSON array of ids by stage.
+/// The settings of a worker or of the last plan.
+struct StoredSettings {
+    /// Ids of the fingerprints by stage, as a JSON array.
+    fingerprints: String,
+    /// As [`BlockSettings::json`](crate::catalog::BlockSettings::json).
+    block_settings: String,
+}
+
+from_row! { StoredSettings { fingerprints, block_settings } }
+
+/// Returns the fields in which the settings differ from others.
 async fn other(
     conn: &mut Conn,
-    others: String,
-    fingerprints: FingerprintIds,
+    others: StoredSettings,
+    settings: &WorkerSettings,
 ) -> Result<SharedSettings> {
-    let others: [i64; 4] = serde_json::from_str(&others)?;
+    let ids: [i64; 4] = serde_json::from_str(&others.fingerprints)?;
     let mut changes = Vec::new();
-    for (stage, id) in Stage::ALL.into_iter().zip(others) {
-        let mine: Value = fields_of(conn, fingerprints.of(stage)).await?;
+    for (stage, id) in Stage::ALL.into_iter().zip(ids) {
+        let mine: Value = fields_of(conn, settings.fingerprints.of(stage)).await?;
         let other = fields_of(conn, FingerprintId(id)).await?;
-        changes.extend(differences(stage, &other, &mine));
+        changes.extend(differences(stage.name(), &other, &mine));
     }
+    changes.extend(settings.blocks.changes_from(&others.block_settings));
     Ok(SharedSettings::Other(changes))
 }

@@ -1,5 +1,6 @@
 //! Worker registration, due back-offs and open work.
 
+use crate::catalog::blocks::model::BlockSettings;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
@@ -18,6 +19,15 @@ pub struct WorkerInfo {
     pub pid: u32,
     /// Boot id of the machine, if known.
     pub boot_id: Option<String>,
+}
+
+/// The settings that a worker uses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkerSettings {
+    /// Fingerprints of the settings of pairs.
+    pub fingerprints: FingerprintIds,
+    /// Settings of the stages of blocks.
+    pub blocks: BlockSettings,
 }
 
 /// Numbers of pairs that have a stage to run.
@@ -71,17 +81,17 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Registers a worker process with the fingerprints of its settings. Returns an id that no worker had before.
+    /// Registers a worker process with its settings. Returns an id that no worker had before.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
-        fingerprints: FingerprintIds,
+        settings: WorkerSettings,
         now: UnixMillis,
     ) -> Result<WorkerId> {
-        self.in_transaction(move |conn| Box::pin(insert_worker(conn, info, fingerprints, now)))
+        self.in_transaction(move |conn| Box::pin(insert_worker(conn, info, settings, now)))
             .await
     }
 
@@ -178,18 +188,19 @@ impl Catalog {
 async fn insert_worker(
     conn: &mut Conn,
     info: WorkerInfo,
-    fingerprints: FingerprintIds,
+    settings: WorkerSettings,
     now: UnixMillis,
 ) -> Result<WorkerId> {
     let id: i64 = query_scalar(
-        "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints)
-        VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
+        "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints, block_settings)
+        VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6) RETURNING id",
     )
     .bind(info.host)
     .bind(info.pid)
     .bind(info.boot_id)
     .bind(now)
-    .bind(fingerprints.json())
+    .bind(settings.fingerprints.json())
+    .bind(settings.blocks.json())
     .fetch_one(conn)
     .await?;
     Ok(WorkerId(id))

@@ -2,9 +2,9 @@
 //!
 //! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction.
 //! A checksum is the first 64 bits of a BLAKE3 hash of the table's number, the row's number and the row's columns. For
-//! a pair or a block, it covers only the columns that no run writes. For a verdict, an answer and a manual alignment, it also covers the
-//! previous row's checksum. This reveals a row that was removed together with its checksum. The tables of undone rows
-//! have no such chain.
+//! a pair or a block, it covers only the columns that no run writes. For a verdict, an answer and a manual alignment, it
+//! also covers the previous row's checksum. This reveals a row that was removed together with its checksum. The tables
+//! of undone rows have no such chain.
 
 use serde_json::json;
 

@@ -157,9 +157,8 @@ pub(crate) async fn import_chunk(
     summary: &mut ImportSummary,
     deltas: &mut Deltas,
 ) -> Result<()> {
-    let given: Vec<_> = chunk.iter().map(|row| row.name.clone()).collect();
-    retired::restore(conn, &given, deltas).await?;
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
+    retired::restore(conn, &names, deltas).await?;
     let known = query(SELECT).bind(&names);
     let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
     for row in &known.fetch_all(&mut *conn).await? {

@@ -44,8 +44,8 @@ SELECT name, path FROM (
 );
 
 impl Catalog {
-    /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name of
-    /// its pair.
+    /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name
+    /// of its pair.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
@@ -56,8 +56,9 @@ impl Catalog {
         query.fetch_all(&mut conn).await
     }
 
-    /// Replaces the paths of the input files of pairs and blocks in one transaction, for a project that is restored at another place. `find` receives a stored path and returns the new
-    /// one, or `None` to keep the stored path. Returns the paths that were kept.
+    /// Replaces the paths of the input files of pairs and blocks in one transaction, for a project that is restored at
+    /// another place. `find` receives a stored path and returns the new one, or `None` to keep the stored path. Returns
+    /// the paths that were kept.
     ///
     /// # Errors
     /// Returns an error, and replaces no path, if a row differs from its checksum or a database operation fails.

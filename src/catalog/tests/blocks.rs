@@ -28,7 +28,7 @@ pub(super) fn attributes(text: &str) -> BlockAttributes {
     }
 }
 
-fn settings(revision: [u32; 4]) -> BlockSettings {
+pub(super) fn settings(revision: [u32; 4]) -> BlockSettings {
     BlockSettings::new(|stage| json!({ "revision": revision[stage.index()] }))
 }
 
@@ -94,7 +94,7 @@ pub(super) fn character(label: &str, content: &str) -> NewCharacter {
 
 impl World {
     pub(super) async fn claim_block(&self, worker: WorkerId) -> Option<(BlockLease, BlockWork)> {
-        let claim = self.catalog.claim_block(worker, 1_000, 0);
+        let claim = self.catalog.claim_block(worker, 1_000, 0, None);
         claim.await.expect("a claim")
     }
 
@@ -122,8 +122,11 @@ impl World {
     ) -> Vec<(BlockStage, BlockReason)> {
         let settings = settings(revision);
         let policy = RerunPolicy::Changed;
-        let plan = self.catalog.plan_blocks(&settings, policy).await;
-        let requeued = self.catalog.requeue_stale_blocks(&settings, policy).await;
+        let plan = self.catalog.plan_blocks(&settings, policy, None).await;
+        let requeued = self
+            .catalog
+            .requeue_stale_blocks(&settings, policy, None)
+            .await;
         requeued.expect("requeued");
         let plan = plan.expect("a plan").into_iter();
         plan.map(|entry| (entry.from, entry.why)).collect()
@@ -306,7 +309,7 @@ async fn a_refused_block_stays_until_a_retry_or_another_page() {
     let other = RerunPolicy::Failed;
     let plan = world
         .catalog
-        .plan_blocks(&settings([1; 4]), other)
+        .plan_blocks(&settings([1; 4]), other, None)
         .await
         .expect("a plan");
     assert_eq!(plan[0].why, BlockReason::Requested);
@@ -350,7 +353,11 @@ async fn a_block_backs_off_and_becomes_due() {
             .await
             .expect("stored")
     );
-    let left = world.catalog.outstanding_blocks().await.expect("a read");
+    let left = world
+        .catalog
+        .outstanding_blocks(None)
+        .await
+        .expect("a read");
     assert_eq!(
         (left.backoff, left.next_due, left.left()),
         (1, Some(500), 1)

@@ -2,6 +2,7 @@
 
 mod answers;
 mod block_pairs;
+mod block_settings;
 mod blocks;
 mod claim_order;
 mod control_points;
@@ -25,6 +26,7 @@ use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
     InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
+    WorkerSettings,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
@@ -147,12 +149,13 @@ impl World {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {
             let fingerprints = fingerprints(revision);
-            let plan = |names| {
+            let selected = self.catalog.select(&names).await.expect("a read");
+            let plan = |among| {
                 self.catalog
-                    .plan(&fingerprints, names, RerunPolicy::Changed)
+                    .plan(&fingerprints, among, RerunPolicy::Changed)
             };
             let all = plan(None).await.expect("a plan");
-            let each = plan(Some(names.as_slice())).await.expect("a plan");
+            let each = plan(Some(&selected)).await.expect("a plan");
             assert_eq!(all, each, "{revision:?}");
             let stale = self
                 .catalog
@@ -194,7 +197,11 @@ async fn enter(catalog: &Catalog, fingerprints: FingerprintIds, clock: UnixMilli
         pid: 1,
         boot_id: None,
     };
-    let entered = catalog.register_worker(info, fingerprints, clock);
+    let settings = WorkerSettings {
+        fingerprints,
+        blocks: blocks::settings([1; 4]),
+    };
+    let entered = catalog.register_worker(info, settings, clock);
     entered.await.expect("a worker")
 }
 

@@ -82,8 +82,8 @@ macro_rules! table_by_two {
 /// the last plan are not copied.
 pub(super) const TABLES: [CopyTable; 23] = [
     table!("review_key", 2, "id", "key"),
-    table!("worker", 10, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "died",
-        "metrics"; numbered),
+    table!("worker", 11, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "block_settings",
+        "died", "metrics"; numbered),
     table!("fingerprint", 5, "id", "stage", "hash", "fields", "upstream"; numbered),
     table!("pair", 16, "id", "name", "mesh_path", "print_path", "unit", "scanned_face_down", "character", "block", "meta",
         "prior", "attributes", "mesh_hash", "mesh_stat", "print_hash", "print_stat", "imported"; numbered),

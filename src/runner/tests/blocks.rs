@@ -1,11 +1,12 @@
 //! Runs of blocks with fake stages: pairs that are cut, refusals, changed files and stops.
 
+use super::values::pair_row;
 use super::{RunFixture, name, options};
 use crate::catalog::{BlockAttributes, BlockState, RerunPolicy};
 use crate::domain::{BlockName, BlockStage, FailureClass, JobStatus, Stage};
-use crate::runner::{RunEvent, RunOptions, StopLevel};
+use crate::runner::{NamedWork, RunError, RunEvent, RunOptions, StopLevel};
 
-fn block(text: &str) -> BlockName {
+pub(super) fn block(text: &str) -> BlockName {
     BlockName::new(text).expect("a valid name")
 }
 
@@ -32,12 +33,12 @@ impl RunFixture {
         fixture
     }
 
-    fn write(&self, block: &str, ext: &str, content: &str) {
+    pub(super) fn write(&self, block: &str, ext: &str, content: &str) {
         let path = self.project.input_path(&format!("{block}.{ext}"));
         std::fs::write(path, content).expect("written");
     }
 
-    async fn block_state(&self, text: &str) -> BlockState {
+    pub(super) async fn block_state(&self, text: &str) -> BlockState {
         let detail = self.catalog.block(&block(text)).await.expect("a read");
         detail.expect("the block").state
     }
@@ -48,7 +49,7 @@ impl RunFixture {
     }
 
     /// Returns how often each stage of a block was computed.
-    fn counts(&self, text: &str) -> [usize; 4] {
+    pub(super) fn counts(&self, text: &str) -> [usize; 4] {
         BlockStage::ALL.map(|stage| self.blocks.count(text, stage))
     }
 }
@@ -236,11 +237,46 @@ async fn named_pairs_run_without_blocks() {
     fixture.run(&options(1)).await;
     fixture.write("b_1", "txt", "r1 new a\nr2 b");
     let named = RunOptions {
-        pairs: Some(vec![name("b_1_r2")]),
+        only: Some(NamedWork {
+            pairs: vec![name("b_1_r2")],
+            blocks: Vec::new(),
+        }),
         ..options(1)
     };
     assert_eq!(fixture.run(&named).await.blocks.done, 0);
     assert_eq!(fixture.counts("b_1"), [1; 4]);
+}
+
+#[tokio::test]
+async fn a_named_block_runs_with_the_pairs_that_are_cut_from_it_and_no_others() {
+    let fixture = RunFixture::of_blocks(&["b_1", "b_2"], "r1 a\nr2 b").await;
+    fixture.write("b_2", "txt", "r1 c");
+    fixture
+        .catalog
+        .import(vec![pair_row("other")], 1)
+        .await
+        .expect("imported");
+    let named = |blocks: &[&str], pairs: &[&str]| RunOptions {
+        only: Some(NamedWork {
+            pairs: pairs.iter().map(|text| name(text)).collect(),
+            blocks: blocks.iter().map(|text| block(text)).collect(),
+        }),
+        ..options(2)
+    };
+    let first = fixture.run(&named(&["b_1"], &[])).await;
+    assert_eq!((first.blocks.done, first.blocks.left), (1, 0));
+    assert_eq!((first.done, first.left, first.status.pairs), (2, 0, 3));
+    assert_eq!(fixture.counts("b_2"), [0; 4]);
+    assert_eq!(fixture.executor.count("other", Stage::Fit), 0);
+    fixture.write("b_1", "txt", "r1 a\nr2 new b");
+    let second = fixture.run(&named(&["b_2"], &["other"])).await;
+    assert_eq!((second.blocks.done, second.done), (1, 2));
+    assert_eq!(fixture.counts("b_1"), [1; 4]);
+    let again = fixture.run(&named(&["b_1"], &[])).await;
+    assert_eq!((again.blocks.done, again.done), (1, 1));
+    assert_eq!(fixture.counts("b_1"), [1, 1, 2, 2]);
+    let refused = fixture.try_run(&named(&["b_3"], &[])).await;
+    assert!(matches!(refused, Err(RunError::NoSuchBlock(unknown)) if unknown == block("b_3")));
 }
 
 #[tokio::test]
@@ -316,7 +352,7 @@ async fn two_runs_work_on_different_blocks_and_share_the_pairs() {
         let opened = async {
             while fixture
                 .catalog
-                .outstanding_blocks()
+                .outstanding_blocks(None)
                 .await
                 .expect("a read")
                 .left()

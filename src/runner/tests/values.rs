@@ -2,8 +2,8 @@
 
 use serde_json::Map;
 
-use crate::catalog::PairAttributes;
-use crate::domain::{MetricOutcome, PairName, ThresholdMetric, test_values};
+use crate::catalog::{BlockAttributes, ImportRow, PairAttributes};
+use crate::domain::{BlockName, MetricOutcome, PairName, ThresholdMetric, test_values};
 
 /// Returns a pair without optional attributes.
 pub(in crate::runner) fn pair_attributes(mesh_path: &str, print_path: &str) -> PairAttributes {
@@ -17,6 +17,33 @@ pub(in crate::runner) fn pair_attributes(mesh_path: &str, print_path: &str) -> P
         block: None,
         meta: Map::new(),
         prior: None,
+    }
+}
+
+/// Returns a pair whose files do not exist.
+pub(super) fn pair_row(pair: &str) -> ImportRow {
+    ImportRow {
+        name: PairName::new(pair).expect("a pair's name"),
+        mesh_path: format!("{pair}.stl"),
+        print_path: format!("{pair}.png"),
+        unit: None,
+        scanned_face_down: None,
+        character: None,
+        block: None,
+        meta: Map::new(),
+        prior: None,
+    }
+}
+
+/// Returns a block without optional attributes.
+pub(in crate::runner) fn block_attributes(mesh_path: &str, page_path: &str) -> BlockAttributes {
+    BlockAttributes {
+        name: BlockName::new("1").expect("a block's name"),
+        mesh_path: mesh_path.to_owned(),
+        page_path: page_path.to_owned(),
+        labels_path: None,
+        unit: None,
+        side: None,
     }
 }
 

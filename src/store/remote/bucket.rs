@@ -117,7 +117,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails or the object is larger.
-    pub(super) fn read(&self, key: &str, limit: u64) -> Result<Vec<u8>, BucketError> {
+    pub(in crate::store) fn read(&self, key: &str, limit: u64) -> Result<Vec<u8>, BucketError> {
         let copied = self.copy_to(key, limit, None, Vec::new())?;
         let copied = copied.map(|(bytes, _)| bytes);
         copied.ok_or_else(|| BucketError::NotThere(self.address_of(key)))

@@ -141,6 +141,10 @@ impl ObjectCache {
             path: self.folder.clone(),
             source,
         };
+        if self.folder.as_os_str().is_empty() {
+            let text = "no folder for local copies is known; set storage.cache";
+            return Err(local(io::Error::new(ErrorKind::NotFound, text)));
+        }
         std::fs::create_dir_all(&self.folder).map_err(local)?;
         let temporary = tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder);
         let temporary = temporary.map_err(local)?;

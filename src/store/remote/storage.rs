@@ -190,11 +190,10 @@ impl ProjectStorage {
         Some((self.roots.get(name)?, rest))
     }
 
-    /// Returns whether some inputs are in an object store.
+    /// Returns whether some inputs may be in an object store: those below a root, or characters that were cut from blocks.
     pub(in crate::store) fn has_remote_inputs(&self) -> bool {
-        self.roots
-            .values()
-            .any(|root| matches!(root, Root::Bucket(_)))
+        let mut roots = self.roots.values();
+        self.artifacts.is_some() || roots.any(|root| matches!(root, Root::Bucket(_)))
     }
 
     /// Opens a local copy of an input.

@@ -1,0 +1,93 @@
+//! Estimates the memory that a block needs, so that it shares one limit with the pairs.
+
+use std::io::Read as _;
+use std::path::PathBuf;
+
+use super::input_reads::ReadItem;
+use super::memory_budget::{mesh_bytes, print_pixels};
+use crate::catalog::BlockAttributes;
+use crate::mesh::{STL_HEAD, binary_stl_triangles};
+use crate::raster;
+use crate::store::{Input, Project};
+
+/// Bytes reserved for the height maps of both sides, their relief and the search for the page. Measured: 120 MB.
+pub(super) const BLOCK_BYTES: u64 = 160 << 20;
+/// Part of the length of a streamed scan that the meshes of its characters take while they are cut. Measured: 1/18,
+/// with scans of 0.25 and 1.3 GB.
+const STREAMED_SHARE: u64 = 16;
+/// Bytes needed per pixel of a page. Measured: 10, with pages of 6 and 24 million pixels.
+const PAGE_PIXEL_BYTES: u64 = 16;
+
+/// A block whose memory is estimated.
+pub(super) struct EstimatedBlock {
+    pub(super) project: Project,
+    pub(super) attributes: BlockAttributes,
+    pub(super) limits: raster::ImageLimits,
+}
+
+impl ReadItem for EstimatedBlock {
+    type Output = u64;
+
+    fn read(&self) -> u64 {
+        let mesh = self.project.input(&self.attributes.mesh_path);
+        let page = self.project.input(&self.attributes.page_path);
+        let pixels = print_pixels(&page).min(self.limits.max_pixels);
+        BLOCK_BYTES
+            .saturating_add(scan_bytes(&mesh))
+            .saturating_add(pixels.saturating_mul(PAGE_PIXEL_BYTES))
+    }
+
+    fn path(&self) -> PathBuf {
+        self.project.input_path(&self.attributes.mesh_path)
+    }
+}
+
+/// Estimates the memory in bytes for a scan. A binary STL is streamed; other formats are read into memory as a whole.
+fn scan_bytes(scan: &Input) -> u64 {
+    let mut head = Vec::with_capacity(STL_HEAD);
+    let Ok(file) = scan.open() else {
+        return 0;
+    };
+    let length = file.metadata().map_or(0, |meta| meta.len());
+    let read = file.take(STL_HEAD as u64).read_to_end(&mut head);
+    let name = scan.path().to_string_lossy();
+    match read.map(|_| binary_stl_triangles(&head, length, &name)) {
+        Ok(Ok(Some(_))) => length / STREAMED_SHARE,
+        // Without a mesh, the block soon fails.
+        Ok(Err(_)) | Err(_) => 0,
+        Ok(Ok(None)) => mesh_bytes(scan),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BLOCK_BYTES, EstimatedBlock, PAGE_PIXEL_BYTES, STREAMED_SHARE};
+    use crate::raster::ImageLimits;
+    use crate::runner::input_reads::ReadItem as _;
+    use crate::runner::tests::values;
+    use crate::store::Project;
+
+    #[test]
+    fn a_streamed_scan_needs_little_and_another_format_its_whole_length() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        let page = image::GrayImage::from_pixel(300, 200, image::Luma([255]));
+        page.save(dir.path().join("page.png")).expect("a file");
+        let triangles = 1000_u32;
+        let mut stl = vec![0; 84 + 50 * triangles as usize];
+        stl[80..84].copy_from_slice(&triangles.to_le_bytes());
+        std::fs::write(dir.path().join("scan.stl"), &stl).expect("a file");
+        std::fs::write(dir.path().join("scan.ply"), vec![b'#'; 1000]).expect("a file");
+        let estimate = |mesh: &str| {
+            let block = EstimatedBlock {
+                project: project.clone(),
+                attributes: values::block_attributes(mesh, "page.png"),
+                limits: ImageLimits::SUGGESTED,
+            };
+            block.read() - BLOCK_BYTES - 60_000 * PAGE_PIXEL_BYTES
+        };
+        assert_eq!(estimate("scan.stl"), stl.len() as u64 / STREAMED_SHARE);
+        assert_eq!(estimate("scan.ply"), 3500);
+        assert_eq!(estimate("none.stl"), 0);
+    }
+}
