@@ -1,0 +1,124 @@
+"""Times whole blocks from files to files: `mocban run` against the steps of `block_assembly.py`.
+
+    cargo build --release
+    peers/bin/python benches/peers/block.py
+
+The blocks come from `mocban demo --block`, with their meshes rewritten as binary STL; both programs get the same labels
+and give a mesh, a print and a map for each of them. Each program runs in a process of its own, in turn, on all cores.
+The time of mocban is that of the four stages of the block, with durable writes; the alignment of each pair, which the
+peer does not do, comes in addition. The peer has no catalog, does not sync files, checks nothing and never refuses a
+page; its time does not include the imports of Python. A character is right if the root mean square error of its
+landmarks on the page is below 5 % of its height, and tight below 1.5 %.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+import numpy as np
+import trimesh
+from block_assembly import STL, labelled
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+ASSEMBLY = pathlib.Path(__file__).with_name("block_assembly.py")
+
+
+def measured(command):
+    """Runs a command; returns wall-clock time, CPU time in seconds, peak memory in MB, and its output."""
+    begin = time.perf_counter()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        output = process.stdout.read()
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        sys.exit(f"{command} failed with {process.returncode}")
+    return time.perf_counter() - begin, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, output
+
+
+def ours(program, work, data):
+    """Returns seconds of the stages of the block, seconds of the run with all pairs, peak memory, and the maps."""
+    project = work / "project"
+    shutil.rmtree(project, ignore_errors=True)
+    at = [program, "-C", project]
+    page = next(data.glob("page.*"))
+    labels = ["--labels", data / "labels.json"]
+    measured([*at, "import", "--block", data / "block.stl", "--page", page, *labels, "--name", "block"])
+    whole, _, memory, _ = measured([*at, "run"])
+    found = json.loads(measured([*at, "show", "block", "--json"])[3])
+    stages = sum(attempt["ms"] for attempt in found["attempts"]) / 1e3
+    maps = {one["label"]: one["maps"]["page_from_mesh"] for one in found["character_list"] if one["state"] == "cut"}
+    return stages, whole, memory, maps
+
+
+def theirs(work, data):
+    out = work / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    seconds, memory, maps = json.loads(measured([sys.executable, ASSEMBLY, data, out])[3])
+    return seconds, seconds, memory, maps
+
+
+def errors(maps, data):
+    """Returns the error of each labelled character as a share of its height; infinite without a map."""
+    found, truth = [], json.loads((data / "truth.json").read_text())
+    names = {name for _, name in labelled(data)}
+    for one in (one for one in truth["characters"] if one["name"] in names):
+        left, top, right, bottom = one["box_px"]
+        mesh = np.array([[*mark["mesh"], 1] for mark in one["landmarks"]])
+        page = np.array([mark["page"] for mark in one["landmarks"]])
+        if one["name"] not in maps:
+            found.append(np.inf)
+            continue
+        off = mesh @ np.array(maps[one["name"]])[:2].T - page
+        found.append(np.sqrt((off**2).sum(1).mean()) / max(bottom - top, right - left))
+    return np.array(found)
+
+
+def prepared(program, work, kind, seed, spacing):
+    """Creates a block of the demo with its mesh as binary STL; returns its folder and its number of triangles."""
+    data = work / "demo" / "data"
+    if not (data / "block.stl").exists():
+        options = [f"--block={kind}", "--seed", str(seed), "--spacing", str(spacing), "--no-run"]
+        subprocess.run([program, "demo", work / "demo", *options], check=True, capture_output=True)
+        mesh = trimesh.load(data / "block.ply", process=False)
+        mesh.export(data / "part.stl")
+        (data / "part.stl").rename(data / "block.stl")
+    return data, ((data / "block.stl").stat().st_size - 84) // STL.itemsize
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--blocks", default="plain:0.3,notes:0.3,warp:0.3,plain:0.2", help="kinds and spacings in mm")
+    options.add_argument("--seed", type=int, default=11)
+    options.add_argument("--rounds", type=int, default=3)
+    options.add_argument("--program", type=pathlib.Path, default=ROOT / "target" / "release" / "mocban")
+    options.add_argument("--work", type=pathlib.Path, default=ROOT / "target" / "tmp" / "peers-blocks")
+    options = options.parse_args()
+    print("| block | program | s | with all pairs, s | MB | right | tight | median error | ratio of time, of memory |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for kind, spacing in (block.split(":") for block in options.blocks.split(",")):
+        work = options.work / f"{kind}-{spacing}-{options.seed}"
+        data, triangles = prepared(options.program, work, kind, options.seed, spacing)
+        spent = {"mocban": [], "assembled": []}
+        for _ in range(options.rounds):
+            for name, result in (("mocban", ours(options.program, work, data)), ("assembled", theirs(work, data))):
+                spent[name].append((*result[:3], errors(result[3], data)))
+        medians = {name: [statistics.median(column) for column in list(zip(*spent[name]))[:3]] for name in spent}
+        for name, runs in spent.items():
+            seconds, whole, memory = medians[name]
+            off = runs[-1][3]
+            right, tight = (f"{(off < limit).sum()} of {len(off)}" for limit in (0.05, 0.015))
+            ratios = f"{medians['mocban'][0] / seconds:.3f}, {medians['mocban'][2] / memory:.2f}"
+            whole = f"{whole:.1f}" if name == "mocban" else "-"
+            row = f"| {kind}, {triangles / 1e6:.1f} million triangles | {name} | {seconds:.1f} | {whole} | {memory:.0f} "
+            print(f"{row}| {right} | {tight} | {100 * np.median(off):.2f} % | {ratios} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
