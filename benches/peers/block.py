@@ -13,12 +13,12 @@ landmarks on the page is below 5 % of its height, and tight below 1.5 %.
 
 import argparse
 import json
-import os
 import pathlib
 import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -30,15 +30,19 @@ ASSEMBLY = pathlib.Path(__file__).with_name("block_assembly.py")
 
 
 def measured(command):
-    """Runs a command; returns wall-clock time, CPU time in seconds, peak memory in MB, and its output."""
-    begin = time.perf_counter()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        output = process.stdout.read()
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        sys.exit(f"{command} failed with {process.returncode}")
-    return time.perf_counter() - begin, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, output
+    """Runs a command; returns seconds, peak memory in MB, and its output."""
+    begin, memory = time.perf_counter(), 0
+    with tempfile.TemporaryFile("w+") as output:
+        with subprocess.Popen(command, stdout=output, stderr=subprocess.DEVNULL) as process:
+            while process.poll() is None:
+                # `ru_maxrss` would include the memory of this process.
+                lines = pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines()
+                memory = max([memory, *(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))])
+                time.sleep(0.01)
+        if process.returncode:
+            sys.exit(f"{command} failed with {process.returncode}")
+        output.seek(0)
+        return time.perf_counter() - begin, memory, output.read()
 
 
 def ours(program, work, data):
@@ -49,8 +53,8 @@ def ours(program, work, data):
     page = next(data.glob("page.*"))
     labels = ["--labels", data / "labels.json"]
     measured([*at, "import", "--block", data / "block.stl", "--page", page, *labels, "--name", "block"])
-    whole, _, memory, _ = measured([*at, "run"])
-    found = json.loads(measured([*at, "show", "block", "--json"])[3])
+    whole, memory, _ = measured([*at, "run"])
+    found = json.loads(measured([*at, "show", "block", "--json"])[2])
     stages = sum(attempt["ms"] for attempt in found["attempts"]) / 1e3
     maps = {one["label"]: one["maps"]["page_from_mesh"] for one in found["character_list"] if one["state"] == "cut"}
     return stages, whole, memory, maps
@@ -60,7 +64,8 @@ def theirs(work, data):
     out = work / "out"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    seconds, memory, maps = json.loads(measured([sys.executable, ASSEMBLY, data, out])[3])
+    _, memory, output = measured([sys.executable, ASSEMBLY, data, out])
+    seconds, maps = json.loads(output)
     return seconds, seconds, memory, maps
 
 
@@ -116,8 +121,8 @@ def main():
             right, tight = (f"{(off < limit).sum()} of {len(off)}" for limit in (0.05, 0.015))
             ratios = f"{medians['mocban'][0] / seconds:.3f}, {medians['mocban'][2] / memory:.2f}"
             whole = f"{whole:.1f}" if name == "mocban" else "-"
-            row = f"| {kind}, {triangles / 1e6:.1f} million triangles | {name} | {seconds:.1f} | {whole} | {memory:.0f} "
-            print(f"{row}| {right} | {tight} | {100 * np.median(off):.2f} % | {ratios} |", flush=True)
+            row = f"| {kind}, {triangles / 1e6:.1f} million triangles | {name} | {seconds:.1f} | {whole} |"
+            print(f"{row} {memory:.0f} | {right} | {tight} | {100 * np.median(off):.2f} % | {ratios} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@
 vectorized: axes from the distribution of the area, height maps of both sides, strokes above a local surface, ink by a
 local threshold, FFT correlation over quarter turns, rotations and scales, affine ECC, three rounds of windows
 (`matchTemplate`) with a smooth robust field, one more of the characters themselves, and for each character a mesh
-(PLY), a print (PNG) and a map. Prints seconds without the imports, peak memory in MB, and the maps as JSON.
+(PLY), a print (PNG) and a map. Prints seconds without the imports and the maps as JSON.
 """
 
 import json
 import pathlib
-import resource
 import sys
 import time
 
@@ -361,7 +360,7 @@ def main(data, out):
     begin = time.perf_counter()
     maps = block(data, out)
     seconds = time.perf_counter() - begin
-    print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, maps]))
+    print(json.dumps([seconds, maps]))
 
 
 if __name__ == "__main__":
