@@ -33,7 +33,7 @@ pub use character_map::CharacterMap;
 pub use characters::{CharacterBox, PlacedCharacter, PlacedCharacters, place_characters};
 pub use cut::{CUT_MARGIN_MM, CutError, CutPlan, cut_meshes};
 pub use error::BlockError;
-pub use found_boxes::{FoundBox, NoteHalf, find_boxes};
+pub use found_boxes::{FoundBox, find_boxes};
 pub use height_map::{HEIGHT_STEP_MM, HeightMap, draw_height_maps};
 pub use label_fit::{LabelFit, check_label_fit};
 pub use orientation::Orientation;
