@@ -2,6 +2,7 @@
 
 mod agreement;
 mod align;
+mod bounds;
 mod character_map;
 mod characters;
 mod coarse;
