@@ -13,6 +13,7 @@ landmarks on the page is below 5 % of its height, and tight below 1.5 %.
 
 import argparse
 import json
+import os
 import pathlib
 import shutil
 import statistics
@@ -29,44 +30,54 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 ASSEMBLY = pathlib.Path(__file__).with_name("block_assembly.py")
 
 
-def measured(command):
-    """Runs a command; returns seconds, peak memory in MB, and its output."""
-    begin, memory = time.perf_counter(), 0
-    with tempfile.TemporaryFile("w+") as output:
-        with subprocess.Popen(command, stdout=output, stderr=subprocess.DEVNULL) as process:
+def cpu_seconds(pid):
+    """Returns the CPU time of a process with all its threads."""
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def measured(command, text="\n"):
+    """Runs a command; returns its seconds, its peak memory in MB, its output, and the CPU seconds that it had used when
+    its messages contained a text."""
+    begin, memory, used = time.perf_counter(), 0, None
+    with tempfile.TemporaryFile("w+") as output, tempfile.NamedTemporaryFile("w+") as messages:
+        with subprocess.Popen(command, stdout=output, stderr=messages) as process:
             while process.poll() is None:
                 # `ru_maxrss` would include the memory of this process.
-                lines = pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines()
-                memory = max([memory, *(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))])
+                status = pathlib.Path(f"/proc/{process.pid}/status").read_text().splitlines()
+                memory = max([memory, *(int(field.split()[1]) / 1024 for field in status if field.startswith("VmHWM"))])
+                if used is None and text in pathlib.Path(messages.name).read_text():
+                    used = cpu_seconds(process.pid)
                 time.sleep(0.01)
         if process.returncode:
             sys.exit(f"{command} failed with {process.returncode}")
         output.seek(0)
-        return time.perf_counter() - begin, memory, output.read()
+        return time.perf_counter() - begin, memory, output.read(), used
 
 
 def ours(program, work, data):
-    """Returns seconds of the stages of the block, seconds of the run with all pairs, peak memory, and the maps."""
+    """Returns wall-clock and CPU seconds of the stages of the block, peak memory in MB, the maps, and seconds of the run
+    with all pairs."""
     project = work / "project"
     shutil.rmtree(project, ignore_errors=True)
     at = [program, "-C", project]
     page = next(data.glob("page.*"))
     labels = ["--labels", data / "labels.json"]
     measured([*at, "import", "--block", data / "block.stl", "--page", page, *labels, "--name", "block"])
-    whole, memory, _ = measured([*at, "run"])
+    whole, memory, _, cpu = measured([*at, "run", "--progress", "plain"], "pairs added")
     found = json.loads(measured([*at, "show", "block", "--json"])[2])
     stages = sum(attempt["ms"] for attempt in found["attempts"]) / 1e3
     maps = {one["label"]: one["maps"]["page_from_mesh"] for one in found["character_list"] if one["state"] == "cut"}
-    return stages, whole, memory, maps
+    return stages, cpu, memory, maps, whole
 
 
 def theirs(work, data):
     out = work / "out"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    _, memory, output = measured([sys.executable, ASSEMBLY, data, out])
-    seconds, maps = json.loads(output)
-    return seconds, seconds, memory, maps
+    _, memory, output, _ = measured([sys.executable, ASSEMBLY, data, out])
+    seconds, cpu, maps = json.loads(output)
+    return seconds, cpu, memory, maps, None
 
 
 def errors(maps, data):
@@ -105,24 +116,25 @@ def main():
     options.add_argument("--program", type=pathlib.Path, default=ROOT / "target" / "release" / "mocban")
     options.add_argument("--work", type=pathlib.Path, default=ROOT / "target" / "tmp" / "peers-blocks")
     options = options.parse_args()
-    print("| block | program | s | with all pairs, s | MB | right | tight | median error | ratio of time, of memory |")
+    print("| block | program | s | CPU s | MB | right | tight | median error | with all pairs, s |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind, spacing in (block.split(":") for block in options.blocks.split(",")):
         work = options.work / f"{kind}-{spacing}-{options.seed}"
         data, triangles = prepared(options.program, work, kind, options.seed, spacing)
         spent = {"mocban": [], "assembled": []}
         for _ in range(options.rounds):
-            for name, result in (("mocban", ours(options.program, work, data)), ("assembled", theirs(work, data))):
-                spent[name].append((*result[:3], errors(result[3], data)))
-        medians = {name: [statistics.median(column) for column in list(zip(*spent[name]))[:3]] for name in spent}
-        for name, runs in spent.items():
-            seconds, whole, memory = medians[name]
-            off = runs[-1][3]
+            spent["mocban"].append(ours(options.program, work, data))
+            spent["assembled"].append(theirs(work, data))
+        medians = {name: [statistics.median(run[k] for run in runs) for k in range(3)] for name, runs in spent.items()}
+        for name, (seconds, cpu, memory) in medians.items():
+            off = errors(spent[name][-1][3], data)
             right, tight = (f"{(off < limit).sum()} of {len(off)}" for limit in (0.05, 0.015))
-            ratios = f"{medians['mocban'][0] / seconds:.3f}, {medians['mocban'][2] / memory:.2f}"
-            whole = f"{whole:.1f}" if name == "mocban" else "-"
-            row = f"| {kind}, {triangles / 1e6:.1f} million triangles | {name} | {seconds:.1f} | {whole} |"
-            print(f"{row} {memory:.0f} | {right} | {tight} | {100 * np.median(off):.2f} % | {ratios} |", flush=True)
+            cells = [f"{kind}, {triangles / 1e6:.1f} million triangles", name, f"{seconds:.1f}", f"{cpu:.1f}"]
+            cells += [f"{memory:.0f}", right, tight, f"{100 * np.median(off):.2f} %"]
+            cells += [f"{statistics.median(run[4] for run in spent[name]):.1f}"] if name == "mocban" else [""]
+            print(f"| {' | '.join(cells)} |")
+        ratios = [f"{a / b:.2f}" for a, b in zip(*medians.values())]
+        print(f"| | ratio | {' | '.join(ratios)} | | | | |", flush=True)
 
 
 if __name__ == "__main__":
