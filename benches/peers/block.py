@@ -56,8 +56,8 @@ def measured(command, text="\n"):
 
 
 def ours(program, work, data):
-    """Returns wall-clock and CPU seconds of the stages of the block, peak memory in MB, the maps, and seconds of the run
-    with all pairs."""
+    """Returns wall-clock and CPU seconds of the stages of the block, peak memory in MB, the maps, and seconds of the
+    run with all pairs."""
     project = work / "project"
     shutil.rmtree(project, ignore_errors=True)
     at = [program, "-C", project]
