@@ -24,7 +24,6 @@ mod square_fft;
 mod stored_heights;
 #[cfg(test)]
 mod test_world;
-mod unit_guess;
 mod window_images;
 mod window_template;
 mod windows;

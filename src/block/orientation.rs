@@ -9,14 +9,15 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
-use super::unit_guess::guess_unit;
 use crate::domain::LengthUnit;
 use crate::mesh::{MeshReadError, Triangle, TriangleStream};
 
 /// Triangles that one task sums. Sums are added in a fixed order, so they do not depend on the number of threads.
 const TASK: usize = 4096;
+/// Typical long side of a block, mm. The unit is the one that brings the long side nearest to it.
+const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 /// Ratio of the side of a uniform rectangle to its standard deviation along that side: sqrt(12).
-pub(super) const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
+const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
 /// Every 32nd triangle is kept for the direction of the face and for the extent of the block, unless the mesh has
@@ -28,7 +29,7 @@ const EXTENT_MARGIN_MM: f64 = 3.0;
 /// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
 const LAYER_SHARE: f64 = 0.0375;
 /// Area looks along a direction if the cosine is at least this.
-pub(super) const ALONG: f64 = 0.85;
+const ALONG: f64 = 0.85;
 /// Steps that refine a direction.
 const REFINEMENTS: usize = 4;
 
@@ -61,7 +62,7 @@ struct AreaSums {
 }
 
 /// A triangle of the sample: its first corner relative to the origin, and its normal times twice its area.
-pub(super) type SampledTriangle = [Vector3<f32>; 2];
+type SampledTriangle = [Vector3<f32>; 2];
 
 impl AreaSums {
     const fn empty() -> Self {
@@ -104,7 +105,7 @@ impl AreaSums {
 
 impl Orientation {
     /// Finds the frame of a block in one pass over its triangles. If `unit` is `None`, the unit is the one of mm, cm,
-    /// inch and m that brings the carving nearest to the size of a page.
+    /// inch and m that brings the long side nearest to 320 mm.
     ///
     /// # Errors
     /// Returns an error if the mesh cannot be read or has no area.
@@ -173,8 +174,7 @@ impl Orientation {
         let axes = [u, v, n];
         let deviation = |axis: &Vector3<f64>| axis.dot(&(covariance * axis)).max(0.0).sqrt();
         let long_side = SIDE_BY_DEVIATION * deviation(&u);
-        let unit = unit.unwrap_or_else(|| guess_unit(&axes, sample, long_side));
-        let mm = unit.mm();
+        let mm = unit.unwrap_or_else(|| nearest_unit(long_side)).mm();
         let half_extent_mm = axes.map(|axis| {
             let distance =
                 |[corner, _]: &SampledTriangle| axis.dot(&(corner.cast::<f64>() - mean)).abs();
@@ -246,6 +246,15 @@ fn layer_area(n: &Vector3<f64>, sample: &[SampledTriangle], thickness: f64) -> f
         largest = largest.max(area);
     }
     largest
+}
+
+/// Returns the unit in which the long side of a block is nearest to a typical one.
+fn nearest_unit(long_side: f64) -> LengthUnit {
+    let distance = |unit: &LengthUnit| (long_side * unit.mm() / TYPICAL_LONG_SIDE_MM).ln().abs();
+    LengthUnit::ALL
+        .into_iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(LengthUnit::Mm)
 }
 
 /// Returns the axis or its opposite, so that its largest component is positive.
