@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bounds::bounds;
 use super::field::ShiftField;
 use super::windows::WindowMatch;
 
@@ -131,17 +132,10 @@ impl Agreement {
 
 impl Support {
     fn of(positions: &[[f64; 2]], agrees: &[bool]) -> Self {
-        let bound = |k: usize, combine: fn(f64, f64) -> f64| {
-            positions
-                .iter()
-                .map(|at| at[k])
-                .reduce(combine)
-                .unwrap_or(0.0)
-        };
-        let origin_mm = [bound(0, f64::min), bound(1, f64::min)];
-        let count =
-            |k: usize| ((bound(k, f64::max) - origin_mm[k]) / SUPPORT_STEP_MM).ceil() as usize + 1;
-        let (columns, rows) = (count(0), count(1));
+        let [u0, v0, u1, v1] = bounds(positions.iter().copied());
+        let origin_mm = [u0, v0];
+        let count = |extent: f64| (extent / SUPPORT_STEP_MM).ceil() as usize + 1;
+        let (columns, rows) = (count(u1 - u0), count(v1 - v0));
         let share = |place: usize| {
             let at = [
                 origin_mm[0] + (place % columns) as f64 * SUPPORT_STEP_MM,

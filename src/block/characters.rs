@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::agreement::Support;
 use super::align::CarvedFace;
+use super::bounds::bounds;
 use super::field::ShiftField;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
@@ -136,20 +137,7 @@ fn matches(
 /// Returns the bounding box on the face of a box on the page, mm.
 pub(super) fn face_box(map: &PageMap, [left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
     let corners = [[left, top], [right, top], [right, bottom], [left, bottom]];
-    let corners = corners.map(|corner| map.face_from_page(corner));
-    let bound = |k: usize, combine: fn(f64, f64) -> f64| {
-        corners
-            .iter()
-            .map(|corner| corner[k])
-            .reduce(combine)
-            .unwrap_or(0.0)
-    };
-    [
-        bound(0, f64::min),
-        bound(1, f64::min),
-        bound(0, f64::max),
-        bound(1, f64::max),
-    ]
+    bounds(corners.map(|corner| map.face_from_page(corner)))
 }
 
 impl ShrunkRelief {

@@ -327,20 +327,13 @@ impl PageTarget {
 fn half_extent(face: &ShrunkRelief, angle_rad: f64) -> [f64; 2] {
     let (sin, cos) = angle_rad.sin_cos();
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-    for y in 0..face.face.height() {
-        let row = face.face.row(y);
-        let ends = [
-            row.iter().position(|set| *set),
-            row.iter().rposition(|set| *set),
-        ];
-        for x in ends.into_iter().flatten() {
-            let (x, y) = (x as f64, y as f64);
-            for (bounds, at) in bounds
-                .iter_mut()
-                .zip([cos * x + sin * y, cos * y - sin * x])
-            {
-                *bounds = [bounds[0].min(at), bounds[1].max(at)];
-            }
+    for end in face.face.row_ends() {
+        let [x, y] = end.map(|at| at as f64);
+        for (bounds, at) in bounds
+            .iter_mut()
+            .zip([cos * x + sin * y, cos * y - sin * x])
+        {
+            *bounds = [bounds[0].min(at), bounds[1].max(at)];
         }
     }
     bounds.map(|[low, high]| (high - low + 1.0).max(1.0) / 2.0 * face.pixel_mm)

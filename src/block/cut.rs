@@ -5,6 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use rayon::prelude::*;
 
 use super::align::CarvedFace;
+use super::bounds::bounds;
 use super::characters::PlacedCharacter;
 use super::relief::surface_height;
 use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
@@ -61,14 +62,12 @@ impl<'a> CutPlan<'a> {
             ]
         };
         let boxes: Vec<[f64; 4]> = characters.iter().map(|c| grown(c.face_box)).collect();
-        let bound = |k: usize, combine: fn(f64, f64) -> f64| {
-            boxes.iter().map(|b| b[k]).reduce(combine).unwrap_or(0.0)
-        };
-        let origin_mm = [bound(0, f64::min), bound(1, f64::min)];
-        let ends = [bound(2, f64::max), bound(3, f64::max)];
+        let [left, top, right, bottom] =
+            bounds((boxes.iter()).flat_map(|[u0, v0, u1, v1]| [[*u0, *v0], [*u1, *v1]]));
+        let origin_mm = [left, top];
         let cell = |k: usize, at: f64| ((at - origin_mm[k]) / CELL_MM) as usize;
-        let columns = cell(0, ends[0]) + 1;
-        let rows = cell(1, ends[1]) + 1;
+        let columns = cell(0, right) + 1;
+        let rows = cell(1, bottom) + 1;
         let cells_of = |[u0, v0, u1, v1]: [f64; 4]| {
             (cell(1, v0)..=cell(1, v1))
                 .flat_map(move |y| (cell(0, u0)..=cell(0, u1)).map(move |x| y * columns + x))

@@ -141,13 +141,9 @@ const ANGLE_STEPS: usize = 360;
 /// Returns the angle by which the smallest rectangle around the face is rotated, from u to v, in radians; within an eighth
 /// of a turn. Blocks are rectangular, but a scan shows them in any rotation.
 pub(super) fn face_angle(face: &Mask) -> f64 {
-    let mut ends = Vec::with_capacity(2 * face.height());
-    for y in 0..face.height() {
-        let row = face.row(y);
-        let first = row.iter().position(|set| *set);
-        let last = row.iter().rposition(|set| *set);
-        ends.extend(first.into_iter().chain(last).map(|x| [x as f64, y as f64]));
-    }
+    let ends: Vec<[f64; 2]> = (face.row_ends())
+        .map(|end| end.map(|at| at as f64))
+        .collect();
     let area = |angle: f64| {
         let (sin, cos) = angle.sin_cos();
         let extent = |along: [f64; 2]| {

@@ -2,6 +2,7 @@
 
 mod agreement;
 mod align;
+mod bounds;
 mod character_map;
 mod characters;
 mod coarse;
@@ -35,7 +36,7 @@ pub use characters::{CharacterBox, PlacedCharacter, PlacedCharacters, place_char
 pub use control_start::{ControlPointError, align_at};
 pub use cut::{CUT_MARGIN_MM, CutError, CutPlan, cut_meshes};
 pub use error::BlockError;
-pub use found_boxes::{FoundBox, NoteHalf, find_boxes};
+pub use found_boxes::{FoundBox, find_boxes};
 pub use height_map::{HEIGHT_STEP_MM, HeightMap, draw_height_maps};
 pub use label_fit::{LabelFit, check_label_fit};
 pub use orientation::Orientation;

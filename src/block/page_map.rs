@@ -201,7 +201,13 @@ impl PageMap {
 
     /// Returns the rotation from the face to the page at the middle of the map, from x to y, radians.
     pub fn angle_rad(&self) -> f64 {
-        let [[a, b], [c, d]] = self.derivative(self.middle());
+        self.angle_at(self.middle())
+    }
+
+    /// Returns the rotation from the face to the page at a point of the face, from x to y, radians: that of the rotation
+    /// nearest to the derivative.
+    pub(super) fn angle_at(&self, face: [f64; 2]) -> f64 {
+        let [[a, b], [c, d]] = self.derivative(face);
         (c - b).atan2(a + d)
     }
 

@@ -34,10 +34,10 @@ impl ControlPoints {
 
     /// Returns the hash over files and points.
     pub fn hash(&self) -> ContentHash {
-        let mut text = format!("{} {} {}", self.mesh, self.page, self.side);
-        for point in &self.points {
-            text.push_str(&format!(" {:?} {:?}", point.mesh, point.page));
-        }
+        let points = self.points.iter();
+        let points = points.map(|point| format!(" {:?} {:?}", point.mesh, point.page));
+        let text = [format!("{} {} {}", self.mesh, self.page, self.side)];
+        let text: String = text.into_iter().chain(points).collect();
         ContentHash::of(text.as_bytes())
     }
 }

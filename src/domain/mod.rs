@@ -5,6 +5,7 @@ mod artifact;
 pub mod artifact_role;
 mod attention_check;
 mod block;
+mod box_name;
 mod control_points;
 mod enum_names;
 mod failure;
@@ -35,6 +36,7 @@ pub use attention_check::AttentionCheck;
 pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
+pub use box_name::{BoxName, NotePart};
 pub use control_points::{ControlPoint, ControlPoints};
 pub(crate) use enum_names::{enum_names, stage_order};
 pub use failure::{Failure, FailureClass};

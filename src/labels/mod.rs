@@ -27,6 +27,6 @@ pub use error::{LabelsError, LabelsProblem};
 pub use model::{LabelBox, LabelFormat, Labels, PageFile};
 pub use page_fit::MAX_BOXES;
 pub use read::{MAX_BYTES, read};
-pub use reading_order::{BoxName, NotePart, reading_order};
+pub use reading_order::reading_order;
 pub use region::{NAME_ATTRIBUTES, TEXT_ATTRIBUTES};
 pub use write::{write_coco, write_via};

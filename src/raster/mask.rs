@@ -82,6 +82,26 @@ pub struct MaskOverlap {
 }
 
 impl Mask {
+    /// Returns column and row of the first and the last set pixel of each row that has one. Extents of a mask in any
+    /// direction are those of these pixels.
+    ///
+    /// ```
+    /// use mocban::raster::Mask;
+    ///
+    /// let mask = Mask::from_fn(5, 2, |x, y| y == 1 && (1..4).contains(&x));
+    /// assert!(mask.row_ends().eq([[1, 1], [3, 1]]));
+    /// ```
+    pub fn row_ends(&self) -> impl Iterator<Item = [usize; 2]> {
+        (0..self.height()).flat_map(|y| {
+            let row = self.row(y);
+            let ends = [
+                row.iter().position(|set| *set),
+                row.iter().rposition(|set| *set),
+            ];
+            ends.into_iter().flatten().map(move |x| [x, y])
+        })
+    }
+
     /// Computes the overlap with another mask of the same size.
     ///
     /// ```

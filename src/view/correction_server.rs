@@ -77,7 +77,7 @@ impl<S: CorrectionStore> CorrectionState<S> {
     async fn shown(&self) -> Result<Arc<BlockCorrection>, Response> {
         let read = async || self.store.read().await.map(Arc::new);
         let shown = self.shown.get_or_try_init(read).await;
-        shown.map(Arc::clone).map_err(unavailable)
+        shown.map(Arc::clone).map_err(|why| unavailable(&why))
     }
 
     fn tried(&self) -> Option<Arc<TriedAlignment>> {
@@ -94,7 +94,7 @@ impl<S: CorrectionStore> CorrectionState<S> {
     async fn store_points(&self, points: Option<ControlPoints>) -> Response {
         match self.store.save(points).await {
             Ok(()) => Json(json!({"next": self.store.next_command()})).into_response(),
-            Err(why) => unavailable(why),
+            Err(why) => unavailable(&why),
         }
     }
 }
@@ -161,7 +161,7 @@ async fn try_points<S: CorrectionStore>(
             state.set_tried(None);
             refused(StatusCode::UNPROCESSABLE_ENTITY, &error.to_string())
         }
-        Err(error) => unavailable(error.to_string()),
+        Err(error) => unavailable(&error.to_string()),
     }
 }
 
@@ -189,7 +189,7 @@ async fn image<S: CorrectionStore>(
     match tokio::task::spawn_blocking(move || draw(&shown)).await {
         Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
         Ok(None) => StatusCode::NOT_FOUND.into_response(),
-        Err(error) => unavailable(error.to_string()),
+        Err(error) => unavailable(&error.to_string()),
     }
 }
 
@@ -197,6 +197,6 @@ fn refused(status: StatusCode, why: &str) -> Response {
     (status, Json(json!({"error": why}))).into_response()
 }
 
-fn unavailable(why: String) -> Response {
-    refused(StatusCode::SERVICE_UNAVAILABLE, &why)
+fn unavailable(why: &str) -> Response {
+    refused(StatusCode::SERVICE_UNAVAILABLE, why)
 }

@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use super::layout::Layout;
 use super::places::{CharacterPlace, Strokes};
-use super::skew::{page_angle, text_angle};
+use super::skew::text_angle;
 use super::text_image::{TextFrame, TextImage};
 use crate::block::align::CarvedFace;
 use crate::block::height_map::HEIGHT_STEP_MM;
@@ -47,26 +47,22 @@ impl Upright {
             face.map.origin_mm[0] + soft.width() as f64 / 2.0 * HEIGHT_STEP_MM,
             face.map.origin_mm[1] + soft.height() as f64 / 2.0 * HEIGHT_STEP_MM,
         ];
-        let angle = text_angle(face, page_angle(map, middle));
-        let sample = |angle: f64| {
+        // Text that runs to the right on the page runs against the rotation of the map on the face.
+        let angle = text_angle(face, -map.angle_at(middle));
+        let sample = |angle: f64, is_as_on_page: bool| {
             let frame = TextFrame::around(face, angle);
             let image = TextImage::sample(face, page, map, frame);
-            let layout = Layout::of(&image);
-            (image, layout)
-        };
-        let (image, layout) = sample(angle);
-        if runs_along_x(&layout) {
-            let (image, layout) = sample(angle + FRAC_PI_2);
-            return Self {
+            Self {
+                layout: Layout::of(&image),
                 image,
-                layout,
-                is_as_on_page: false,
-            };
-        }
-        Self {
-            image,
-            layout,
-            is_as_on_page: true,
+                is_as_on_page,
+            }
+        };
+        let straight = sample(angle, true);
+        if runs_along_x(&straight.layout) {
+            sample(angle + FRAC_PI_2, false)
+        } else {
+            straight
         }
     }
 

@@ -12,8 +12,6 @@ mod skew;
 mod tests;
 mod text_image;
 
-use serde::{Deserialize, Serialize};
-
 use self::columns::find_columns;
 use self::direction::Upright;
 use self::layout::CELL_MM;
@@ -22,6 +20,7 @@ use self::rows::{RowPitches, find_rows};
 use super::align::CarvedFace;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
+use crate::domain::{BoxName, NotePart};
 
 /// Least area of a character, mm^2, and least length of its longer side, in pitches.
 const MIN_AREA_MM2: f64 = 0.8;
@@ -33,43 +32,19 @@ const MIN_PRINTED: f64 = 0.5;
 /// Largest share of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
 
-/// What a character loses in confidence when all of its strokes were divided.
-const DIVIDED_DOUBT: f64 = 0.5;
-
-/// Half of a row of notes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum NoteHalf {
-    /// The right half, which is read first: `a`.
-    Right,
-    /// The left half: `b`.
-    Left,
-}
-
 /// A character that was found on a page.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FoundBox {
     /// Left, top, right and bottom edge of its ink on the page, pixels; (0, 0) is the centre of the first pixel.
     pub page_box: [f64; 4],
-    /// Number of the column from the right, from 1. The strip at the fold is a column.
-    pub column: u32,
-    /// Number of the row in its column from the top, from 1. Blanks do not count; two notes side by side are a row.
-    pub row: u32,
-    /// Half of a row of notes.
-    pub half: Option<NoteHalf>,
-    /// How sure it is that the box holds one whole character, 0..=1.
-    pub confidence: f64,
+    /// Column and row. The strip at the fold is a column; blanks do not count as rows.
+    pub place: BoxName,
 }
 
 impl FoundBox {
     /// Returns the name by column and row, such as `c03-r12` or `c03-r12a`.
     pub fn name(&self) -> String {
-        let half = match self.half {
-            None => "",
-            Some(NoteHalf::Right) => "a",
-            Some(NoteHalf::Left) => "b",
-        };
-        format!("c{:02}-r{:02}{half}", self.column, self.row)
+        self.place.to_string()
     }
 }
 
@@ -107,14 +82,6 @@ fn is_character(place: &CharacterPlace, strokes: &Strokes, pitches: &RowPitches)
     strokes.area_mm2() >= MIN_AREA_MM2 && width.max(height) >= MIN_SIDE * pitch * CELL_MM
 }
 
-/// Returns the geometric mean of the share of the ink over relief and of the share of the relief that is printed, less if
-/// strokes were divided between this character and its neighbours.
-fn confidence(strokes: &Strokes) -> f64 {
-    let divided = strokes.divided as f64 / strokes.area.max(1) as f64;
-    let agreement = (strokes.support() * strokes.printed).max(0.0).sqrt();
-    (agreement * (1.0 - DIVIDED_DOUBT * divided)).clamp(0.0, 1.0)
-}
-
 /// Returns whether a box lies on the page, with a tolerance of one pixel.
 fn is_on_page(strokes: &Strokes, [width, height]: [usize; 2]) -> bool {
     let [left, top, right, bottom] = strokes.page_bounds;
@@ -130,14 +97,14 @@ fn numbered(
     is_upside_down: bool,
     page_size: [usize; 2],
 ) -> Vec<FoundBox> {
-    let mut characters: Vec<(u32, i64, Option<NoteHalf>, &Strokes)> = places
+    let mut characters: Vec<(u32, i64, Option<NotePart>, &Strokes)> = places
         .iter()
         .zip(strokes)
         .filter(|(place, strokes)| is_character(place, strokes, pitches))
         .map(|(place, strokes)| {
             let half = place.half.map(|half| match (half, is_upside_down) {
-                (Half::Right, false) | (Half::Left, true) => NoteHalf::Right,
-                (Half::Left, false) | (Half::Right, true) => NoteHalf::Left,
+                (Half::Right, false) | (Half::Left, true) => NotePart::Right,
+                (Half::Left, false) | (Half::Right, true) => NotePart::Left,
             });
             if is_upside_down {
                 (place.column as u32 + 1, -(place.row as i64), half, strokes)
@@ -172,10 +139,11 @@ fn numbered(
         }
         boxes.push(FoundBox {
             page_box: strokes.page_bounds,
-            column,
-            row: number,
-            half,
-            confidence: confidence(strokes),
+            place: BoxName {
+                column,
+                row: number,
+                part: half,
+            },
         });
     }
     boxes

@@ -47,8 +47,6 @@ pub(super) struct Strokes {
     pub(super) relief: u64,
     /// Number of pixels where only the relief shows the text.
     pub(super) only_relief: usize,
-    /// Number of pixels of parts that were divided between places.
-    pub(super) divided: usize,
     /// Share of the relief in the place that is printed.
     pub(super) printed: f64,
 }
@@ -70,7 +68,6 @@ impl Strokes {
         ],
         relief: 0,
         only_relief: 0,
-        divided: 0,
         printed: 0.0,
     };
 
@@ -193,9 +190,6 @@ pub(super) fn measure(
         };
         let found = &mut strokes[number];
         found.area += x1 - x0;
-        if parts[label] == Part::Divided {
-            found.divided += x1 - x0;
-        }
         let relief = &image.relief.row(y)[x0..x1];
         found.relief += relief.iter().map(|r| u64::from(*r)).sum::<u64>();
         if image.trust_at(x0, y) == Trust::Relief {

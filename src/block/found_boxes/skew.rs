@@ -1,7 +1,6 @@
 //! The angle of the text on the face.
 
 use crate::block::align::CarvedFace;
-use crate::block::page_map::PageMap;
 use crate::block::window_images::ShrunkRelief;
 use crate::raster::Grid;
 
@@ -13,13 +12,6 @@ const ROUNDS: [(usize, f64); 3] = [(8, 0.5), (4, 0.1), (2, 0.03)];
 const REFINED: i32 = 6;
 /// Relief below this does not count.
 const STROKE: f32 = 0.25;
-
-/// Returns the angle from u to v, rad, of the direction on the face that runs to the right on the page.
-pub(super) fn page_angle(map: &PageMap, middle: [f64; 2]) -> f64 {
-    let [[a, b], [c, d]] = map.derivative(middle);
-    // The rotation of the map is that of its nearest rotation; the text runs against it.
-    -(c - b).atan2(a + d)
-}
 
 /// Returns the angle near that of the page at which the projections of the relief on both axes are sharpest, rad.
 pub(super) fn text_angle(side: &CarvedFace, page_angle: f64) -> f64 {

@@ -41,23 +41,16 @@ impl TextFrame {
         let mut high = [f64::NEG_INFINITY; 2];
         let face = &side.relief.face;
         let step = FACE_CELL as f64 * HEIGHT_STEP_MM;
-        for y in 0..face.height() {
-            let row = face.row(y);
-            let ends = [
-                row.iter().position(|set| *set),
-                row.iter().rposition(|set| *set),
-            ];
-            for x in ends.into_iter().flatten() {
-                for (right, down) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let u = side.map.origin_mm[0] + (x + right) as f64 * step;
-                    let v = side.map.origin_mm[1] + (y + down) as f64 * step;
-                    for (k, at) in [cos * u + sin * v, cos * v - sin * u]
-                        .into_iter()
-                        .enumerate()
-                    {
-                        low[k] = low[k].min(at);
-                        high[k] = high[k].max(at);
-                    }
+        for [x, y] in face.row_ends() {
+            for (right, down) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let u = side.map.origin_mm[0] + (x + right) as f64 * step;
+                let v = side.map.origin_mm[1] + (y + down) as f64 * step;
+                for (k, at) in [cos * u + sin * v, cos * v - sin * u]
+                    .into_iter()
+                    .enumerate()
+                {
+                    low[k] = low[k].min(at);
+                    high[k] = high[k].max(at);
                 }
             }
         }

@@ -1,6 +1,5 @@
 //! Names of boxes by their place: columns from the right, rows from the top.
 
-mod box_name;
 mod columns;
 mod rows;
 mod spot;
@@ -8,11 +7,11 @@ mod straighten;
 #[cfg(test)]
 mod tests;
 
-pub use self::box_name::{BoxName, NotePart};
 use self::columns::columns;
 use self::rows::rows;
 use self::spot::{Spot, full_size};
 use self::straighten::straighten;
+use crate::domain::BoxName;
 
 /// Returns the names of boxes, in the order of the boxes. All names differ. Takes left, top, right and bottom of each
 /// box in any unit, y down; the result does not depend on the unit, and hardly on the order of the boxes.

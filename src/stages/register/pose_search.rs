@@ -2,7 +2,7 @@
 
 use super::params::{RegisterError, RegisterParams};
 use crate::domain::Affine2;
-use crate::raster::Mask;
+use crate::raster::PixelBox;
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, Loss, PoseCandidate, RefinementPass, Refiner, SearchRange, SoftMask,
@@ -86,7 +86,7 @@ pub(super) fn search(
 ) -> Result<PoseSearch, RegisterError> {
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
-    let depth_px = longest(&depths.known);
+    let depth_px = longest(depths.known.bounding_box());
     let inks = prints.iter().enumerate();
     let searches =
         inks.map(|(ink, print)| find_poses(&wood, depth_px, ink, print, expected, params));
@@ -113,9 +113,10 @@ fn find_poses(
         beam_width: KEEP,
     };
     let mut found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
-    let print_px = longest(&print.known);
-    if let Some(expected) = expected {
-        let near = near_expected(&print_base, wood, &found, expected, &print.known);
+    let print_bounds = print.known.bounding_box();
+    let print_px = longest(print_bounds);
+    if let (Some(expected), Some(bounds)) = (expected, print_bounds) {
+        let near = near_expected(&print_base, wood, &found, expected, bounds);
         prefer_expected(&mut found, near);
     }
     require_upright(&found)?;
@@ -134,16 +135,14 @@ fn find_poses(
 }
 
 /// Refines the expected pose and the poses found near it; returns the best of them that stays near. `None` if the expected
-/// pose is mirrored.
+/// pose is mirrored. `bounds` are those of the print.
 fn near_expected(
     print: &ImagePyramid,
     wood: &ImagePyramid,
     found: &[PoseCandidate],
     expected: &Affine2,
-    known: &Mask,
+    bounds: PixelBox,
 ) -> Option<PoseCandidate> {
-    let bounds = known.bounding_box()?;
-    let print_px = bounds.longest_side() as f64;
     let print_middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
     if expected.determinant() <= 0.0 {
         return None;
@@ -164,7 +163,7 @@ fn near_expected(
         let distance = (a[0] - b[0]).hypot(a[1] - b[1]);
         pose.rotation_to(&start) < EXPECTED_DEG
             && ratio.ln().abs() < EXPECTED_RATIO
-            && distance < EXPECTED_SHIFT * print_px
+            && distance < EXPECTED_SHIFT * bounds.longest_side() as f64
     };
     let refined = refiner.refine(&start, LAST_PASS.max_steps, Loss::Huber);
     let upright = found.iter().filter(|pose| !pose.mirrored).copied();
@@ -182,11 +181,9 @@ fn prefer_expected(found: &mut Vec<PoseCandidate>, near: Option<PoseCandidate>) 
     }
 }
 
-/// Returns the longest side of the bounding box of the known pixels, or 1 if there are none.
-fn longest(known: &Mask) -> f64 {
-    known
-        .bounding_box()
-        .map_or(1.0, |bounds| bounds.longest_side() as f64)
+/// Returns the longest side of the box around the known pixels, or 1 if there are none.
+fn longest(bounds: Option<PixelBox>) -> f64 {
+    bounds.map_or(1.0, |bounds| bounds.longest_side() as f64)
 }
 
 /// Refuses mirrored pairs and pairs without a correlating pose.
