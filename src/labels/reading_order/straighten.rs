@@ -10,6 +10,8 @@ const MAX_SHIFT: f64 = 1.0;
 const MIN_BOXES: usize = 6;
 /// Smallest number of boxes that show a keystone and a bend.
 const MIN_BOXES_OF_BENT: usize = 40;
+/// Smallest share of boxes of full size that show a keystone and a bend without the notes.
+const MIN_FULL_SHARE: f64 = 0.3;
 /// Maximum number of boxes that take part in the search.
 const MAX_SEARCHED: usize = 4000;
 /// Bins of the histogram in the usual size.
@@ -52,8 +54,7 @@ pub(super) fn straighten(spots: &mut [Spot], full_size: f64) {
         return;
     }
     let frame = BendFrame::of(spots, full_size);
-    let stride = spots.len().div_ceil(MAX_SEARCHED);
-    let searched: Vec<Spot> = spots.iter().copied().step_by(stride).collect();
+    let searched = searched(spots, full_size);
     let mut search = BendSearch {
         spots: &searched,
         frame,
@@ -77,6 +78,21 @@ pub(super) fn straighten(spots: &mut [Spot], full_size: f64) {
     for spot in spots {
         *spot = frame.straightened(spot, best);
     }
+}
+
+/// Returns the boxes by which the bend is searched: those of full size, unless they are few. Notes stand beside the middle
+/// of their column, so that wrong bends can bring them together with other columns.
+fn searched(spots: &[Spot], full_size: f64) -> Vec<Spot> {
+    let full = || spots.iter().filter(|spot| !spot.is_small(full_size));
+    let count = full().count();
+    let enough = count >= MIN_BOXES_OF_BENT && count as f64 >= MIN_FULL_SHARE * spots.len() as f64;
+    let chosen: Vec<Spot> = if enough {
+        full().copied().collect()
+    } else {
+        spots.to_vec()
+    };
+    let stride = chosen.len().div_ceil(MAX_SEARCHED);
+    chosen.into_iter().step_by(stride).collect()
 }
 
 /// The search for the bend with the sharpest columns.

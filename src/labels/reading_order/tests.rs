@@ -280,6 +280,28 @@ fn leaning_and_bent_columns_are_straightened() {
 }
 
 #[test]
+fn bent_pages_with_notes_are_straightened() {
+    use Cell::{Full, Notes};
+    for seed in 0..12 {
+        let mut random = SplitMix(40 + seed);
+        let mut columns = plain_columns(10, 20, &mut random);
+        for (_, cells) in &mut columns {
+            let first = 12.0 * random.unit();
+            let notes = [vec![Full; first as usize], vec![Notes; 8], vec![Full; 4]].concat();
+            if random.unit() < 0.6 {
+                *cells = notes;
+            }
+        }
+        let bend = PageBend {
+            degrees: 2.0,
+            keystone: -45.0,
+            bow: 45.0,
+        };
+        Page::new(&columns, bend, &mut random).check(&format!("seed {seed}"));
+    }
+}
+
+#[test]
 fn many_boxes_far_apart_are_named() {
     let mut random = SplitMix(20);
     let mut edge = || 1e9 * random.unit();
