@@ -293,8 +293,8 @@ fn bent_pages_with_notes_are_straightened() {
             }
         }
         let bend = PageBend {
-            degrees: 2.0,
-            keystone: -45.0,
+            degrees: -3.0,
+            keystone: 45.0,
             bow: 45.0,
         };
         Page::new(&columns, bend, &mut random).check(&format!("seed {seed}"));
