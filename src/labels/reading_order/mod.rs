@@ -18,7 +18,8 @@ use crate::domain::BoxName;
 ///
 /// - **Rotation and bends.** The page is turned back first by at most 6 degrees, and its columns are straightened if they
 ///   lean differently to both sides or are bent, by at most one character at top and bottom: as far as the centres
-///   of the boxes form the sharpest columns. Fewer than six boxes are not turned, fewer than 40 not straightened.
+///   of the boxes form the sharpest columns. Fewer than six boxes are not turned, fewer than 40 not straightened. Only
+///   boxes of full size are looked at if they are at least 40 and at least 30 % of all.
 /// - **Columns.** Boxes of full size whose centres follow one another sideways by less than 0.4 of the usual size are
 ///   one column. Columns are counted from the right, so a column without boxes has no number.
 /// - **Rows.** Boxes are counted within each column, from the top. Columns need not begin or end at the same height, and
