@@ -31,13 +31,17 @@ const MIN_SUPPORT: f64 = 0.08;
 const MIN_PRINTED: f64 = 0.5;
 /// Largest share of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
+/// A page shows only a part of the text if it does not show more than this share of the characters. Wood beside the text
+/// makes up to a sixth.
+const PART_UNSEEN: f64 = 0.3;
 
 /// A character that was found on a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundBox {
     /// Left, top, right and bottom edge of its ink on the page, pixels; (0, 0) is the centre of the first pixel.
     pub page_box: [f64; 4],
-    /// Column and row. The strip at the fold is a column; blanks do not count as rows.
+    /// Column and row. The strip at the fold is a column; blanks do not count as rows, and wood beside the text counts as
+    /// neither.
     pub place: BoxName,
 }
 
@@ -118,29 +122,35 @@ fn numbered(
             }
         })
         .collect();
+    let is_seen =
+        |strokes: &Strokes| is_on_page(strokes, page_size) && strokes.unseen() <= MAX_UNSEEN;
+    let unseen = characters.iter().filter(|(.., strokes)| !is_seen(strokes));
+    let is_part = unseen.count() as f64 > PART_UNSEEN * characters.len() as f64;
     characters.sort_by_key(|(column, row, half, _)| (*column, *row, *half));
     let mut boxes = Vec::new();
     let (mut number, mut before) = (0, None);
+    let mut first_column = None;
     for (column, row, half, strokes) in characters {
         if before.is_none_or(|(last, _)| last != column) {
-            number = 0;
+            (number, before) = (0, None);
+        }
+        let (is_seen, is_printed) = (is_seen(strokes), strokes.printed >= MIN_PRINTED);
+        // Relief without ink before all characters is wood beside the text, unless the page shows only a part of it.
+        if number == 0 && !is_printed && (is_seen || !is_part) {
+            continue;
         }
         if before != Some((column, row)) {
             number += 1;
         }
         before = Some((column, row));
-        let share = |count: usize| count as f64 / strokes.area as f64;
-        if !is_on_page(strokes, page_size)
-            || strokes.printed < MIN_PRINTED
-            || strokes.support() < MIN_SUPPORT
-            || share(strokes.only_relief) > MAX_UNSEEN
-        {
+        let first_column = *first_column.get_or_insert(column);
+        if !is_seen || !is_printed || strokes.support() < MIN_SUPPORT {
             continue;
         }
         boxes.push(FoundBox {
             page_box: strokes.page_bounds,
             place: BoxName {
-                column,
+                column: column + 1 - first_column,
                 row: number,
                 part: half,
             },

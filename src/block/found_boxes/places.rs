@@ -76,6 +76,11 @@ impl Strokes {
         self.area as f64 * PIXEL_MM * PIXEL_MM
     }
 
+    /// Returns the share of the text that only the relief shows, because the page does not show the place.
+    pub(super) fn unseen(&self) -> f64 {
+        self.only_relief as f64 / self.area.max(1) as f64
+    }
+
     /// Returns width and height in mm.
     pub(super) fn size_mm(&self) -> [f64; 2] {
         [0, 1].map(|k: usize| (self.bounds[k + 2] - self.bounds[k]) * PIXEL_MM)

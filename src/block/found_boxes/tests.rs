@@ -305,6 +305,25 @@ fn characters_that_the_block_lost_are_counted_only() {
 }
 
 #[test]
+fn relief_that_is_not_printed_before_the_text_is_not_counted() {
+    let (map, size) = upright();
+    let whole = Drawing::full(|_, _| false).found(&map, size);
+    let mut drawing = Drawing::full(|_, _| false);
+    let (column, first) = (cell(1, 1), cell(2, 1));
+    // The page has neither the first column nor the first character of the second one.
+    drawing.ink.retain(|[left, top, right, bottom]| {
+        let is_stroke = bottom - top < 20.0 && right - left < 20.0;
+        let is_first = *left >= first[0] && *bottom <= first[3];
+        !is_stroke || !(*left >= column[0] || is_first)
+    });
+    let found = drawing.found(&map, size);
+    assert_eq!(found.len(), 23);
+    assert_eq!(found[0].name(), "c01-r01");
+    assert_eq!(found[0].page_box, whole[7].page_box);
+    assert_eq!(found[5].name(), "c02-r01");
+}
+
+#[test]
 fn a_worn_character_keeps_its_box() {
     let (map, size) = upright();
     let whole = Drawing::full(|_, _| false).found(&map, size);
