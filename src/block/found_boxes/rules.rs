@@ -11,6 +11,11 @@ const RULE_COVER: f64 = 0.9;
 const LINE_MM: f64 = 40.0;
 /// Least length of all parts of a rule, in relation to the longest rule. Strokes of a few characters may lie in line.
 const LINE_SHARE: f64 = 0.35;
+/// The same for rules that are broken into short parts, which strokes of characters have not: length of a part, least
+/// length of all in relation to the text, and largest width of all, mm.
+const PART_MM: f64 = 12.0;
+const PARTS_SHARE: f64 = 0.4;
+const PARTS_WIDTH_MM: f64 = 1.5;
 /// Wanderings of a rule across its direction, mm.
 const LINE_SPREAD_MM: f64 = 0.6;
 /// Width of the strokes beside the middle of a rule that belong to it, mm.
@@ -29,13 +34,24 @@ pub(super) struct Rule {
 
 /// Finds the rules along y and erases them. Rules along x are found in the transposed mask.
 pub(super) fn take_rules(strokes: &mut Mask, erased: &mut Mask) -> Vec<Rule> {
-    let found = long_runs(strokes);
+    let found = long_runs(strokes, RULE_MM);
     let mut rules = group(&found);
     let longest = rules.iter().map(|rule| rule.length).max().unwrap_or(0);
     rules.retain(|rule| rule.length as f64 >= LINE_SHARE * longest as f64);
     for rule in &rules {
         erase_thin(strokes, erased, rule);
     }
+    let parts = long_runs(strokes, PART_MM);
+    let broken = group(&parts).into_iter();
+    let least = PARTS_SHARE * strokes.height() as f64;
+    let is_rule = |rule: &Rule| {
+        rule.length as f64 >= least && rule.edges[1] - rule.edges[0] <= PARTS_WIDTH_MM / PIXEL_MM
+    };
+    for rule in broken.filter(is_rule) {
+        erase_thin(strokes, erased, &rule);
+        rules.push(rule);
+    }
+    rules.sort_by(|a, b| a.at.total_cmp(&b.at));
     for (at, is_rule) in found.data().iter().enumerate() {
         if *is_rule {
             strokes.data_mut()[at] = false;
@@ -45,10 +61,10 @@ pub(super) fn take_rules(strokes: &mut Mask, erased: &mut Mask) -> Vec<Rule> {
     rules
 }
 
-/// Returns the pixels that lie on a nearly unbroken line along y.
-fn long_runs(strokes: &Mask) -> Mask {
+/// Returns the pixels that lie on a nearly unbroken line along y of at least this length.
+fn long_runs(strokes: &Mask, length_mm: f64) -> Mask {
     let (width, height) = (strokes.width(), strokes.height());
-    let length = (RULE_MM / PIXEL_MM) as usize;
+    let length = (length_mm / PIXEL_MM) as usize;
     let needed = (RULE_COVER * length as f64) as u32;
     let mut found = Mask::new(width, height, false);
     if height < length {
