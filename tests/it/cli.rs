@@ -324,7 +324,10 @@ fn missing_files_cause_a_warning_by_line_and_fail_only_their_pairs() {
 fn unknown_pair_is_code_4_with_similar_ids() {
     let dir = imported();
     let refused = mocban(dir.path(), &["-C", "p", "show", "aa"]).expect(4);
-    assert_eq!(refused.err, "error: there is no pair aa; similar ids: a\n");
+    assert_eq!(
+        refused.err,
+        "error: there is no pair or block aa; similar ids: a\n"
+    );
     mocban(dir.path(), &["-C", "p", "run", "a/b"]).expect(4);
     let set = [
         "-C",
