@@ -11,7 +11,7 @@ export class PageCamera {
     this.element = element;
     this.size = size;
     this.changed = changed;
-    [this.zoom, this.x, this.y] = [1, 0, 0];
+    [this.zoom, this.x, this.y, this.wholeZoom] = [1, 0, 0, 1];
   }
 
   /** Returns the zoom at which the whole page is visible. */
@@ -22,8 +22,16 @@ export class PageCamera {
 
   /** Shows the whole page in the middle. */
   reset() {
-    this.zoom = this.farthest();
+    this.zoom = this.wholeZoom = this.farthest();
     this.centre(this.size[0] / 2, this.size[1] / 2);
+  }
+
+  /** Follows a change of the element's size: a whole page stays whole, a closer view stays where it is. */
+  resized() {
+    const isWhole = this.zoom <= this.wholeZoom * 1.001;
+    this.wholeZoom = this.farthest();
+    if (isWhole || this.zoom < this.wholeZoom) this.reset();
+    else this.settle();
   }
 
   /** Moves a point of the page to the middle. */

@@ -5,8 +5,7 @@ import { blockText } from "./block-messages.js";
 import { preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 
-/** Least number of points, pixels per press of an arrow key, and zoom per press of + or -. */
-const MIN_POINTS = 3;
+/** Pixels per press of an arrow key, and zoom per press of + or -. */
 const MOVE_PX = 80;
 const ZOOM_STEP = 1.4;
 const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -34,7 +33,7 @@ class MarkedPicture {
       this.choose(x - left, y - top, chosen);
     });
     this.canvas.addEventListener("keydown", (event) => this.press(event, chosen));
-    new ResizeObserver(() => this.camera.reset()).observe(this.canvas);
+    new ResizeObserver(() => this.camera.resized()).observe(this.canvas);
   }
 
   /**
@@ -70,6 +69,7 @@ class MarkedPicture {
 
   /** Replaces the marks: pixels of the picture, or null for a place that is not chosen yet. */
   mark(places) {
+    const hadFocus = this.marks.some(({ button }) => button === document.activeElement);
     for (const { button } of this.marks) button.remove();
     this.marks = places.flatMap((place, index) => {
       if (!place) return [];
@@ -81,6 +81,7 @@ class MarkedPicture {
       this.canvas.append(button);
       return [{ button, place }];
     });
+    if (hadFocus) this.canvas.focus({ preventScroll: true });
     this.moved();
   }
 
@@ -130,7 +131,8 @@ class CorrectionPage {
     this.showSide(this.side);
     this.showPage("page");
     this.update();
-    this.tell(block.failure ?? text(block.points.length ? "correct_saved_points" : "correct_how"), Boolean(block.failure));
+    const hint = block.points.length ? "correct_saved_points" : block.is_saved ? "correct_other_files" : "correct_how";
+    this.tell(block.failure ?? text(hint), Boolean(block.failure));
   }
 
   bar() {
@@ -181,7 +183,7 @@ class CorrectionPage {
     this.points[index][part] = place;
     this.changed();
     const other = this.points[index].face ? (this.points[index].page ? null : "page") : "face";
-    const missing = MIN_POINTS - this.complete().length;
+    const missing = this.block.min_points - this.complete().length;
     if (other) this.tell(text(other === "page" ? "choose_on_page" : "choose_on_relief", { n: index + 1 }));
     else this.tell(missing > 0 ? text("choose_more", { n: missing }) : text("ready_to_try"));
   }
@@ -216,7 +218,7 @@ class CorrectionPage {
   update() {
     this.face.mark(this.points.map((point) => point.face));
     this.page.mark(this.points.map((point) => point.page));
-    this.tryButton.disabled = this.isBusy || this.complete().length < MIN_POINTS;
+    this.tryButton.disabled = this.isBusy || this.complete().length < this.block.min_points;
     this.saveButton.disabled = this.isBusy || !this.isTried;
     this.clearButton.disabled = this.isBusy || this.points.length === 0;
     this.removeButton.hidden = !this.block.is_saved;
@@ -243,8 +245,7 @@ class CorrectionPage {
   showPage(layer) {
     const isFirst = !this.layer;
     this.layer = layer;
-    this.tries ??= 0;
-    this.page.show(layer === "page" ? "/correct/page" : `/correct/overlay?${this.tries}`, this.block.page_size, { keeps: !isFirst });
+    this.page.show(layer === "page" ? "/correct/page" : `/correct/overlay/${this.tried}`, this.block.page_size, { keeps: !isFirst });
     this.update();
   }
 
@@ -273,17 +274,16 @@ class CorrectionPage {
     this.isTried = false;
     const points = this.complete();
     this.tell(text("trying"));
-    const { agreement } = await this.send("/correct/try", { side: this.side, points });
+    const { agreement, id } = await this.send("/correct/try", { side: this.side, points });
     // Points may have changed meanwhile.
     if (JSON.stringify(points) !== JSON.stringify(this.complete())) return;
-    this.isTried = true;
-    this.tries += 1;
+    [this.isTried, this.tried] = [true, id];
     this.showPage("overlay");
     this.tell(text("tried", { agreement: (100 * agreement).toFixed(0) }));
   }
 
   async save() {
-    const { next } = await this.send("/correct/save", {});
+    const { next } = await this.send("/correct/save", { id: this.tried });
     this.block.is_saved = true;
     this.tell(text("saved", { command: next }));
   }

@@ -44,6 +44,10 @@ const BLOCK_MESSAGES = {
     vi: "Chọn ít nhất ba chỗ: mỗi chỗ một lần trên mặt khắc và một lần trên trang in, tốt nhất gần các góc của phần chữ.",
   },
   correct_saved_points: { en: "These points are saved. Try other ones, or remove them.", vi: "Đây là các điểm đã lưu. Hãy thử điểm khác hoặc bỏ đi." },
+  correct_other_files: {
+    en: "The saved points belong to another scan or page, and are not used.",
+    vi: "Các điểm đã lưu thuộc về bản quét hoặc trang in khác nên không được dùng.",
+  },
   choose_on_page: { en: "Choose the same place on the page (point {n}).", vi: "Chọn chỗ đó trên trang in (điểm {n})." },
   choose_on_relief: { en: "Choose the same place on the relief (point {n}).", vi: "Chọn chỗ đó trên mặt khắc (điểm {n})." },
   choose_more: { en: "Points still needed: {n}.", vi: "Còn thiếu {n} điểm." },

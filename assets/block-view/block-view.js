@@ -57,7 +57,7 @@ class BlockPage {
     this.canvas.addEventListener("pointerleave", () => (this.tip.hidden = true));
     document.addEventListener("keydown", (event) => this.press(event));
     this.dialog.addEventListener("close", () => this.unmount());
-    new ResizeObserver(() => this.resized()).observe(this.canvas);
+    new ResizeObserver(() => this.camera.resized()).observe(this.canvas);
     this.show("page");
     this.camera.reset();
   }
@@ -135,16 +135,8 @@ class BlockPage {
     else this.camera.zoomBy(key === "closer" ? ZOOM_STEP : 1 / ZOOM_STEP);
   }
 
-  resized() {
-    const isWhole = this.camera.zoom <= this.wholeZoom * 1.001;
-    this.wholeZoom = this.camera.farthest();
-    if (isWhole || this.camera.zoom < this.wholeZoom) this.camera.reset();
-    else this.camera.settle();
-  }
-
   moved() {
     const { x, y, zoom } = this.camera;
-    this.wholeZoom ??= zoom;
     this.stage.style.transform = `translate(${x}px, ${y}px) scale(${zoom})`;
     this.stage.style.setProperty("--block-stroke", `${STROKE_PX / zoom}px`);
     clearTimeout(this.waiting);

@@ -19,29 +19,41 @@ type PointPair = ([f64; 2], [f64; 2]);
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ControlPointError {
     /// There are too few.
-    #[error("{count} control points are too few: choose at least 3")]
+    #[error(
+        "{count} control points are too few: choose at least {}",
+        ControlPoints::MIN
+    )]
     TooFew {
         /// How many.
         count: usize,
     },
     /// They are too near to each other.
     #[error(
-        "the control points lie within {span_mm:.0} mm of each other: choose points that are at least 40 mm apart, best near the \
-         corners of the text"
+        "the control points lie within {span_mm:.0} mm of each other: choose points that are at least {MIN_SPAN_MM} mm apart, \
+         best near the corners of the text"
     )]
     TooNear {
         /// Largest distance of two points, mm.
         span_mm: f64,
     },
-    /// They contradict each other.
+    /// They contradict each other. With three points, it cannot be said which one is wrong.
     #[error(
-        "the control points contradict each other: point {number} lies {apart_mm:.0} mm from where the others put it; choose it \
-         again, and check that all lie on the same strokes of both images"
+        "the control points contradict each other: no common position is nearer than {apart_mm:.0} mm to all of them; choose \
+         them again on the same strokes of both images, or add a fourth one"
     )]
     Contradiction {
-        /// The worst point, from 1.
+        /// Largest distance of a point from the common position, mm.
+        apart_mm: f64,
+    },
+    /// One of them contradicts the others.
+    #[error(
+        "control point {number} contradicts the others, which put it {apart_mm:.0} mm away: choose it again on the same stroke \
+         of both images"
+    )]
+    Outlier {
+        /// Which one, from 1.
         number: usize,
-        /// Its distance, mm.
+        /// Its distance from the place where the others put it, mm.
         apart_mm: f64,
     },
     /// Relief and ink do not agree around the position that they give.
@@ -82,18 +94,55 @@ pub fn align_at(
     }
 }
 
-/// Fits the similarity from the face (mm) to the page (pixels).
+/// Fits the similarity from the face (mm) to the page (pixels), and checks that all points agree with it.
 fn similarity(pairs: &[PointPair]) -> Result<Affine2, ControlPointError> {
     if pairs.len() < ControlPoints::MIN {
         return Err(ControlPointError::TooFew { count: pairs.len() });
     }
-    let spans = pairs
-        .iter()
-        .flat_map(|(a, _)| pairs.iter().map(|(b, _)| distance(*a, *b)));
+    let spans = (pairs.iter()).flat_map(|(a, _)| pairs.iter().map(|(b, _)| distance(*a, *b)));
     let span_mm = spans.fold(0.0, f64::max);
+    let too_near = ControlPointError::TooNear { span_mm };
     if span_mm < MIN_SPAN_MM {
-        return Err(ControlPointError::TooNear { span_mm });
+        return Err(too_near);
     }
+    let map = fitted(pairs).ok_or(too_near)?;
+    let apart_mm = farthest(&map, pairs);
+    if apart_mm <= MAX_APART_MM {
+        return Ok(map);
+    }
+    Err(outlier(pairs).unwrap_or(ControlPointError::Contradiction { apart_mm }))
+}
+
+/// Returns the point without which the others agree, if there are enough others to tell.
+fn outlier(pairs: &[PointPair]) -> Option<ControlPointError> {
+    if pairs.len() == ControlPoints::MIN {
+        return None;
+    }
+    let without = (0..pairs.len()).filter_map(|index| {
+        let mut others = pairs.to_vec();
+        let (face, page) = others.remove(index);
+        let map = fitted(&others)?;
+        let apart_mm = distance(map.apply(face), page) / map.scale();
+        Some((farthest(&map, &others), index + 1, apart_mm))
+    });
+    let best = without.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, number, apart_mm) = best.filter(|(others, ..)| *others <= MAX_APART_MM)?;
+    Some(ControlPointError::Outlier { number, apart_mm })
+}
+
+/// Returns the largest distance of points from a map, mm.
+fn farthest(map: &Affine2, pairs: &[PointPair]) -> f64 {
+    let apart = pairs
+        .iter()
+        .map(|(face, page)| distance(map.apply(*face), *page));
+    // A map without scale is far from all points.
+    apart
+        .map(|apart| apart / map.scale())
+        .fold(0.0, |a: f64, b| if a.is_nan() || b <= a { a } else { b })
+}
+
+/// Fits a similarity by least squares; `None` if all points of the face are one.
+fn fitted(pairs: &[PointPair]) -> Option<Affine2> {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     for ([u, v], page) in pairs {
         for (row, value) in [([*u, -v, 1.0, 0.0], page[0]), ([*v, *u, 0.0, 1.0], page[1])] {
@@ -102,26 +151,11 @@ fn similarity(pairs: &[PointPair]) -> Result<Affine2, ControlPointError> {
             right += row * value;
         }
     }
-    let solved = normal.cholesky().map(|factor| factor.solve(&right));
-    let too_near = ControlPointError::TooNear { span_mm };
-    let found = solved.ok_or(too_near)?;
-    let map = Affine2([
+    let found = normal.cholesky()?.solve(&right);
+    Some(Affine2([
         [found[0], -found[1], found[2]],
         [found[1], found[0], found[3]],
-    ]);
-    let apart = pairs
-        .iter()
-        .map(|(face, page)| distance(map.apply(*face), *page) / map.scale());
-    let worst = apart.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-    match worst {
-        Some((index, apart_mm)) if apart_mm.is_nan() || apart_mm > MAX_APART_MM => {
-            Err(ControlPointError::Contradiction {
-                number: index + 1,
-                apart_mm,
-            })
-        }
-        _ => Ok(map),
-    }
+    ]))
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -189,12 +223,13 @@ mod tests {
         let mut shifts = [[0.0; 2]; 4];
         shifts[2] = [0.0, -300.0];
         let refused = align_at(&face, &page, &points(&face, &map, shifts));
+        let named = |number: usize| matches!(refused, Err(ControlPointError::Outlier { number: found, apart_mm }) if found == number && (apart_mm - 37.5).abs() < 1.0);
+        assert!(named(3), "{refused:?}");
+        // Three points do not tell which one is wrong.
+        let three = align_at(&face, &page, &points(&face, &map, shifts)[..3]);
         assert!(
-            matches!(
-                refused,
-                Err(ControlPointError::Contradiction { number: 3, .. })
-            ),
-            "{refused:?}"
+            matches!(three, Err(ControlPointError::Contradiction { .. })),
+            "{three:?}"
         );
         // The points of a mirrored page.
         let mirrored = Affine2([[-8.0, 0.0, 1240.0], [0.0, 8.0, 40.0]]);

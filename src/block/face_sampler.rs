@@ -36,6 +36,12 @@ impl CarvedFace {
         )
     }
 
+    /// Returns the point of the mesh's frame at a point of the face (u, v in mm), at the height of the tops of the strokes.
+    pub fn top_point(&self, [u, v]: [f64; 2]) -> [f64; 3] {
+        let height = surface_height(&self.map, &self.relief.surface, [u, v]);
+        self.map.frame.mesh_from_face([u, v, f64::from(height)])
+    }
+
     /// Returns the height along the axis n of the frame, mm.
     fn height_in_frame(&self, point: [f64; 2]) -> Option<f32> {
         self.mean(point, |[x, y]| {

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::block_view::{BlockViewError, RegisteredFace};
-use crate::block::{CarvedFace, CharacterBox, CharacterMap, PageMap, PlacedCharacter, Support};
+use crate::block::{CarvedFace, Support};
 use crate::domain::LengthUnit;
 use crate::store::Project;
 
@@ -69,7 +69,7 @@ pub(super) fn face_grid(
     };
     let nodes = places.iter().zip(pixels).zip(is_used);
     for ((place, pixel), _) in nodes.filter(|(_, is_used)| *is_used) {
-        let point = top_point(&face, &map, *place);
+        let point = face.top_point(*place);
         grid.mesh.push(point.map(|value| rounded(value, decimals)));
         grid.page
             .push(pixel.map(|value| rounded(value, PIXEL_DECIMALS)));
@@ -100,30 +100,6 @@ fn used_nodes(
         }
     }
     used
-}
-
-/// Returns the point of the scan at a place of the face, at the height of the tops of the strokes.
-fn top_point(face: &CarvedFace, map: &PageMap, [u, v]: [f64; 2]) -> [f64; 3] {
-    let frame = &face.map.frame;
-    let [across, down, normal] = frame.axes;
-    let on_plane =
-        [0, 1, 2].map(|k: usize| frame.centre[k] + (u * across[k] + v * down[k]) / frame.mm);
-    // A character without extent: its map has the height over the tops at this place.
-    let here = PlacedCharacter {
-        label: CharacterBox {
-            name: String::new(),
-            text: None,
-            page_box: [0.0; 4],
-        },
-        face_box: [u, v, u, v],
-        ncc: 0.0,
-        shift_mm: [0.0; 2],
-        support: 0.0,
-        confidence: 0.0,
-    };
-    let local = CharacterMap::of(face, map, &here);
-    let [_, _, over_tops] = local.page_from_mesh.apply(on_plane);
-    [0, 1, 2].map(|k: usize| on_plane[k] - over_tops * normal[k])
 }
 
 /// Returns the decimals of coordinates of the scan: a micrometre or less.

@@ -27,7 +27,7 @@ pub struct BlockAccuracy {
     pub right: u64,
     /// Right characters whose landmark error is at most 1.5 % of their height.
     pub tight: u64,
-    /// Precision and recall of the boxes. `None` if they come from labels.
+    /// Precision and recall of the boxes. `None` if they come from labels, or if the block is not finished.
     pub boxes: Option<BoxAccuracy>,
 }
 

@@ -10,7 +10,6 @@ use axum::routing::{get, post};
 use axum::{Extension, Json, Router};
 use serde::Deserialize;
 use serde_json::json;
-use tokio::sync::OnceCell;
 
 use super::page;
 use crate::domain::{BlockName, BlockSide, ControlPoints};
@@ -37,9 +36,9 @@ struct CorrectionState<S> {
     block: BlockName,
     store: S,
     /// The block, which is read when the page is opened.
-    shown: OnceCell<Arc<BlockCorrection>>,
-    /// The last alignment that was tried and accepted.
-    tried: Mutex<Option<Arc<TriedAlignment>>>,
+    shown: tokio::sync::Mutex<Option<Arc<BlockCorrection>>>,
+    /// The last alignment that was tried and accepted, with its number.
+    tried: Mutex<(u64, Option<Arc<TriedAlignment>>)>,
 }
 
 /// Points as the page sends them.
@@ -50,6 +49,13 @@ struct PointsBody {
     points: Vec<PicturePoint>,
 }
 
+/// The alignment whose points are stored.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SaveBody {
+    id: u64,
+}
+
 type CorrectionPage<S> = State<Arc<CorrectionState<S>>>;
 
 /// Returns the routes of the page of a block.
@@ -57,15 +63,15 @@ pub(super) fn routes<S: CorrectionStore>(block: BlockName, store: S) -> Router {
     let state = CorrectionState {
         block,
         store,
-        shown: OnceCell::new(),
-        tried: Mutex::new(None),
+        shown: tokio::sync::Mutex::default(),
+        tried: Mutex::default(),
     };
     Router::new()
         .route("/correct", get(index::<S>))
         .route("/correct/block.json", get(block_json::<S>))
         .route("/correct/face/{side}/{turns}", get(face::<S>))
         .route("/correct/page", get(page_image::<S>))
-        .route("/correct/overlay", get(overlay::<S>))
+        .route("/correct/overlay/{id}", get(overlay::<S>))
         .route("/correct/try", post(try_points::<S>))
         .route("/correct/save", post(save::<S>))
         .route("/correct/remove", post(remove::<S>))
@@ -73,27 +79,38 @@ pub(super) fn routes<S: CorrectionStore>(block: BlockName, store: S) -> Router {
 }
 
 impl<S: CorrectionStore> CorrectionState<S> {
-    /// Returns the block, which is read once.
+    /// Returns the block, which is read if it was not yet.
     async fn shown(&self) -> Result<Arc<BlockCorrection>, Response> {
-        let read = async || self.store.read().await.map(Arc::new);
-        let shown = self.shown.get_or_try_init(read).await;
-        shown.map(Arc::clone).map_err(|why| unavailable(&why))
+        let mut shown = self.shown.lock().await;
+        if let Some(shown) = &*shown {
+            return Ok(Arc::clone(shown));
+        }
+        let read = self.store.read().await.map(Arc::new);
+        let read = read.map_err(|why| unavailable(&why))?;
+        *shown = Some(Arc::clone(&read));
+        Ok(read)
     }
 
-    fn tried(&self) -> Option<Arc<TriedAlignment>> {
+    /// Returns the alignment with a number, if no other one was tried since.
+    fn tried(&self, id: u64) -> Option<Arc<TriedAlignment>> {
         let tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
-        tried.clone()
+        tried.1.clone().filter(|_| tried.0 == id)
     }
 
-    fn set_tried(&self, tried: Option<TriedAlignment>) {
-        let mut stored = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
-        *stored = tried.map(Arc::new);
+    /// Keeps an alignment, and returns its number.
+    fn set_tried(&self, alignment: Option<TriedAlignment>) -> u64 {
+        let mut tried = self.tried.lock().unwrap_or_else(PoisonError::into_inner);
+        *tried = (tried.0 + 1, alignment.map(Arc::new));
+        tried.0
     }
 
     /// Stores points, and responds.
     async fn store_points(&self, points: Option<ControlPoints>) -> Response {
         match self.store.save(points).await {
-            Ok(()) => Json(json!({"next": self.store.next_command()})).into_response(),
+            Ok(()) => {
+                *self.shown.lock().await = None;
+                Json(json!({"next": self.store.next_command()})).into_response()
+            }
             Err(why) => unavailable(&why),
         }
     }
@@ -107,6 +124,8 @@ async fn block_json<S: CorrectionStore>(
     State(state): CorrectionPage<S>,
     Extension(access): Extension<Arc<AccessControl>>,
 ) -> Response {
+    // The block may have run, or its files may have changed, since the page was opened before.
+    *state.shown.lock().await = None;
     match state.shown().await {
         Ok(shown) => {
             let mut value = shown.to_json();
@@ -132,8 +151,11 @@ async fn page_image<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Resp
     image(&state, |shown| Some(shown.page_jpeg())).await
 }
 
-async fn overlay<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
-    let tried = state.tried();
+async fn overlay<S: CorrectionStore>(
+    State(state): CorrectionPage<S>,
+    Path(id): Path<u64>,
+) -> Response {
+    let tried = state.tried(id);
     image(&state, move |_| tried.map(|tried| tried.overlay.clone())).await
 }
 
@@ -154,8 +176,8 @@ async fn try_points<S: CorrectionStore>(
     match tokio::task::spawn_blocking(tried).await {
         Ok(Ok(tried)) => {
             let agreement = tried.agreement;
-            state.set_tried(Some(tried));
-            Json(json!({"agreement": agreement})).into_response()
+            let id = state.set_tried(Some(tried));
+            Json(json!({"agreement": agreement, "id": id})).into_response()
         }
         Ok(Err(error)) => {
             state.set_tried(None);
@@ -165,10 +187,21 @@ async fn try_points<S: CorrectionStore>(
     }
 }
 
-async fn save<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
-    match state.tried() {
+/// Stores the points of an alignment that was tried.
+async fn save<S: CorrectionStore>(
+    State(state): CorrectionPage<S>,
+    body: Result<Json<SaveBody>, JsonRejection>,
+) -> Response {
+    let id = match body {
+        Ok(Json(body)) => body.id,
+        Err(rejection) => return refused(rejection.status(), &rejection.to_string()),
+    };
+    match state.tried(id) {
         Some(tried) => state.store_points(Some(tried.points.clone())).await,
-        None => refused(StatusCode::CONFLICT, "try the points before saving them"),
+        None => refused(
+            StatusCode::CONFLICT,
+            "other points were tried meanwhile: try these again before saving them",
+        ),
     }
 }
 

@@ -171,7 +171,7 @@ fn error(reply: &Reply) -> String {
         .to_owned()
 }
 
-/// Checks the routes; stores nothing but at the end, the points.
+/// Checks the routes. Stores the points at the end.
 fn check_routes(dir: &Path, page: &Page) {
     assert_eq!(page.get("/correct/block.json").status, 401);
     let session = session(page);
@@ -201,7 +201,6 @@ fn check_routes(dir: &Path, page: &Page) {
             &json!({"side": side, "points": points}),
         )
     };
-    let post = |path: &str| session.request("POST", path, token, &json!({}));
     assert_eq!(send(&points, "guessed").status, 403);
     let few = send(&points[..2], token);
     assert_eq!(
@@ -223,8 +222,9 @@ fn check_routes(dir: &Path, page: &Page) {
     (swapped[0]["page"], swapped[1]["page"]) = (b, a);
     let swapped = error(&send(&swapped, token));
     assert!(swapped.contains("contradict each other"), "{swapped}");
-    assert_eq!(post("/correct/save").status, 409);
-    assert_eq!(session.get("/correct/overlay").status, 404);
+    let save = |id: u64| session.request("POST", "/correct/save", token, &json!({ "id": id }));
+    assert_eq!(save(1).status, 409);
+    assert_eq!(session.get("/correct/overlay/1").status, 404);
     let tried = send(&points, token);
     assert_eq!(
         tried.status,
@@ -237,8 +237,14 @@ fn check_routes(dir: &Path, page: &Page) {
         "{}",
         tried.json()
     );
-    assert!(session.get("/correct/overlay").body.len() > 10_000);
-    let saved = post("/correct/save");
+    let first = tried.json()["id"].as_u64().expect("a number");
+    assert!(session.get(&format!("/correct/overlay/{first}")).body.len() > 10_000);
+    // Another tab tries points meanwhile.
+    let second = send(&points, token).json()["id"]
+        .as_u64()
+        .expect("a number");
+    assert_eq!(save(first).status, 409);
+    let saved = save(second);
     assert_eq!(saved.status, 200);
     assert!(
         saved.json()["next"]
@@ -246,6 +252,9 @@ fn check_routes(dir: &Path, page: &Page) {
             .expect("a command")
             .ends_with("run")
     );
+    let again = session.get("/correct/block.json").json();
+    assert_eq!(again["is_saved"], true);
+    assert_eq!(again["points"].as_array().map(Vec::len), Some(3));
 }
 
 /// Chooses the points as a person does.

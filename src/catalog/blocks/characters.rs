@@ -37,7 +37,8 @@ WHERE b.name = ?1 ORDER BY c.state = 'retired', c.place, c.label";
 
 const ORIGINS: &str = "
 SELECT p.name, c.label, c.box, c.maps
-FROM pair AS p JOIN block_character AS c ON c.pair = p.id WHERE p.name BETWEEN ?1 AND ?2";
+FROM pair AS p JOIN block_character AS c ON c.pair = p.id AND c.state = 'cut'
+WHERE p.name BETWEEN ?1 AND ?2";
 
 impl FromRow for CutOrigin {
     fn from_row(row: &Row) -> Result<Self> {

@@ -23,7 +23,7 @@ const SELECT: &str =
     "SELECT name, mesh_path, page_path, labels_path, unit, side FROM block WHERE name = ?1";
 
 /// Adds a block or updates it. If a path changed, clears the `stat` of that file, so that the next run reads the file. True
-/// boxes belong to one page.
+/// boxes belong to the page of one path; they are not compared with its content.
 const UPSERT: &str = "
 INSERT INTO block (name, mesh_path, page_path, labels_path, unit, side, attributes, imported)
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)

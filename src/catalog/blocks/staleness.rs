@@ -55,7 +55,7 @@ pub enum BlockReason {
     ControlPoints,
     /// Settings changed.
     Settings,
-    /// It failed with other settings or inputs.
+    /// It failed with other settings, inputs or control points.
     FailedBefore,
     /// A user requests it.
     Requested,
@@ -72,7 +72,7 @@ impl std::fmt::Display for BlockReason {
             Self::Attributes => "unit or side changed",
             Self::ControlPoints => "the control points changed",
             Self::Settings => "settings changed",
-            Self::FailedBefore => "it failed with other settings or files",
+            Self::FailedBefore => "it failed with other settings, files or control points",
             Self::Requested => "requested",
         })
     }

@@ -84,7 +84,7 @@ pub enum CorrectionError {
         number: usize,
     },
     /// There are more points than are stored.
-    #[error("{count} points are too many: choose at most 50")]
+    #[error("{count} points are too many: choose at most {}", ControlPoints::MAX)]
     TooMany {
         /// How many.
         count: usize,
@@ -163,9 +163,10 @@ impl BlockCorrection {
         json!({
             "block": self.name,
             "sides": sides.collect::<Vec<_>>(),
-            "side": saved.map(|points| points.side).or(self.aligned).or(first),
+            "side": shown.map(|(face, _)| face.side).or(self.aligned).or(first),
             "page_size": [page.width(), page.height()],
             "points": points.unwrap_or_default(),
+            "min_points": ControlPoints::MIN,
             "is_saved": self.saved.is_some(),
             "is_aligned": self.aligned.is_some(),
             "failure": self.failure,
@@ -217,7 +218,7 @@ impl BlockCorrection {
         let size = [self.page.picture.width(), self.page.picture.height()];
         let chosen = points.iter().enumerate().map(|(index, point)| {
             let number = index + 1;
-            let is_on_page = |k: usize| (-0.5..size[k] as f64).contains(&point.page[k]);
+            let is_on_page = |k: usize| (-0.5..size[k] as f64 - 0.5).contains(&point.page[k]);
             if !(is_on_page(0) && is_on_page(1)) {
                 return Err(CorrectionError::OutsidePage { number });
             }
