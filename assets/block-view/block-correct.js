@@ -132,7 +132,9 @@ class CorrectionPage {
     this.showPage("page");
     this.update();
     const hint = block.points.length ? "correct_saved_points" : block.is_saved ? "correct_other_files" : "correct_how";
-    this.tell(block.failure ?? text(hint), Boolean(block.failure));
+    // The search has refused the page; points that are saved count in the next run.
+    const isRefused = block.failure && block.points.length === 0;
+    this.tell(isRefused ? `${block.failure}. ${text(hint)}` : text(hint), Boolean(isRefused));
   }
 
   bar() {
