@@ -1,5 +1,9 @@
 // Zoom and position of a page in an element, moved by wheel, pointers and fingers.
 
+/** Pixels per press of an arrow key, and zoom per press of + or -. */
+const MOVE_PX = 80;
+const ZOOM_STEP = 1.4;
+const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 /** Closest view, screen pixels per page pixel. */
 const CLOSEST = 16;
 /** Pointers that move less between down and up are clicks, in pixels. */
@@ -24,6 +28,24 @@ export class PageCamera {
   reset() {
     this.zoom = this.wholeZoom = this.farthest();
     this.centre(this.size[0] / 2, this.size[1] / 2);
+  }
+
+  closer() {
+    this.zoomBy(ZOOM_STEP);
+  }
+
+  away() {
+    this.zoomBy(1 / ZOOM_STEP);
+  }
+
+  /** Moves or zooms by a key. Returns whether the key does that. */
+  press(event) {
+    if (ARROWS[event.code]) this.move(...ARROWS[event.code].map((way) => MOVE_PX * way));
+    else if (event.key === "+" || ["Equal", "NumpadAdd"].includes(event.code)) this.closer();
+    else if (event.key === "-" || ["Minus", "NumpadSubtract"].includes(event.code)) this.away();
+    else if (["Digit0", "Numpad0"].includes(event.code)) this.reset();
+    else return false;
+    return true;
   }
 
   /** Follows a change of the element's size: a whole page stays whole, a closer view stays where it is. */

@@ -5,11 +5,6 @@ import { blockText } from "./block-messages.js";
 import { preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 
-/** Pixels per press of an arrow key, and zoom per press of + or -. */
-const MOVE_PX = 80;
-const ZOOM_STEP = 1.4;
-const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-
 const language = preferredLanguage();
 const text = (key, values) => blockText(language, key, values);
 
@@ -105,12 +100,8 @@ class MarkedPicture {
   press(event, chosen) {
     if (event.target !== this.canvas || event.ctrlKey || event.metaKey || event.altKey) return;
     const { clientWidth, clientHeight } = this.canvas;
-    if (ARROWS[event.code]) this.camera.move(...ARROWS[event.code].map((way) => MOVE_PX * way));
-    else if (event.key === "+" || event.key === "=") this.camera.zoomBy(ZOOM_STEP);
-    else if (event.key === "-") this.camera.zoomBy(1 / ZOOM_STEP);
-    else if (event.key === "0") this.camera.reset();
-    else if (event.key === "Enter") this.choose(clientWidth / 2, clientHeight / 2, chosen);
-    else return;
+    if (event.key === "Enter") this.choose(clientWidth / 2, clientHeight / 2, chosen);
+    else if (!this.camera.press(event)) return;
     event.preventDefault();
   }
 }

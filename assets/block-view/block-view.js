@@ -9,10 +9,7 @@ import { mountScanViewer } from "./scan-viewer.js";
 const LAYERS = { page: "KeyP", relief: "KeyR", overlay: "KeyO" };
 const STATUSES = ["done", "low_confidence", "failed", "waiting"];
 const OVERLAY_COLOURS = ["both", "stroke_only", "ink_only"];
-const ARROWS = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-/** Pixels per press of an arrow key, zoom per press of + or -, and the wait before a region is loaded in ms. */
-const MOVE_PX = 80;
-const ZOOM_STEP = 1.4;
+/** The wait before a region is loaded, ms. */
 const REGION_WAIT = 120;
 /** Width of the outline of a box on the screen. */
 const STROKE_PX = 2;
@@ -132,7 +129,8 @@ class BlockPage {
 
   zoom(key) {
     if (key === "whole") this.camera.reset();
-    else this.camera.zoomBy(key === "closer" ? ZOOM_STEP : 1 / ZOOM_STEP);
+    else if (key === "closer") this.camera.closer();
+    else this.camera.away();
   }
 
   moved() {
@@ -244,12 +242,8 @@ class BlockPage {
     const box = event.target.dataset?.index;
     if (layer) this.show(layer);
     else if (event.code === "KeyB") this.toggleBoxes();
-    else if (ARROWS[event.code]) this.camera.move(...ARROWS[event.code].map((way) => MOVE_PX * way));
-    else if (event.key === "+" || ["Equal", "NumpadAdd"].includes(event.code)) this.zoom("closer");
-    else if (event.key === "-" || ["Minus", "NumpadSubtract"].includes(event.code)) this.zoom("farther");
-    else if (["Digit0", "Numpad0"].includes(event.code)) this.zoom("whole");
     else if (box !== undefined && ["Enter", "Space"].includes(event.code)) this.open(Number(box));
-    else return;
+    else if (!this.camera.press(event)) return;
     event.preventDefault();
   }
 }

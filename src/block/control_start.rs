@@ -113,7 +113,7 @@ fn similarity(pairs: &[PointPair]) -> Result<Affine2, ControlPointError> {
     Err(outlier(pairs).unwrap_or(ControlPointError::Contradiction { apart_mm }))
 }
 
-/// Returns the point without which the others agree, if there are enough others to tell.
+/// Returns the error of the one point that contradicts the others; `None` with three points, or if no point does alone.
 fn outlier(pairs: &[PointPair]) -> Option<ControlPointError> {
     if pairs.len() == ControlPoints::MIN {
         return None;
@@ -225,7 +225,7 @@ mod tests {
         let refused = align_at(&face, &page, &points(&face, &map, shifts));
         let named = |number: usize| matches!(refused, Err(ControlPointError::Outlier { number: found, apart_mm }) if found == number && (apart_mm - 37.5).abs() < 1.0);
         assert!(named(3), "{refused:?}");
-        // Three points do not tell which one is wrong.
+        // With three points, the wrong one cannot be determined.
         let three = align_at(&face, &page, &points(&face, &map, shifts)[..3]);
         assert!(
             matches!(three, Err(ControlPointError::Contradiction { .. })),

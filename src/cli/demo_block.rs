@@ -43,7 +43,7 @@ pub(super) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Resu
     let name = BlockName::new(NAME)?;
     let boxes = truth.true_boxes();
     if !boxes.is_empty() {
-        catalog.set_true_boxes(name.clone(), boxes).await?;
+        catalog.set_true_boxes(&name, &boxes).await?;
     }
     let characters = catalog.block_characters(&name).await?;
     let truths = characters

@@ -5,6 +5,7 @@ mod artifact;
 pub mod artifact_role;
 mod attention_check;
 mod block;
+mod box_iou;
 mod box_name;
 mod control_points;
 mod enum_names;
@@ -36,6 +37,7 @@ pub use attention_check::AttentionCheck;
 pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
+pub use box_iou::box_iou;
 pub use box_name::{BoxName, NotePart};
 pub use control_points::{ControlPoint, ControlPoints};
 pub(crate) use enum_names::{enum_names, stage_order};

@@ -1,6 +1,6 @@
 //! Found boxes compared with true ones.
 
-use crate::domain::TrueBox;
+use crate::domain::{TrueBox, box_iou};
 
 /// Counts of found and true boxes at one threshold of the intersection over union.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -45,26 +45,10 @@ impl BoxMatches {
     }
 }
 
-/// Returns the intersection over union of two boxes, each left, top, right and bottom; 0 for boxes without area.
-fn box_iou(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let area = |[x0, y0, x1, y1]: [f64; 4]| (x1 - x0).max(0.0) * (y1 - y0).max(0.0);
-    let common = area([
-        a[0].max(b[0]),
-        a[1].max(b[1]),
-        a[2].min(b[2]),
-        a[3].min(b[3]),
-    ]);
-    if common > 0.0 {
-        common / (area(a) + area(b) - common)
-    } else {
-        0.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{BoxMatches, box_iou};
-    use crate::domain::TrueBox;
+    use super::BoxMatches;
+    use crate::domain::{TrueBox, box_iou};
 
     fn square(left: f64, is_partial: bool) -> TrueBox {
         TrueBox {

@@ -12,7 +12,7 @@ use axum::routing::get;
 
 use super::correction_server::{self, CorrectionStore};
 use super::page;
-use super::server::{ViewError, ViewServer};
+use super::server::{ViewError, ViewServer, jpeg};
 use crate::domain::BlockName;
 use crate::export::block_view::{BlockView, PageLayer, PageRegion};
 use crate::export::scan_view::assets;
@@ -135,7 +135,7 @@ async fn overview(State(shown): State<Arc<ShownBlock>>, Path(layer): Path<String
     let Ok(layer) = layer.parse::<PageLayer>() else {
         return StatusCode::NOT_FOUND.into_response();
     };
-    image(move || shown.overview(layer)).await
+    jpeg(move || Some(shown.overview(layer))).await
 }
 
 async fn region(
@@ -148,7 +148,9 @@ async fn region(
     };
     let part = region.within(shown.view.layers.size());
     match (layer.parse::<PageLayer>(), part) {
-        (Ok(layer), Some(part)) => image(move || shown.picture(layer, part, LONGEST_SIDE)).await,
+        (Ok(layer), Some(part)) => {
+            jpeg(move || Some(shown.picture(layer, part, LONGEST_SIDE))).await
+        }
         _ => StatusCode::NOT_FOUND.into_response(),
     }
 }
@@ -164,14 +166,6 @@ async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) ->
         Ok(Ok(None)) => StatusCode::NOT_FOUND.into_response(),
         Ok(Err(error)) => failed(error.to_string()),
         Err(error) => failed(error.to_string()),
-    }
-}
-
-/// Draws an image on a thread for long work and responds with it.
-async fn image(draw: impl FnOnce() -> Bytes + Send + 'static) -> Response {
-    match tokio::task::spawn_blocking(draw).await {
-        Ok(jpeg) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
-        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use axum::body::Bytes;
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, State};
-use axum::http::{StatusCode, header};
+use axum::http::StatusCode;
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::{get, post};
 use axum::{Extension, Json, Router};
@@ -12,6 +13,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::page;
+use super::server::jpeg;
 use crate::domain::{BlockName, BlockSide, ControlPoints};
 use crate::export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 use crate::local_server::AccessControl;
@@ -210,7 +212,7 @@ async fn remove<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response
     state.store_points(None).await
 }
 
-/// Draws an image on a thread for long work and responds with it.
+/// Reads the block, and responds with an image that is drawn from it.
 async fn image<S: CorrectionStore>(
     state: &CorrectionState<S>,
     draw: impl FnOnce(&BlockCorrection) -> Option<Vec<u8>> + Send + 'static,
@@ -219,11 +221,7 @@ async fn image<S: CorrectionStore>(
         Ok(shown) => shown,
         Err(failed) => return failed,
     };
-    match tokio::task::spawn_blocking(move || draw(&shown)).await {
-        Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
-        Ok(None) => StatusCode::NOT_FOUND.into_response(),
-        Err(error) => unavailable(&error.to_string()),
-    }
+    jpeg(move || draw(&shown).map(Bytes::from)).await
 }
 
 fn refused(status: StatusCode, why: &str) -> Response {

@@ -128,3 +128,12 @@ async fn scan(State(shown): State<Arc<ShownScan>>) -> Response {
     let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
     (kind, shown.data.clone()).into_response()
 }
+
+/// Draws an image on a thread for long work and responds with it, or that there is none.
+pub(super) async fn jpeg(draw: impl FnOnce() -> Option<Bytes> + Send + 'static) -> Response {
+    match tokio::task::spawn_blocking(draw).await {
+        Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
+        Ok(None) => StatusCode::NOT_FOUND.into_response(),
+        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
+    }
+}

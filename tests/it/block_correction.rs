@@ -9,23 +9,14 @@ use serde_json::{Value, json};
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::page::{Page, Reply, send};
+use crate::small_block::demo_block;
 
 /// Part of the page's width and height that the fragment shows.
 const FRAGMENT: f64 = 0.42;
 
 /// Creates a project `p` with the block `b1` of a fragment of its page, which is too small for the search.
 fn refused_block(dir: &Path) {
-    let demo = [
-        "demo",
-        "d",
-        "--block=plain",
-        "--seed",
-        "3",
-        "--spacing",
-        "0.5",
-        "--no-run",
-    ];
-    mocban(dir, &demo).expect(0);
+    demo_block(dir);
     let page = fs::read(dir.join("d/data/page.jpg")).expect("the page");
     let page = decode(&page, &ImageLimits::SUGGESTED)
         .expect("an image")

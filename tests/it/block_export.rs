@@ -253,7 +253,7 @@ fn check_report(dir: &Path) {
         let catalog = Catalog::open(&Project::at(&dir.join("p")).catalog_path()).await;
         let catalog = catalog.expect("a catalog");
         let name = BlockName::new("b1").expect("a name");
-        let set = catalog.set_true_boxes(name, truth).await;
+        let set = catalog.set_true_boxes(&name, &truth).await;
         catalog.close().await;
         set.expect("stored")
     };

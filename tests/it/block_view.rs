@@ -4,11 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use mocban::raster::{Grid, ImageLimits, decode};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
 use crate::page::{Page, send};
+use crate::small_block::{demo_block, few_labels};
 
 /// Vermillion and blue of the overlays.
 const STROKE_ONLY: [u8; 3] = [213, 94, 0];
@@ -16,26 +17,8 @@ const INK_ONLY: [u8; 3] = [0, 114, 178];
 
 /// Creates a project `p` with a finished block `b1` of six characters. The truth is in `d/data/truth.json`.
 pub(crate) fn finished_block(dir: &Path) {
-    let demo = [
-        "demo",
-        "d",
-        "--block=plain",
-        "--seed",
-        "3",
-        "--spacing",
-        "0.5",
-        "--no-run",
-    ];
-    mocban(dir, &demo).expect(0);
-    let labels = fs::read_to_string(dir.join("d/data/labels.json")).expect("the labels");
-    let mut labels: Value = serde_json::from_str(&labels).expect("JSON");
-    let files = labels["_via_img_metadata"].as_object_mut().expect("files");
-    let file = files.values_mut().next().expect("a file");
-    let regions = file["regions"].as_array().expect("regions");
-    let few: Vec<Value> = regions.iter().step_by(30).take(6).cloned().collect();
-    assert_eq!(few.len(), 6);
-    file["regions"] = json!(few);
-    fs::write(dir.join("few.json"), labels.to_string()).expect("written");
+    demo_block(dir);
+    few_labels(dir, &dir.join("few.json"));
     let import = [
         "-C",
         "p",

@@ -102,6 +102,7 @@ mod scan_viewer;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
+mod small_block;
 mod snapshots;
 mod source_text;
 mod stroke_map;

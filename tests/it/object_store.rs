@@ -14,7 +14,7 @@ use mocban::store::Project;
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::resume::project;
 use crate::s3_server::{Faults, S3Server, proxy};
-use crate::uninterrupted::files;
+use crate::uninterrupted::{assert_same_files, files};
 
 const PAIRS: &str = "6";
 const GOOD: Faults = Faults {
@@ -94,16 +94,8 @@ impl Remote {
         let port = self.server.port();
         self.remote(port, &[&export[..], &["of-remote"]].concat())
             .expect(0);
-        let of = |name: &str| files(&self.path().join(name));
-        let (local, other) = (of("of-local"), of("of-remote"));
-        let differing = local
-            .iter()
-            .filter(|(path, bytes)| other.get(*path) != Some(bytes));
-        let differing: Vec<_> = differing.map(|(path, _)| path).collect();
-        assert!(
-            local.len() == other.len() && differing.is_empty(),
-            "{differing:?} differ"
-        );
+        let [local, remote] = ["of-local", "of-remote"].map(|name| self.path().join(name));
+        assert_same_files(&local, &remote);
         self.remote(port, &["check"]).expect(0);
     }
 }

@@ -5,13 +5,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use serde_json::{Value, json};
-
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::s3_server::S3Server;
-use crate::uninterrupted::files;
-
-const CHARACTERS: usize = 6;
+use crate::small_block::{CHARACTERS, demo_block, few_labels};
+use crate::uninterrupted::assert_same_files;
 
 /// A project with a block below a local folder that has been run, and one with the same block in an object store.
 struct RemoteBlock {
@@ -19,42 +16,14 @@ struct RemoteBlock {
     server: S3Server,
 }
 
-/// Writes the labels of some characters of the demo.
-fn write_few_labels(data: &Path) {
-    let labels = fs::read_to_string(data.join("labels.json")).expect("the labels");
-    let mut labels: Value = serde_json::from_str(&labels).expect("JSON");
-    let files = labels["_via_img_metadata"].as_object_mut().expect("files");
-    let file = files.values_mut().next().expect("a file");
-    let regions = file["regions"].as_array().expect("regions");
-    let few: Vec<Value> = regions
-        .iter()
-        .step_by(30)
-        .take(CHARACTERS)
-        .cloned()
-        .collect();
-    assert_eq!(few.len(), CHARACTERS);
-    file["regions"] = json!(few);
-    fs::write(data.join("few.json"), labels.to_string()).expect("written");
-}
-
 impl RemoteBlock {
     /// Returns `None` if no server is installed.
     fn new() -> Option<Self> {
         let server = S3Server::start()?;
         let dir = empty();
-        let demo = [
-            "demo",
-            "d",
-            "--block=plain",
-            "--seed",
-            "3",
-            "--spacing",
-            "0.5",
-            "--no-run",
-        ];
-        mocban(dir.path(), &demo).expect(0);
+        demo_block(dir.path());
         let data = dir.path().join("d/data");
-        write_few_labels(&data);
+        few_labels(dir.path(), &data.join("few.json"));
         server.upload(&data, "scans");
         let list = "block,mesh,page,labels\nb1,scans:block.ply,scans:page.jpg,scans:few.json\n";
         fs::write(dir.path().join("blocks.csv"), list).expect("written");
@@ -102,16 +71,8 @@ impl RemoteBlock {
         mocban(self.path(), &local).expect(0);
         self.remote(&[&export[..], &["of-remote"]].concat())
             .expect(0);
-        let of = |name: &str| files(&self.path().join(name));
-        let (local, other) = (of("of-local"), of("of-remote"));
-        let differing = local
-            .iter()
-            .filter(|(path, bytes)| other.get(*path) != Some(bytes));
-        let differing: Vec<_> = differing.map(|(path, _)| path).collect();
-        assert!(
-            local.len() == other.len() && local.len() > CHARACTERS && differing.is_empty(),
-            "{differing:?} differ"
-        );
+        let [local, remote] = ["of-local", "of-remote"].map(|name| self.path().join(name));
+        assert!(assert_same_files(&local, &remote) > CHARACTERS);
         self.remote(&["check"]).expect(0);
     }
 

@@ -67,6 +67,19 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
+/// Checks that two folders have the same files. Returns their number.
+#[track_caller]
+pub(crate) fn assert_same_files(one: &Path, other: &Path) -> usize {
+    let (one, other) = (files(one), files(other));
+    let differing = (one.iter()).filter(|(path, bytes)| other.get(*path) != Some(bytes));
+    let differing: Vec<_> = differing.map(|(path, _)| path).collect();
+    assert!(
+        one.len() == other.len() && differing.is_empty(),
+        "{differing:?} differ"
+    );
+    one.len()
+}
+
 /// Report formats that are compared.
 const FORMATS: [&str; 3] = ["csv", "json", "text"];
 

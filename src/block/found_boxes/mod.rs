@@ -31,8 +31,8 @@ const MIN_SUPPORT: f64 = 0.08;
 const MIN_PRINTED: f64 = 0.5;
 /// Largest share of a character's strokes where the page does not show the block.
 const MAX_UNSEEN: f64 = 0.5;
-/// A page shows only a part of the text if it does not show more than this share of the characters. Wood beside the text
-/// makes up to a sixth.
+/// A page that lacks more than this share of the characters shows only a part of the text. With a smaller share, what it
+/// lacks is wood beside the text.
 const PART_UNSEEN: f64 = 0.3;
 
 /// A character that was found on a page.

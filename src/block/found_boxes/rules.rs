@@ -11,8 +11,8 @@ const RULE_COVER: f64 = 0.9;
 const LINE_MM: f64 = 40.0;
 /// Least length of all parts of a rule, in relation to the longest rule. Strokes of a few characters may lie in line.
 const LINE_SHARE: f64 = 0.35;
-/// The same for rules that are broken into short parts, which strokes of characters have not: length of a part, least
-/// length of all in relation to the text, and largest width of all, mm.
+/// A rule may be broken into short parts: length over which a part is nearly without gaps, mm; least length of all parts, in
+/// relation to the height of the text; largest width across all parts, mm. Strokes of characters are shorter.
 const PART_MM: f64 = 12.0;
 const PARTS_SHARE: f64 = 0.4;
 const PARTS_WIDTH_MM: f64 = 1.5;

@@ -1,7 +1,5 @@
 //! Stores the control points of blocks.
 
-use crate::catalog::db::query::query_scalar;
-use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{BlockName, ControlPoints};
 
@@ -19,16 +17,6 @@ impl Catalog {
         points: Option<&ControlPoints>,
     ) -> Result<bool> {
         let text = points.map(serde_json::to_string).transpose()?;
-        let name = block.to_string();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let update = query_scalar(UPDATE).bind(&name).bind(&text);
-                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
-                let Some(id) = id else { return Ok(false) };
-                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-                Ok(true)
-            })
-        })
-        .await
+        self.update_block(UPDATE, block, text).await
     }
 }

@@ -61,6 +61,27 @@ impl Catalog {
         .await
     }
 
+    /// Changes a block by a statement with its name as `?1` and a value as `?2`, which returns its id, and stores the
+    /// checksum of the row. Returns `false` if the block does not exist.
+    pub(crate) async fn update_block(
+        &self,
+        statement: &'static str,
+        block: &BlockName,
+        value: Option<String>,
+    ) -> Result<bool> {
+        let name = block.to_string();
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let update = query_scalar(statement).bind(&name).bind(&value);
+                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+                let Some(id) = id else { return Ok(false) };
+                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+                Ok(true)
+            })
+        })
+        .await
+    }
+
     /// Returns the names of all blocks, sorted.
     ///
     /// # Errors

@@ -1,9 +1,7 @@
 //! Boxes on the pages of blocks that are known to be right, where a dataset has them.
 
-use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::db::query::query;
 use crate::catalog::db::value::Json;
-use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{BlockName, TrueBox};
 
@@ -16,9 +14,9 @@ impl Catalog {
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
-    pub async fn set_true_boxes(&self, block: BlockName, boxes: Vec<TrueBox>) -> Result<bool> {
-        self.in_transaction(move |conn| Box::pin(async move { set(conn, &block, &boxes).await }))
-            .await
+    pub async fn set_true_boxes(&self, block: &BlockName, boxes: &[TrueBox]) -> Result<bool> {
+        let text = serde_json::to_string(boxes)?;
+        self.update_block(SET, block, Some(text)).await
     }
 
     /// Returns the blocks that have true boxes, sorted by name.
@@ -34,14 +32,4 @@ impl Catalog {
         });
         blocks.collect()
     }
-}
-
-async fn set(conn: &mut Conn, block: &BlockName, boxes: &[TrueBox]) -> Result<bool> {
-    let set = query_scalar(SET).bind(block.as_str());
-    let set = set.bind(serde_json::to_string(boxes)?);
-    let id: Option<i64> = set.fetch_optional(&mut *conn).await?;
-    if let Some(id) = id {
-        checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-    }
-    Ok(id.is_some())
 }

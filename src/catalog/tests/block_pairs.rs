@@ -9,8 +9,8 @@ use crate::catalog::{
     CutReply, NewCharacter, NewVerdict, ReviewContext,
 };
 use crate::domain::{
-    BlockCharacterState, BlockStage, JobStatus, PrintFromMesh, Stage, ThresholdMetric, TrueBox,
-    Verdict,
+    BlockCharacterState, BlockName, BlockStage, JobStatus, PrintFromMesh, Stage, ThresholdMetric,
+    TrueBox, Verdict,
 };
 
 #[tokio::test]
@@ -78,8 +78,8 @@ async fn true_boxes_stay_until_the_block_gets_another_page() {
         bounds: [left, 0.0, 9.0, 9.5],
         is_partial: left > 2.0,
     });
-    let set = async |block| {
-        let set = world.catalog.set_true_boxes(block, boxes.to_vec());
+    let set = async |block: BlockName| {
+        let set = world.catalog.set_true_boxes(&block, &boxes);
         set.await.expect("stored")
     };
     assert!(set(block("b")).await);

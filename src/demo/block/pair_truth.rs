@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::block_truth::{BlockCharacterTruth, BlockTruth};
 use crate::demo::scan_pose::TopsPlane;
-use crate::domain::{Affine2, PrintFromMesh};
+use crate::domain::{Affine2, PrintFromMesh, box_iou};
 
 /// Least intersection over union of a box with the ink of a character that it belongs to.
 const MIN_OVERLAP: f64 = 0.3;
@@ -31,7 +31,7 @@ impl BlockTruth {
     /// if none does.
     pub fn character_at(&self, found: [f64; 4]) -> Option<&BlockCharacterTruth> {
         let overlaps = self.characters.iter().filter_map(|character| {
-            let share = overlap(character.box_px?, found);
+            let share = box_iou(character.box_px?, found);
             (share >= MIN_OVERLAP).then_some((character, share))
         });
         let best = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -106,18 +106,6 @@ fn fitted(points: &[[f64; 2]], values: &[f64]) -> Option<[f64; 3]> {
     let solved = normal.cholesky()?.solve(&right);
     let (a, b) = (solved[0], solved[1]);
     Some([a, b, solved[2] - a * middle[0] - b * middle[1]])
-}
-
-/// Returns the intersection over union of two boxes.
-fn overlap(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let area = |[x0, y0, x1, y1]: [f64; 4]| (x1 - x0).max(0.0) * (y1 - y0).max(0.0);
-    let common = area([
-        a[0].max(b[0]),
-        a[1].max(b[1]),
-        a[2].min(b[2]),
-        a[3].min(b[3]),
-    ]);
-    common / (area(a) + area(b) - common).max(1e-9)
 }
 
 #[cfg(test)]

@@ -45,7 +45,7 @@ impl SplitMix {
 
 /// How a page is turned and bent.
 #[derive(Debug, Clone, Copy, Default)]
-struct PageBend {
+struct DrawnBend {
     /// Clockwise.
     degrees: f64,
     /// Sideways shift at the corners, in pixels.
@@ -54,7 +54,7 @@ struct PageBend {
     bow: f64,
 }
 
-impl PageBend {
+impl DrawnBend {
     /// Returns the box around a box on a bent page from its place and half its width and height on an even page of ten
     /// columns and 20 rows.
     fn bounds(self, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> [f64; 4] {
@@ -64,7 +64,7 @@ impl PageBend {
     }
 }
 
-impl From<f64> for PageBend {
+impl From<f64> for DrawnBend {
     fn from(degrees: f64) -> Self {
         Self {
             degrees,
@@ -81,7 +81,11 @@ struct Page {
 
 impl Page {
     /// Draws columns from the right, each from a height in pixels. Boxes differ from their places at random.
-    fn new(columns: &[(f64, Vec<Cell>)], bend: impl Into<PageBend>, random: &mut SplitMix) -> Self {
+    fn new(
+        columns: &[(f64, Vec<Cell>)],
+        bend: impl Into<DrawnBend>,
+        random: &mut SplitMix,
+    ) -> Self {
         let (mut page, bend) = (Self::default(), bend.into());
         for (k, (top, cells)) in columns.iter().enumerate() {
             let middle = 3000.0 - PITCH[0] * k as f64;
@@ -269,7 +273,7 @@ fn leaning_and_bent_columns_are_straightened() {
         for degrees in [-3.0, 0.0, 2.0] {
             let mut random = SplitMix(13 + k as u64);
             let columns = plain_columns(10, 20, &mut random);
-            let bend = PageBend {
+            let bend = DrawnBend {
                 degrees,
                 keystone,
                 bow,
@@ -292,7 +296,7 @@ fn bent_pages_with_notes_are_straightened() {
                 *cells = notes;
             }
         }
-        let bend = PageBend {
+        let bend = DrawnBend {
             degrees: -3.0,
             keystone: 45.0,
             bow: 45.0,

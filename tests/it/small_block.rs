@@ -1,0 +1,51 @@
+//! A generated block that several tests use.
+
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use serde_json::{Value, json};
+
+use crate::cli::mocban;
+
+/// Number of characters that [`few_labels`] names.
+pub(crate) const CHARACTERS: usize = 6;
+
+/// Creates the folder `d/data` with the files of `demo --block`, at a spacing of 0.5 mm. All tests copy the same files.
+pub(crate) fn demo_block(dir: &Path) {
+    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let made = tempfile::tempdir().expect("a temporary directory");
+        let demo = [
+            "demo",
+            "d",
+            "--block=plain",
+            "--seed",
+            "3",
+            "--spacing",
+            "0.5",
+            "--no-run",
+        ];
+        mocban(made.path(), &demo).expect(0);
+        made
+    });
+    let data = dir.join("d/data");
+    fs::create_dir_all(&data).expect("a folder");
+    for entry in fs::read_dir(made.path().join("d/data")).expect("the files") {
+        let entry = entry.expect("a file");
+        fs::copy(entry.path(), data.join(entry.file_name())).expect("copied");
+    }
+}
+
+/// Writes labels of a few characters of the block that [`demo_block`] has created.
+pub(crate) fn few_labels(dir: &Path, file: &Path) {
+    let labels = fs::read_to_string(dir.join("d/data/labels.json")).expect("the labels");
+    let mut labels: Value = serde_json::from_str(&labels).expect("JSON");
+    let files = labels["_via_img_metadata"].as_object_mut().expect("files");
+    let of_page = files.values_mut().next().expect("a file");
+    let regions = of_page["regions"].as_array().expect("regions").iter();
+    let few: Vec<Value> = regions.step_by(30).take(CHARACTERS).cloned().collect();
+    assert_eq!(few.len(), CHARACTERS);
+    of_page["regions"] = json!(few);
+    fs::write(file, labels.to_string()).expect("written");
+}
