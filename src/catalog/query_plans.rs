@@ -62,7 +62,7 @@ async fn a_claim_scans_the_ready_index_in_order() {
 #[tokio::test]
 async fn fenced_writes_find_their_jobs_by_key() {
     for sql in [
-        checkpoint::ADVANCE,
+        checkpoint::ADVANCE.into(),
         fail::FAIL.into(),
         claim::RELEASE,
         requeue::REQUEUE.into(),

@@ -1,26 +1,28 @@
-//! Group commit: stores a batch of requests in one transaction, with two round trips to SQLite's thread.
+//! Group commit: stores a batch of requests in one transaction, with two round trips.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::db::known_leases::{KnownLeases, stored_before};
+use crate::catalog::db::known_leases::stored_before;
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
-use crate::catalog::db::write_connection::{BEGIN, CatalogServerState};
-use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints, position_after};
-use crate::catalog::queue::claim::{self, Behind, ClaimRequest, Heartbeat};
-use crate::catalog::queue::claim_start::ClaimStart;
-use crate::catalog::queue::counters::{DONE, Deltas};
+use crate::catalog::db::write_connection::BEGIN;
+use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints};
+use crate::catalog::queue::claim::{self, ClaimRequest, Heartbeat};
+use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::fail::{self, FailedRow};
 use crate::catalog::queue::lease::{FencedRow, Lease, StageFailure};
 
 /// Requests of one kind, and where the reply to each goes.
-struct Pending<I, R>(Vec<(I, Reply<R>)>);
+pub(crate) struct Pending<I, R>(Vec<(I, Reply<R>)>);
 
 impl<I, R> Pending<I, R> {
-    fn items(&self) -> impl Iterator<Item = &I> {
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn items(&self) -> impl Iterator<Item = &I> {
         self.0.iter().map(|(item, _)| item)
     }
 
@@ -47,20 +49,21 @@ impl<I, R> Default for Pending<I, R> {
 /// The requests of one commit by kind.
 #[derive(Default)]
 pub(crate) struct Batch {
-    heartbeats: Pending<Heartbeat, bool>,
-    checkpoints: Pending<Box<LeasedCheckpoints>, bool>,
-    failures: Pending<Box<(Lease, StageFailure)>, bool>,
-    releases: Pending<Lease, bool>,
-    claims: Pending<ClaimRequest, Vec<Lease>>,
+    pub(crate) heartbeats: Pending<Heartbeat, bool>,
+    pub(crate) checkpoints: Pending<Box<LeasedCheckpoints>, bool>,
+    pub(crate) failures: Pending<Box<(Lease, StageFailure)>, bool>,
+    pub(crate) releases: Pending<Lease, bool>,
+    pub(crate) claims: Pending<ClaimRequest, Vec<Lease>>,
 }
 
 /// Replies to the requests of a batch, in their order.
+#[derive(Debug, Default)]
 pub(crate) struct BatchReply {
     heartbeats: Vec<bool>,
-    checkpoints: Vec<bool>,
+    pub(crate) checkpoints: Vec<bool>,
     failures: Vec<bool>,
     releases: Vec<bool>,
-    claims: Vec<Vec<Lease>>,
+    pub(crate) claims: Vec<Vec<Lease>>,
 }
 
 /// Statements of the first round trip, which change workers and jobs. A request under a lease changes its job only if
@@ -93,107 +96,42 @@ impl Batch {
     }
 
     /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
-    /// the transaction may still be open, so the caller must roll it back. `server` is given for a server, where an
-    /// earlier commit of the same batch may have been stored although its answer was lost.
-    pub(crate) async fn apply(
-        &self,
-        conn: &mut Conn,
-        mut server: Option<&mut CatalogServerState>,
-    ) -> Result<BatchReply> {
-        let began = Instant::now();
-        let starts = match &mut server {
-            Some(server) => self.claim_starts(&mut server.claim_start, began),
-            None => vec![None; self.claims.0.len()],
-        };
+    /// the transaction may still be open, so the caller must roll it back. `may_be_stored` says that an earlier commit of
+    /// the same failures and releases may have been stored although its reply was lost, on a server.
+    pub(crate) async fn apply(&self, conn: &mut Conn, may_be_stored: bool) -> Result<BatchReply> {
         let mut script = Script::default();
         script.execute(BEGIN);
-        let statements = self.add_jobs(&mut script, &starts)?;
+        let statements = self.add_jobs(&mut script)?;
         let rows = script.run(conn).await?;
-        let (mut stored, mut unknown) = (Vec::new(), Vec::new());
-        if let Some(server) = &mut server {
-            // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
-            if server.leases.is_searching() {
-                stored = self.stored_before(conn, &statements, &rows).await?;
-            }
-            for request in self.claims.items() {
-                unknown.push(server.leases.unknown(conn, request.worker).await?);
-            }
+        let mut stored = Vec::new();
+        if may_be_stored {
+            stored = self.stored_before(conn, &statements, &rows).await?;
         }
         let mut script = Script::default();
-        let mut reply = self.add_records(&mut script, &statements, &rows, &stored)?;
+        let reply = self.add_records(&mut script, &statements, &rows, &stored)?;
         script.execute("COMMIT");
         script.run(conn).await?;
-        if let Some(server) = &mut server {
-            let times = [began, Instant::now()];
-            let claims = self.claims.items().zip(starts).zip(&reply.claims);
-            for ((request, start), claimed) in claims {
-                server.claim_start.note(request, start, claimed, times);
-            }
-        }
-        for (claimed, unknown) in reply.claims.iter_mut().zip(unknown) {
-            let is_new = |lease: &Lease| !claimed.iter().any(|other| other.pair == lease.pair);
-            let found: Vec<Lease> = unknown.into_iter().filter(is_new).collect();
-            claimed.extend(found);
-        }
-        if let Some(server) = server {
-            self.note_leases(&mut server.leases, &reply);
-        }
         Ok(reply)
     }
 
-    /// Returns where each claim on a server begins. Claims see what the other requests of the batch change.
-    fn claim_starts(&self, claim_start: &mut ClaimStart, now: Instant) -> Vec<Option<Behind>> {
-        if !self.heartbeats.0.is_empty() {
-            claim_start.begin_again();
-        }
-        let failures = self.failures.items().map(|item| &item.0);
-        let checkpoints = self.checkpoints.items().map(|item| &item.0);
-        let exclusive = failures.chain(checkpoints).filter(|lease| lease.exclusive);
-        for lease in exclusive.chain(self.releases.items()) {
-            claim_start.note_release(lease);
-        }
-        let claims = self.claims.items();
-        claims.map(|request| claim_start.of(request, now)).collect()
-    }
-
-    /// Finds the requests without effect in this transaction that an earlier commit has stored.
+    /// Finds the failures and releases without effect in this transaction that an earlier commit has stored.
     async fn stored_before(
         &self,
         conn: &mut Conn,
         statements: &JobStatements,
         rows: &ScriptRows,
     ) -> Result<Vec<FencedRow>> {
-        let advanced = rows.read_if_any(statements.advanced.as_ref())?;
         let failed = rows.read_if_any(statements.failed.as_ref())?;
         let released = rows.read_if_any(statements.released.as_ref())?;
-        let checkpoints = self.checkpoints.items().map(|item| &**item);
-        let checkpoints = checkpoints.filter(|(lease, _)| !lease.is_in(&advanced));
         let failures = self.failures.items().map(|item| &item.0);
         let failures = failures.filter(|lease| fail::row_of(lease, &failed).is_none());
         let releases = self.releases.items();
         let releases = releases.filter(|lease| !lease.is_in(&released));
-        stored_before(conn, checkpoints, failures.chain(releases)).await
-    }
-
-    /// Notes which leases have begun and ended.
-    fn note_leases(&self, leases: &mut KnownLeases, reply: &BatchReply) {
-        for (item, kept) in self.checkpoints.items().zip(&reply.checkpoints) {
-            let is_done = position_after(&item.1).is_some_and(|(cursor, _)| cursor == DONE);
-            if is_done || !kept {
-                leases.remove(&item.0);
-            }
-        }
-        let failures = self.failures.items().map(|item| &item.0);
-        failures
-            .chain(self.releases.items())
-            .for_each(|lease| leases.remove(lease));
-        for claimed in &reply.claims {
-            leases.add(claimed);
-        }
+        stored_before(conn, [].into_iter(), failures.chain(releases)).await
     }
 
     /// Adds the statements that change workers and jobs.
-    fn add_jobs(&self, script: &mut Script, starts: &[Option<Behind>]) -> Result<JobStatements> {
+    fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.items();
         let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, heartbeat));
         Ok(JobStatements {
@@ -207,8 +145,7 @@ impl Batch {
             claims: self
                 .claims
                 .items()
-                .zip(starts)
-                .map(|(request, start)| claim::add_claim(script, request, *start))
+                .map(|request| claim::add_claim(script, request))
                 .collect(),
         })
     }
@@ -229,7 +166,9 @@ impl Batch {
         let heartbeats = heartbeats.map(|statement| Ok(!rows.read(statement)?.is_empty()));
         let mut claims = Vec::with_capacity(statements.claims.len());
         for statement in &statements.claims {
-            claims.push(claim::count_claimed(rows.read(statement)?, &mut deltas));
+            let leases = claim::in_order(rows.read(statement)?);
+            claim::count_claimed(&leases, &mut deltas);
+            claims.push(leases);
         }
         let stored = self.checkpoints.items().map(|item| &**item);
         let stored: Vec<_> = stored.filter(|(lease, _)| lease.is_in(&advanced)).collect();
@@ -244,9 +183,7 @@ impl Batch {
         let releases = self.releases.items();
         Ok(BatchReply {
             heartbeats: heartbeats.collect::<Result<_>>()?,
-            checkpoints: checkpoints
-                .map(|item| item.0.is_in(&advanced) || item.0.is_in(stored_before))
-                .collect(),
+            checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
             failures: failures
                 .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(stored_before))
                 .collect(),
@@ -273,6 +210,32 @@ impl Batch {
         self.failures.refuse(error);
         self.releases.refuse(error);
         self.claims.refuse(error);
+    }
+
+    /// Returns whether there are requests that share a transaction on a server.
+    pub(crate) const fn has_shared_transaction(&self) -> bool {
+        !self.heartbeats.is_empty() || !self.failures.is_empty() || !self.releases.is_empty()
+    }
+
+    /// Splits the batch into the parts that a server commits one after another: heartbeats with failures and releases,
+    /// then checkpoints, then each claim.
+    pub(crate) fn split_for_server(self) -> Vec<Self> {
+        let checkpoints = Self {
+            checkpoints: self.checkpoints,
+            ..Self::default()
+        };
+        let claims = self.claims.0.into_iter().map(|claim| Self {
+            claims: Pending(vec![claim]),
+            ..Self::default()
+        });
+        let shared = Self {
+            heartbeats: self.heartbeats,
+            failures: self.failures,
+            releases: self.releases,
+            ..Self::default()
+        };
+        let parts = [shared, checkpoints].into_iter().chain(claims);
+        parts.filter(|part| part.len() > 0).collect()
     }
 
     /// Splits the batch into batches of one request each, in the order of execution.

@@ -2,6 +2,7 @@
 
 pub(crate) mod batch_collector;
 pub(crate) mod busy_retry;
+pub(crate) mod column_arrays;
 pub(crate) mod commit_delay;
 pub(crate) mod conn;
 pub(crate) mod copy;
@@ -22,6 +23,7 @@ pub(crate) mod roles;
 pub(crate) mod row;
 pub(crate) mod rows;
 pub(crate) mod script;
+pub(crate) mod server_commit;
 pub(crate) mod unplaced;
 pub(crate) mod value;
 pub(crate) mod write_connection;

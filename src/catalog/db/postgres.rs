@@ -19,9 +19,16 @@ const READERS: u32 = 2;
 /// Longest time for one connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Setting of the write connection. With it, the planner reads the ready jobs in the order of their index also while it
-/// does not know how many they are.
-const IN_INDEX_ORDER: [(&str, &str); 1] = [("enable_bitmapscan", "off")];
+/// Settings of the write connection, for group commits. Each of their statements finds a few rows of large tables by an
+/// index. The planner would read whole tables instead while it has no statistics about them, as after an import. The
+/// plans do not depend on the parameters.
+const BY_INDEX: [(&str, &str); 5] = [
+    ("plan_cache_mode", "force_generic_plan"),
+    ("enable_bitmapscan", "off"),
+    ("enable_hashjoin", "off"),
+    ("enable_mergejoin", "off"),
+    ("enable_seqscan", "off"),
+];
 
 static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
 
@@ -73,6 +80,8 @@ impl PostgresAddress {
             ("default_transaction_isolation", "read committed"),
             ("idle_in_transaction_session_timeout", "60s"),
             ("client_min_messages", "warning"),
+            // Compiling a plan takes longer than running most of our statements.
+            ("jit", "off"),
         ]);
         Ok(Self { options, schema })
     }
@@ -100,7 +109,7 @@ impl PostgresAddress {
     /// # Errors
     /// Returns an error if the server does not answer or refuses, or if the schema is missing or has another version.
     pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
-        let options = self.options.clone().options(IN_INDEX_ORDER);
+        let options = self.options.clone().options(BY_INDEX);
         let mut conn = self.connect_to_server(&options).await?;
         if self.version(&mut conn).await?.is_none() {
             if !may_create {
@@ -221,6 +230,13 @@ impl PostgresAddress {
 /// run one after another, as in SQLite.
 pub(crate) const LOCK: &str =
     "SELECT pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482))";
+
+/// Takes the lock of a catalog, and permits all plans until the end of the transaction.
+pub(crate) const LOCK_FOR_ANY_PLAN: &str = "
+SELECT set_config(name, 'on', true) FROM (VALUES ('enable_bitmapscan'), ('enable_hashjoin'), ('enable_mergejoin'),
+    ('enable_seqscan')) AS setting (name)
+UNION ALL SELECT set_config('plan_cache_mode', 'auto', true)
+UNION ALL SELECT CAST(pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482)) AS text)";
 
 /// Returns whether a URL contains a password.
 pub fn has_password(url: &str) -> bool {

@@ -13,7 +13,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::known_leases::KnownLeases;
 use crate::catalog::db::log_watch::LogWatch;
-use crate::catalog::db::postgres::{LOCK, PostgresAddress};
+use crate::catalog::db::postgres::{LOCK_FOR_ANY_PLAN, PostgresAddress};
 use crate::catalog::db::query::query;
 use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::queue::claim_start::ClaimStart;
@@ -85,6 +85,11 @@ impl WriteConnection {
     pub(crate) fn parts(&mut self) -> (&mut Conn, &Path, Option<&mut CatalogServerState>) {
         let state = self.server.as_mut().map(|server| &mut server.state);
         (&mut self.conn, &self.path, state)
+    }
+
+    /// Returns whether the catalog is on a server.
+    pub(crate) const fn is_on_server(&self) -> bool {
+        self.server.is_some()
     }
 
     /// Connects again if the state of the connection is unknown.
@@ -202,7 +207,7 @@ async fn begin(conn: &mut Conn) -> Result<()> {
     execute(conn, BEGIN).await?;
     match conn {
         Conn::Sqlite(_) => Ok(()),
-        Conn::Postgres(_) => execute(conn, LOCK).await,
+        Conn::Postgres(_) => execute(conn, LOCK_FOR_ANY_PLAN).await,
     }
 }
 

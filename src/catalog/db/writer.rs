@@ -12,6 +12,7 @@ use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
 use crate::catalog::db::request::Message;
+use crate::catalog::db::server_commit;
 use crate::catalog::db::write_connection::{WriteConnection, rollback};
 
 /// Number of commits, with about 4 MiB of log, after which the log is checkpointed even if requests are pending.
@@ -47,7 +48,14 @@ pub(crate) async fn run(
             Some(Message::Flush) => continue,
             Some(first @ (Message::Grouped(_) | Message::Deferrable(_))) => {
                 let (batch, after) = collect(first, &delay, &mut inbox).await;
-                commit(&mut writer, batch).await;
+                let parts = if writer.is_on_server() {
+                    batch.split_for_server()
+                } else {
+                    vec![batch]
+                };
+                for part in parts {
+                    commit(&mut writer, part).await;
+                }
                 match after {
                     Some(Message::Close(done)) => break Some(done),
                     Some(Message::Transaction(work)) => work(&mut writer).await,
@@ -95,7 +103,10 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
     let reply = loop {
         let (conn, path, mut server) = writer.parts();
         let reply = retry_while_busy!(path, {
-            let outcome = batch.apply(conn, server.as_deref_mut()).await;
+            let outcome = match server.as_deref_mut() {
+                Some(state) => server_commit::commit(batch, conn, state).await,
+                None => batch.apply(conn, false).await,
+            };
             if outcome.as_ref().is_err_and(|error| !error.is_unavailable()) {
                 rollback(conn).await;
             }

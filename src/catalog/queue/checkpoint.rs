@@ -1,4 +1,5 @@
-//! Statements that store finished stages if the lease is still valid.
+//! Statements that store finished stages in SQLite if the lease is still valid, and what they share with those for
+//! PostgreSQL.
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -11,7 +12,7 @@ use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
 use crate::domain::{
-    ContentHash, JobStatus, MetricOutcome, PairId, Stage, ThresholdMetric, WorkerId,
+    ContentHash, JobStatus, MetricOutcome, PairId, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };
 use crate::failpoint::{self, Point};
 
@@ -19,9 +20,8 @@ use crate::failpoint::{self, Point};
 pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
 
 /// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the pair's crash count. Marks
-/// a job dirty if the new results do not build on the stored ones: see `advanced_job`.
-pub(crate) const ADVANCE: Sql = Sql::pair(
-    "
+/// a job dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
+pub(crate) const ADVANCE: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
     attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.value ->> 'low_confidence',
@@ -33,23 +33,10 @@ WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
-RETURNING pair, token",
-    "
-UPDATE job SET stage = item.next, status = item.status,
-    worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
-    attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
-    dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
-        SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
-FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, worker bigint, token bigint, stage bigint, next bigint, status bigint,
-    fingerprint bigint, first bigint, mixed bigint, low_confidence bigint, deadline bigint, alive_since bigint)
-WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status = 1
-    AND job.stage = item.stage AND EXISTS (SELECT 1 FROM worker AS w WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
-RETURNING job.pair, job.token",
-);
+RETURNING pair, token";
 
 /// Items: [`ResultItem`].
-const RESULT: Sql = Sql::pair(
-    "
+const RESULT: &str = "
 INSERT INTO stage_result
     (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
 SELECT value ->> 'pair', value ->> 'index', value ->> 'worker', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
@@ -58,34 +45,14 @@ SELECT value ->> 'pair', value ->> 'index', value ->> 'worker', value ->> 'finge
 FROM jsonb_each(?) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
-    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
-    "
-INSERT INTO stage_result
-    (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
-SELECT DISTINCT ON (r.pair, r.index) r.pair, r.index, r.worker, r.fingerprint, decode(r.mesh_hash, 'hex'),
-    decode(r.print_hash, 'hex'), r.attributes, r.outcome, CAST(r.files AS text), decode(r.result_hash, 'hex'), r.ms, r.at
-FROM ROWS FROM (json_to_recordset(CAST(? AS json)) AS (pair bigint, index bigint, worker bigint, fingerprint bigint,
-        mesh_hash text, print_hash text, attributes text, outcome text, files json, result_hash text, ms bigint, at bigint))
-    WITH ORDINALITY AS r (pair, index, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files,
-        result_hash, ms, at, position)
-ORDER BY r.pair, r.index, r.position DESC
-ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
-    print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
-    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
-);
+    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
 /// Removes the old metrics, because the new method may compute fewer.
-const CLEAR_METRICS: Sql = Sql::pair(
-    "
-DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
-    "
-DELETE FROM metric_result WHERE pair = ANY (ARRAY(
-    SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json))))",
-);
+const CLEAR_METRICS: &str = "
+DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
 /// Items: [`MetricItem`].
-const METRICS: Sql = Sql::pair(
-    "
+const METRICS: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
@@ -98,35 +65,12 @@ SELECT value ->> 'pair', value ->> 'metric', value ->> 'threshold_level',
     value ->> '$.scores.density_depth', value ->> '$.disagreement.pieces',
     value ->> '$.disagreement.missing_ink', value ->> '$.disagreement.missing_wood',
     value ->> 'margin', value ->> 'confidence', value ->> 'at_bound', unhex(value ->> 'hash')
-FROM jsonb_each(?)",
-    "
-INSERT INTO metric_result
-    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
-     missing_wood, margin, confidence, at_bound, result_hash)
-SELECT m.pair, m.metric, m.threshold_level, m.threshold_depth, CAST(m.print_from_depth AS text), m.angle_deg, m.scale,
-    CAST(m.shift_px ->> 0 AS double precision), CAST(m.shift_px ->> 1 AS double precision),
-    s.ssim, s.nl_ssim, s.iou, s.iou_box, s.dice, s.density_print, s.density_depth,
-    d.pieces, d.missing_ink, d.missing_wood, m.margin, m.confidence, CAST(m.at_bound AS int), decode(m.hash, 'hex')
-FROM json_to_recordset(CAST(? AS json)) AS m (pair bigint, metric text, threshold_level bigint,
-        threshold_depth double precision, print_from_depth json, angle_deg double precision, scale double precision,
-        shift_px json, scores json, disagreement json, margin double precision, confidence double precision,
-        at_bound boolean, hash text),
-    json_to_record(m.scores) AS s (ssim double precision, nl_ssim double precision, iou double precision,
-        iou_box double precision, dice double precision, density_print double precision, density_depth double precision),
-    json_to_record(m.disagreement) AS d (pieces bigint, missing_ink double precision, missing_wood double precision)",
-);
+FROM jsonb_each(?)";
 
 /// Items: pair, index of the stage, worker, milliseconds, time.
-const ATTEMPT: Sql = Sql::pair(
-    "
+const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)",
-    "
-INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint),
-    CAST(value ->> 3 AS bigint), CAST(value ->> 4 AS bigint) FROM json_array_elements(CAST(? AS json))",
-);
+SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
 
 /// Updates the input files of pairs. Items: see [`input_item`].
 pub(crate) const UPDATE_INPUTS: Sql = Sql::pair(
@@ -150,20 +94,17 @@ WHERE pair.id = new.id AND (pair.mesh_hash IS DISTINCT FROM new.mesh_hash OR pai
     OR pair.print_hash IS DISTINCT FROM new.print_hash OR pair.print_stat IS DISTINCT FROM new.print_stat)",
 );
 
-const CLEAR_FAILURE: Sql = Sql::pair(
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))",
-    "DELETE FROM failure WHERE pair = ANY (ARRAY(
-    SELECT CAST(value ->> 0 AS bigint) FROM json_array_elements(CAST(? AS json))))",
-);
+const CLEAR_FAILURE: &str =
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
 /// The statements of [`add_results`].
 #[cfg(test)]
-pub(crate) const ROWS: [Sql; 6] = [
+pub(crate) const ROWS: [&str; 6] = [
     RESULT,
     CLEAR_METRICS,
     METRICS,
     ATTEMPT,
-    UPDATE_INPUTS,
+    UPDATE_INPUTS.sqlite,
     CLEAR_FAILURE,
 ];
 
@@ -172,7 +113,7 @@ pub(crate) fn add_advance<'i>(
     script: &mut Script,
     checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
 ) -> Result<Option<Statement<FencedRow>>> {
-    script.add_over(ADVANCE, checkpoints.filter_map(advanced_job))
+    script.add_over(ADVANCE, checkpoints.filter_map(AdvancedJob::of))
 }
 
 /// Adds the statements that store the results of advanced jobs to a script.
@@ -276,23 +217,50 @@ pub(crate) fn position_after(stages: &[StageCheckpoint]) -> Option<(Cursor, JobS
     Some((after.cursor, after.status))
 }
 
-/// Builds the item of [`ADVANCE`] for a job, or returns `None` if there are no stages. The job becomes dirty if the
-/// stages are not consecutive (`mixed` is 1), or if the upstream of the fingerprint `first` is not the job's
-/// fingerprint.
-fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
-    let last = stages.last()?;
-    let after = key_after(last);
-    let deadline = (after.status == JobStatus::Leased).then_some(last.next_deadline);
-    let low_confidence = last.metrics.iter().any(|metric| {
-        metric.outcome.metric == ThresholdMetric::DEFAULT && metric.outcome.is_low_confidence()
-    });
-    let (first, follow) = chain(stages);
-    Some(json!({
-        "pair": lease.pair, "worker": lease.worker, "token": lease.token, "next": after.cursor,
-        "status": after.status.code(), "fingerprint": after.fingerprint, "first": first,
-        "stage": cursor(lease.cursor), "mixed": i64::from(!follow), "low_confidence": i64::from(low_confidence), "deadline": deadline,
-        "alive_since": last.alive_since,
-    }))
+/// A job to advance, and its state afterwards. An item of [`ADVANCE`].
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct AdvancedJob {
+    pub(crate) pair: i64,
+    pub(crate) worker: i64,
+    pub(crate) token: i64,
+    /// Position under the lease.
+    pub(crate) stage: Cursor,
+    pub(crate) next: Cursor,
+    pub(crate) status: i64,
+    pub(crate) fingerprint: i64,
+    /// The job becomes dirty if the upstream of this fingerprint is not the job's fingerprint.
+    pub(crate) first: Option<i64>,
+    /// The job becomes dirty if this is 1, because the stages are not consecutive.
+    pub(crate) mixed: i64,
+    pub(crate) low_confidence: i64,
+    pub(crate) deadline: Option<UnixMillis>,
+    pub(crate) alive_since: UnixMillis,
+}
+
+impl AdvancedJob {
+    /// Describes a job after its checkpoint, or returns `None` if there are no stages.
+    pub(crate) fn of((lease, stages): &LeasedCheckpoints) -> Option<Self> {
+        let last = stages.last()?;
+        let after = key_after(last);
+        let low_confidence = last.metrics.iter().any(|metric| {
+            metric.outcome.metric == ThresholdMetric::DEFAULT && metric.outcome.is_low_confidence()
+        });
+        let (first, follow) = chain(stages);
+        Some(Self {
+            pair: lease.pair.0,
+            worker: lease.worker.0,
+            token: lease.token,
+            stage: cursor(lease.cursor),
+            next: after.cursor,
+            status: after.status.code(),
+            fingerprint: after.fingerprint,
+            first: first.map(|FingerprintId(id)| id),
+            mixed: i64::from(!follow),
+            low_confidence: i64::from(low_confidence),
+            deadline: (after.status == JobStatus::Leased).then_some(last.next_deadline),
+            alive_since: last.alive_since,
+        })
+    }
 }
 
 /// Returns the fingerprint of the first stage, and whether the stages are consecutive. Ignores the stages before the

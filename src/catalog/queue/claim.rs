@@ -46,6 +46,16 @@ impl ClaimRequest {
             alive_since: UnixMillis::MIN,
         }
     }
+
+    /// Returns the largest number of pairs that the claim may lease.
+    pub(crate) fn limit(&self) -> i64 {
+        let slots = if self.exclusive {
+            self.slots.min(1)
+        } else {
+            self.slots
+        };
+        slots as i64
+    }
 }
 
 /// A worker's sign of life.
@@ -58,94 +68,20 @@ pub(crate) struct Heartbeat {
     pub(crate) metrics: Option<String>,
 }
 
-/// Where a claim on a server begins: behind this pair among those with the same next stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Behind {
-    /// The next stage.
-    pub(crate) turn: Cursor,
-    pub(crate) pair: i64,
-    /// Whether to search all pairs if there are too few behind this one.
-    pub(crate) or_anywhere: bool,
-}
-
-impl Behind {
-    /// Begins behind the pair of a lease.
-    pub(crate) const fn pair_of(lease: &Lease) -> Self {
-        Self {
-            turn: cursor(lease.cursor),
-            pair: lease.pair.0,
-            or_anywhere: true,
-        }
-    }
-
-    /// Returns whether a leased pair is behind this one and has the same next stage.
-    pub(crate) const fn is_before(self, lease: &Lease) -> bool {
-        cursor(lease.cursor) == self.turn && lease.pair.0 > self.pair
-    }
-
-    /// Returns whether a leased pair is behind this one in the order of claims.
-    pub(crate) fn is_before_in_order(self, lease: &Lease) -> bool {
-        order(cursor(lease.cursor), lease.pair.0) > order(self.turn, self.pair)
-    }
-}
-
-/// Builds the text that selects ready jobs for PostgreSQL from the tables, a condition and a limit. It skips jobs that
-/// another process is about to lease.
-macro_rules! ready_in_postgres {
-    ($from:literal, $condition:literal, $limit:literal) => {
-        concat!(
-            "SELECT j.pair FROM ",
-            $from,
-            " WHERE j.status = 0",
-            $condition,
-            " AND j.stage <= ? AND j.exclusive = ?
-        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ",
-            $limit,
-            " FOR UPDATE OF j SKIP LOCKED"
-        )
-    };
-}
-
-/// Builds the text of a claim for PostgreSQL from the text that selects its jobs. An exclusive job excludes only leases
-/// on the same host. A worker whose settings are not those of the last plan gets nothing.
-macro_rules! claim_in_postgres {
-    ($($ready:tt)*) => {
-        concat!(
-            "
-UPDATE job SET status = 1, worker = ?, deadline = ?, token = job.token + 1, attempt = job.attempt + 1
-FROM worker AS me
-WHERE job.pair = ANY (ARRAY(
-        ",
-            $($ready)*,
-            "))
-    AND me.id = ? AND me.ended IS NULL AND me.heartbeat >= ?
-    AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
-    AND NOT EXISTS (
-        SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
-        WHERE other.status = 1 AND its.host = me.host AND (other.exclusive = 1 OR ? = 1))
-RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive"
-        )
-    };
-}
-
 /// Leases the first ready jobs in the order of the index `job_ready`. While an exclusive job is leased, no worker holds
 /// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
 /// prepare the statement again each time.
-pub(crate) const CLAIM: Sql = Sql::pair(
-    "
+pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
     ORDER BY prio, stage DESC, pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    claim_in_postgres!(ready_in_postgres!("job AS j", "", "?")),
-);
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Like [`CLAIM`], but leases only selected pairs.
-pub(crate) const CLAIM_AMONG: Sql = Sql::pair(
-    "
+const CLAIM_AMONG: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT j.pair FROM json_each(?) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
@@ -153,35 +89,7 @@ WHERE pair IN (
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
     AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive",
-    claim_in_postgres!(ready_in_postgres!(
-        "json_each(?) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)",
-        "",
-        "?"
-    )),
-);
-
-/// Like [`CLAIM`], but leases jobs behind a position first, and others only if there are too few. Only for PostgreSQL.
-/// The two conditions on `turn` are an equality that the planner does not recognize. With a plain one, it may read the
-/// primary key, which is in the same order but contains all jobs.
-pub(crate) const CLAIM_BEHIND: &str = claim_in_postgres!(
-    "WITH behind AS MATERIALIZED (
-        ",
-    ready_in_postgres!(
-        "job AS j",
-        " AND j.prio = 0 AND j.turn <= ? AND j.turn >= ? AND j.pair > ?",
-        "?"
-    ),
-    "), anywhere AS MATERIALIZED (
-        ",
-    ready_in_postgres!(
-        "job AS j",
-        " AND NOT (j.prio = 0 AND j.turn = ? AND j.pair > ?)",
-        "greatest(? - (SELECT count(*) FROM behind), 0)"
-    ),
-    ")
-        SELECT pair FROM behind UNION ALL SELECT pair FROM anywhere"
-);
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Gives leases back. Their attempts do not count.
 pub(crate) const RELEASE: Sql = Sql::pair(
@@ -195,7 +103,7 @@ RETURNING pair, token",
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = greatest(job.attempt - 1, 0)
 FROM json_array_elements(CAST(? AS json)) AS item (value)
 WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.worker = CAST(item.value ->> 1 AS bigint)
-    AND job.token = CAST(item.value ->> 2 AS bigint) AND job.status = 1
+    AND job.token = CAST(item.value ->> 2 AS bigint) AND job.status + 0 = 1
 RETURNING job.pair, job.token",
 );
 
@@ -214,43 +122,20 @@ pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> State
     statement
 }
 
-/// Adds a claim to a script. `behind` is only for a claim on a server that is neither exclusive nor for named pairs.
-pub(crate) fn add_claim(
-    script: &mut Script,
-    request: &ClaimRequest,
-    behind: Option<Behind>,
-) -> Statement<Lease> {
-    let slots = if request.exclusive {
-        request.slots.min(1)
-    } else {
-        request.slots
-    } as i64;
-    let bind_search = |script: &mut Script, slots: i64| {
-        script.bind(cursor(request.until));
-        script.bind(i64::from(request.exclusive));
-        script.bind(slots);
-    };
-    let statement = match (&request.among, behind) {
-        (Some(_), _) => script.add(CLAIM_AMONG),
-        (None, Some(_)) => script.add(CLAIM_BEHIND),
-        (None, None) => script.add(CLAIM),
-    };
+/// Adds a claim to a script, in SQLite.
+pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Statement<Lease> {
+    let statement = script.add(match &request.among {
+        Some(_) => CLAIM_AMONG,
+        None => CLAIM,
+    });
     script.bind(request.worker.0);
     script.bind(request.deadline);
     if let Some(among) = &request.among {
         script.bind(among.json.clone());
     }
-    if let Some(behind) = behind {
-        script.bind(behind.turn);
-        script.bind(behind.turn);
-        script.bind(behind.pair);
-        bind_search(script, slots);
-        script.bind(behind.turn);
-        script.bind(behind.pair);
-        bind_search(script, if behind.or_anywhere { slots } else { 0 });
-    } else {
-        bind_search(script, slots);
-    }
+    script.bind(cursor(request.until));
+    script.bind(i64::from(request.exclusive));
+    script.bind(request.limit());
     script.bind(request.worker.0);
     script.bind(request.alive_since);
     script.bind(i64::from(request.exclusive));
@@ -258,20 +143,25 @@ pub(crate) fn add_claim(
 }
 
 /// Returns the key by which claims sort pairs.
-const fn order(turn: Cursor, pair: i64) -> (Reverse<Cursor>, i64) {
+pub(crate) const fn order(turn: Cursor, pair: i64) -> (Reverse<Cursor>, i64) {
     (Reverse(turn), pair)
 }
 
-/// Counts claimed leases, and returns them in the order of the claim.
-pub(crate) fn count_claimed(mut leases: Vec<Lease>, deltas: &mut Deltas) -> Vec<Lease> {
-    // RETURNING promises no order.
+/// Returns claimed leases in the order of the claim. `RETURNING` promises no order.
+pub(crate) fn in_order(mut leases: Vec<Lease>) -> Vec<Lease> {
     leases.sort_by_key(|lease| order(cursor(lease.cursor), lease.pair.0));
     for lease in &leases {
-        let from = lease.counter_key().with_status(JobStatus::Ready);
-        deltas.move_job(from, lease.counter_key());
         failpoint::hit(lease.cursor, Point::Claiming, None);
     }
     leases
+}
+
+/// Counts claimed leases.
+pub(crate) fn count_claimed(leases: &[Lease], deltas: &mut Deltas) {
+    for lease in leases {
+        let from = lease.counter_key().with_status(JobStatus::Ready);
+        deltas.move_job(from, lease.counter_key());
+    }
 }
 
 /// Adds the release of leases to a script.

@@ -7,9 +7,10 @@
 
 use std::time::{Duration, Instant};
 
-use crate::catalog::queue::claim::{Behind, ClaimRequest};
+use crate::catalog::queue::claim::ClaimRequest;
 use crate::catalog::queue::counters::cursor;
 use crate::catalog::queue::lease::Lease;
+use crate::catalog::queue::server_claim::Behind;
 use crate::domain::{Stage, WorkerId};
 
 /// Time between searches from the beginning, which find earlier pairs that other processes made ready.
@@ -106,8 +107,9 @@ impl ClaimStart {
 #[cfg(test)]
 mod tests {
     use super::{ClaimStart, PAUSE, SEARCH_ALL_EVERY};
-    use crate::catalog::queue::claim::{Behind, ClaimRequest};
+    use crate::catalog::queue::claim::ClaimRequest;
     use crate::catalog::queue::lease::Lease;
+    use crate::catalog::queue::server_claim::Behind;
     use crate::domain::{PairId, Stage, WorkerId};
     use std::time::Instant;
 

@@ -14,7 +14,8 @@ use crate::domain::JobStatus;
 /// Number of attempts kept per pair. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;
 
-/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead.
+/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead. `job.status + 0` keeps the
+/// planner of PostgreSQL from the index of leases, which contains all leases that ended while a snapshot is held.
 pub(crate) const FAIL: &str = concat!(
     "
 UPDATE job SET stage = min(job.stage, CAST(item.value ->> 'stage' AS bigint)), status = CAST(item.value ->> 'status' AS bigint),
@@ -24,7 +25,7 @@ UPDATE job SET stage = min(job.stage, CAST(item.value ->> 'stage' AS bigint)), s
     "
 FROM jsonb_each(?) AS item
 WHERE job.pair = CAST(item.value ->> 'pair' AS bigint) AND job.worker = CAST(item.value ->> 'worker' AS bigint)
-    AND job.token = CAST(item.value ->> 'token' AS bigint) AND job.status = 1 AND EXISTS (
+    AND job.token = CAST(item.value ->> 'token' AS bigint) AND job.status + 0 = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= CAST(item.value ->> 'alive_since' AS bigint))
 RETURNING pair, token, stage, status, coalesce(fingerprint, 0) AS fingerprint"

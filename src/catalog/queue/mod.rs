@@ -15,6 +15,8 @@ pub(crate) mod recovery;
 pub(crate) mod requeue;
 mod run_plan;
 pub(crate) mod selection;
+pub(crate) mod server_checkpoint;
+pub(crate) mod server_claim;
 pub(crate) mod shared_runs;
 pub(crate) mod staleness;
 pub(crate) mod worker_list;

@@ -1,0 +1,106 @@
+//! Commits requests in PostgreSQL. Checkpoints, and each claim, are one statement that commits by itself; the rarer
+//! requests share a transaction.
+
+use std::time::Instant;
+
+use crate::catalog::db::conn::Conn;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::group_commit::{Batch, BatchReply};
+use crate::catalog::db::known_leases::stored_before;
+use crate::catalog::db::write_connection::CatalogServerState;
+use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
+use crate::catalog::queue::claim::ClaimRequest;
+use crate::catalog::queue::counters::DONE;
+use crate::catalog::queue::lease::Lease;
+use crate::catalog::queue::{server_checkpoint, server_claim};
+
+/// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
+/// reply was lost.
+pub(crate) async fn commit(
+    batch: &Batch,
+    conn: &mut Conn,
+    state: &mut CatalogServerState,
+) -> Result<BatchReply> {
+    let mut reply = BatchReply::default();
+    if batch.has_shared_transaction() {
+        reply = batch.apply(conn, state.leases.is_searching()).await?;
+        if !batch.heartbeats.is_empty() {
+            state.claim_start.begin_again();
+        }
+        let failed = batch.failures.items().map(|item| &item.0);
+        for lease in batch.releases.items().chain(failed) {
+            // A failed pair may be ready again at once only if it must run exclusively.
+            state.leases.remove(lease);
+        }
+        for lease in batch.releases.items() {
+            state.claim_start.note_release(lease);
+        }
+        note_exclusive(batch.failures.items().map(|item| &item.0), state);
+    }
+    if !batch.checkpoints.is_empty() {
+        let checkpoints: Vec<_> = batch.checkpoints.items().map(|item| &**item).collect();
+        reply.checkpoints = store(conn, &checkpoints, state).await?;
+    }
+    for request in batch.claims.items() {
+        reply.claims.push(claim(conn, request, state).await?);
+    }
+    Ok(reply)
+}
+
+/// Stores checkpoints. Returns for each whether it is stored.
+async fn store(
+    conn: &mut Conn,
+    checkpoints: &[&LeasedCheckpoints],
+    state: &mut CatalogServerState,
+) -> Result<Vec<bool>> {
+    let Conn::Postgres(server) = conn else {
+        unreachable!("a server is PostgreSQL");
+    };
+    let stored = server_checkpoint::store(server, checkpoints.iter().copied()).await?;
+    let mut earlier = Vec::new();
+    // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
+    if state.leases.is_searching() {
+        let others = checkpoints
+            .iter()
+            .filter(|(lease, _)| !lease.is_in(&stored));
+        earlier = stored_before(conn, others.copied(), [].into_iter()).await?;
+    }
+    let is_kept = |lease: &Lease| lease.is_in(&stored) || lease.is_in(&earlier);
+    let kept: Vec<bool> = checkpoints
+        .iter()
+        .map(|(lease, _)| is_kept(lease))
+        .collect();
+    for ((lease, stages), kept) in checkpoints.iter().zip(&kept) {
+        let is_done = position_after(stages).is_some_and(|(cursor, _)| cursor == DONE);
+        if is_done || !kept {
+            state.leases.remove(lease);
+        }
+    }
+    note_exclusive(checkpoints.iter().map(|(lease, _)| lease), state);
+    Ok(kept)
+}
+
+/// Leases pairs. Also returns leases of the worker that an earlier claim received without a reply.
+async fn claim(
+    conn: &mut Conn,
+    request: &ClaimRequest,
+    state: &mut CatalogServerState,
+) -> Result<Vec<Lease>> {
+    let began = Instant::now();
+    let start = state.claim_start.of(request, began);
+    let mut claimed = server_claim::claim(conn, request, start).await?;
+    let times = [began, Instant::now()];
+    state.claim_start.note(request, start, &claimed, times);
+    state.leases.add(&claimed);
+    let unknown = state.leases.unknown(conn, request.worker).await?;
+    state.leases.add(&unknown);
+    claimed.extend(unknown);
+    Ok(claimed)
+}
+
+/// Lets claims search from the beginning after an exclusive lease, which prevented claims.
+fn note_exclusive<'l>(leases: impl Iterator<Item = &'l Lease>, state: &mut CatalogServerState) {
+    for lease in leases.filter(|lease| lease.exclusive) {
+        state.claim_start.note_release(lease);
+    }
+}

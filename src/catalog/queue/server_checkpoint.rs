@@ -1,0 +1,327 @@
+//! Stores finished stages in PostgreSQL. One statement advances the jobs and stores their results, so a checkpoint takes
+//! one round trip and commits by itself.
+
+use std::sync::LazyLock;
+
+use sqlx::postgres::PgArguments;
+use sqlx::{AssertSqlSafe, PgConnection};
+
+use crate::catalog::db::column_arrays::{ArrayParameters, column_arrays};
+use crate::catalog::db::error::Result;
+use crate::catalog::db::query::limited;
+use crate::catalog::db::row::{FromRow as _, Row};
+use crate::catalog::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
+use crate::catalog::queue::lease::{FencedRow, InputVersion, MetricResult, StageCheckpoint};
+use crate::failpoint::{self, Point};
+
+column_arrays! {
+    /// A job to advance.
+    JobRow,
+    /// Jobs to advance.
+    JobRows<'i>:
+    pair: "bigint" = i64,
+    worker: "bigint" = i64,
+    token: "bigint" = i64,
+    stage: "bigint" = i64,
+    counted_fingerprint: "bigint" = i64,
+    next: "bigint" = i64,
+    status: "bigint" = i64,
+    fingerprint: "bigint" = i64,
+    first: "bigint" = Option<i64>,
+    mixed: "bigint" = i64,
+    low_confidence: "bigint" = i64,
+    deadline: "bigint" = Option<i64>,
+    alive_since: "bigint" = i64,
+    has_failure: "boolean" = bool,
+    // Names of the stored metrics, separated by commas. NULL without the last stage.
+    metrics: "text" = Option<String>,
+    mesh_hash: "bytea" = Option<&'i [u8]>,
+    mesh_stat: "text" = Option<&'i str>,
+    print_hash: "bytea" = Option<&'i [u8]>,
+    print_stat: "text" = Option<&'i str>,
+}
+
+column_arrays! {
+    /// A result of a stage.
+    ResultRow,
+    /// Results of stages.
+    ResultRows<'i>:
+    // Position of the job among the jobs, from 1.
+    position: "bigint" = i64,
+    pair: "bigint" = i64,
+    stage: "bigint" = i64,
+    worker: "bigint" = i64,
+    fingerprint: "bigint" = i64,
+    mesh_hash: "bytea" = &'i [u8],
+    print_hash: "bytea" = Option<&'i [u8]>,
+    attributes: "text" = &'i str,
+    outcome: "text" = &'i str,
+    files: "text" = String,
+    result_hash: "bytea" = &'i [u8],
+    ms: "bigint" = i64,
+    at: "bigint" = i64,
+    // Whether the stage was not computed again under the same lease.
+    is_last: "boolean" = bool,
+}
+
+column_arrays! {
+    /// A result of a metric.
+    MetricRow,
+    /// Results of metrics.
+    MetricRows<'i>:
+    position: "bigint" = i64,
+    pair: "bigint" = i64,
+    metric: "text" = &'static str,
+    threshold_level: "bigint" = i64,
+    threshold_depth: "double precision" = f64,
+    print_from_depth: "text" = String,
+    angle_deg: "double precision" = f64,
+    scale: "double precision" = f64,
+    shift_x_px: "double precision" = f64,
+    shift_y_px: "double precision" = f64,
+    ssim: "double precision" = f64,
+    nl_ssim: "double precision" = f64,
+    iou: "double precision" = f64,
+    iou_box: "double precision" = f64,
+    dice: "double precision" = f64,
+    density_print: "double precision" = f64,
+    density_depth: "double precision" = f64,
+    disagreements: "bigint" = i64,
+    missing_ink: "double precision" = f64,
+    missing_wood: "double precision" = f64,
+    margin: "double precision" = f64,
+    confidence: "double precision" = Option<f64>,
+    at_bound: "bigint" = i64,
+    result_hash: "bytea" = &'i [u8],
+}
+
+/// Columns of an attempt.
+const ATTEMPT: [&str; 6] = ["position", "pair", "stage", "worker", "ms", "at"];
+
+/// Advances jobs whose lease is valid, and stores their results, metrics, attempts, input versions and counters. Returns
+/// the advanced jobs. `job.status + 0` keeps the planner from the index of leases, which contains all leases that ended
+/// while a snapshot is held.
+static STORE: LazyLock<String> = LazyLock::new(|| {
+    let jobs = ArrayParameters {
+        columns: JobRows::COLUMNS,
+        first: 1,
+    };
+    let results = ArrayParameters {
+        columns: ResultRows::COLUMNS,
+        first: jobs.end(),
+    };
+    let metrics = ArrayParameters {
+        columns: MetricRows::COLUMNS,
+        first: results.end(),
+    };
+    let is_advanced = "row.position = ANY (ARRAY(SELECT position FROM advanced))";
+    format!(
+        "
+WITH item AS (
+    SELECT * FROM {jobs} WITH ORDINALITY AS item ({job_names}, position)),
+advanced AS (
+    UPDATE job SET stage = item.next, status = item.status,
+        worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
+        attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
+        dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
+            SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END
+    FROM item
+    WHERE job.pair = item.pair AND job.worker = item.worker AND job.token = item.token AND job.status + 0 = 1
+        AND job.stage = item.stage AND EXISTS (
+            SELECT 1 FROM worker AS w
+            WHERE w.id = item.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
+    RETURNING item.*),
+result AS (
+    INSERT INTO stage_result (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files,
+        result_hash, ms, at)
+    SELECT pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at
+    FROM {results} AS row ({result_names}) WHERE is_last AND {is_advanced}
+    ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
+        print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome,
+        files = excluded.files, result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker,
+        at = excluded.at),
+attempted AS (
+    INSERT INTO attempt (pair, stage, worker, ms, at)
+    SELECT pair, stage, worker, ms, at FROM {attempts} AS row ({attempt_names}) WHERE {is_advanced}),
+removed AS (
+    DELETE FROM metric_result AS old USING advanced
+    WHERE old.pair = advanced.pair AND old.metric <> ALL (string_to_array(advanced.metrics, ','))),
+metric AS (
+    INSERT INTO metric_result ({metric_columns})
+    SELECT {metric_columns} FROM {metrics} AS row ({metric_names}) WHERE {is_advanced}
+    ON CONFLICT (pair, metric) DO UPDATE SET {set_metrics}),
+unfailed AS (
+    DELETE FROM failure USING advanced WHERE failure.pair = advanced.pair AND advanced.has_failure),
+input AS (
+    UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash),
+        mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat), print_hash = coalesce(new.print_hash, pair.print_hash),
+        print_stat = coalesce(new.print_stat, pair.print_stat)
+    FROM advanced AS new
+    WHERE pair.id = new.pair AND (new.mesh_hash <> coalesce(pair.mesh_hash, '') OR new.mesh_stat <> coalesce(pair.mesh_stat, '')
+        OR new.print_hash <> coalesce(pair.print_hash, '') OR new.print_stat <> coalesce(pair.print_stat, ''))),
+counted AS (
+    INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+    SELECT pg_backend_pid() % 256, moved.stage, moved.status, moved.fingerprint, sum(moved.n)
+    FROM advanced AS a CROSS JOIN LATERAL (VALUES
+        (a.stage, 1, a.counted_fingerprint, -1), (a.next, a.status, a.fingerprint, 1)) AS moved (stage, status, fingerprint, n)
+    GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
+    ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
+SELECT pair, token FROM advanced",
+        jobs = jobs.unnest(),
+        job_names = jobs.names(),
+        results = results.unnest(),
+        result_names = results.names(),
+        attempts = results.unnest_of(&ATTEMPT),
+        attempt_names = ATTEMPT.join(", "),
+        metrics = metrics.unnest(),
+        metric_names = metrics.names(),
+        metric_columns = metric_columns().join(", "),
+        set_metrics = metric_columns()
+            .iter()
+            .map(|column| format!("{column} = excluded.{column}"))
+            .collect::<Vec<_>>()
+            .join(", "),
+    )
+});
+
+/// Returns the columns of the table `metric_result`.
+fn metric_columns() -> Vec<&'static str> {
+    let names = MetricRows::COLUMNS.iter().map(|(name, _)| *name);
+    names.filter(|name| *name != "position").collect()
+}
+
+/// Stores finished stages of several jobs. Jobs without a valid lease are skipped, with all their results. Returns the
+/// other jobs.
+///
+/// # Errors
+/// Returns an error if a database operation fails. Then nothing is stored.
+pub(crate) async fn store<'i>(
+    conn: &mut PgConnection,
+    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
+) -> Result<Vec<FencedRow>> {
+    let (mut jobs, mut results, mut metrics) = (
+        JobRows::default(),
+        ResultRows::default(),
+        MetricRows::default(),
+    );
+    for checkpoint in checkpoints {
+        let Some(job) = AdvancedJob::of(checkpoint) else {
+            continue;
+        };
+        let position = jobs.pair.len() as i64 + 1;
+        let (lease, stages) = checkpoint;
+        jobs.push(job_row(job, checkpoint));
+        for (at, one) in stages.iter().enumerate() {
+            failpoint::hit(one.stage, Point::Recorded, None);
+            let is_last = !stages[at + 1..]
+                .iter()
+                .any(|later| later.stage == one.stage);
+            results.push(result_row(position, job, one, is_last)?);
+            let metrics_of_last = one.metrics.iter().filter(|_| is_last);
+            for metric in metrics_of_last {
+                metrics.push(metric_row(position, lease.pair.0, metric)?);
+            }
+        }
+    }
+    let mut arguments = PgArguments::default();
+    jobs.bind(&mut arguments)?;
+    results.bind(&mut arguments)?;
+    metrics.bind(&mut arguments)?;
+    // Constants only.
+    let query = sqlx::query_with(AssertSqlSafe(STORE.as_str()), arguments);
+    let rows = limited(query.fetch_all(conn)).await?.into_iter();
+    rows.map(|row| FencedRow::from_row(&Row::Postgres(row)))
+        .collect()
+}
+
+fn job_row<'i>(job: AdvancedJob, (lease, stages): &'i LeasedCheckpoints) -> JobRow<'i> {
+    let mut metrics = stages.iter().rev().map(|one| &one.metrics);
+    let metrics = metrics.find(|metrics| !metrics.is_empty());
+    let names = |metrics: &Vec<MetricResult>| {
+        let names = metrics.iter().map(|metric| metric.outcome.metric.name());
+        names.collect::<Vec<_>>().join(",")
+    };
+    // The last stage with inputs also lists the inputs of all earlier stages.
+    let mut inputs = stages.iter().rev().map(|one| &one.inputs);
+    let inputs = inputs.find(|inputs| !inputs.is_empty());
+    let mesh = inputs.and_then(|inputs| inputs.mesh.as_ref());
+    let print = inputs.and_then(|inputs| inputs.print.as_ref());
+    let hash = |version: &'i InputVersion| version.hash.as_bytes().as_slice();
+    JobRow {
+        pair: job.pair,
+        worker: job.worker,
+        token: job.token,
+        stage: job.stage,
+        counted_fingerprint: lease.counter_key().fingerprint,
+        next: job.next,
+        status: job.status,
+        fingerprint: job.fingerprint,
+        first: job.first,
+        mixed: job.mixed,
+        low_confidence: job.low_confidence,
+        deadline: job.deadline,
+        alive_since: job.alive_since,
+        has_failure: !lease.cleared,
+        metrics: metrics.map(names),
+        mesh_hash: mesh.map(hash),
+        mesh_stat: mesh.map(|version| version.stat.as_str()),
+        print_hash: print.map(hash),
+        print_stat: print.map(|version| version.stat.as_str()),
+    }
+}
+
+fn result_row(
+    position: i64,
+    job: AdvancedJob,
+    one: &StageCheckpoint,
+    is_last: bool,
+) -> Result<ResultRow<'_>> {
+    let print_hash = one.print_hash.as_ref();
+    Ok(ResultRow {
+        position,
+        pair: job.pair,
+        stage: one.stage.index() as i64,
+        worker: job.worker,
+        fingerprint: one.fingerprint.0,
+        mesh_hash: one.mesh_hash.as_bytes(),
+        print_hash: print_hash.map(|hash| hash.as_bytes().as_slice()),
+        attributes: &one.attributes,
+        outcome: &one.outcome,
+        files: serde_json::to_string(&one.files)?,
+        result_hash: one.result_hash.as_bytes(),
+        ms: one.ms as i64,
+        at: one.at,
+        is_last,
+    })
+}
+
+fn metric_row(position: i64, pair: i64, result: &MetricResult) -> Result<MetricRow<'_>> {
+    let outcome = &result.outcome;
+    let scores = outcome.scores;
+    Ok(MetricRow {
+        position,
+        pair,
+        metric: outcome.metric.name(),
+        threshold_level: outcome.threshold_level.into(),
+        threshold_depth: outcome.threshold_depth,
+        print_from_depth: serde_json::to_string(&outcome.print_from_depth)?,
+        angle_deg: outcome.angle_deg,
+        scale: outcome.scale,
+        shift_x_px: outcome.shift_px[0],
+        shift_y_px: outcome.shift_px[1],
+        ssim: scores.ssim,
+        nl_ssim: scores.nl_ssim,
+        iou: scores.iou,
+        iou_box: scores.iou_box,
+        dice: scores.dice,
+        density_print: scores.density_print,
+        density_depth: scores.density_depth,
+        disagreements: outcome.disagreement.pieces.into(),
+        missing_ink: outcome.disagreement.missing_ink,
+        missing_wood: outcome.disagreement.missing_wood,
+        margin: outcome.margin,
+        confidence: outcome.confidence,
+        at_bound: outcome.at_bound.into(),
+        result_hash: result.result_hash.as_bytes(),
+    })
+}
