@@ -24,13 +24,13 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 
 ON CONFLICT (pair) DO NOTHING";
 
 /// Gives retired pairs of these names their jobs back. A job whose pair changed meanwhile is stale, so it is dirty. A
-/// pair stays quarantined if its failure is stored.
+/// pair stays quarantined if its failure is stored. The first condition saves looking up all names.
 const RESTORE: &str = "
 INSERT INTO job (pair, stage, status, token, fingerprint, dirty, low_confidence)
 SELECT r.pair, r.stage, CASE WHEN r.stage = 4 THEN 3 WHEN r.is_quarantined = 1 AND f.pair IS NOT NULL THEN 4 ELSE 0 END,
     r.token + 1, r.fingerprint, 1, r.low_confidence
 FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair LEFT JOIN failure AS f ON f.pair = r.pair
-WHERE p.name IN (SELECT atom FROM json_each(?1))
+WHERE EXISTS (SELECT 1 FROM retired_pair) AND p.name IN (SELECT atom FROM json_each(?1))
 RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint";
 
 const CLEAR: &str = "

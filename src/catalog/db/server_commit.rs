@@ -27,15 +27,14 @@ pub(crate) async fn commit(
         if !batch.heartbeats.is_empty() {
             state.claim_start.begin_again();
         }
-        let failed = batch.failures.items().map(|item| &item.0);
-        for lease in batch.releases.items().chain(failed) {
-            // A failed pair may be ready again at once only if it must run exclusively.
+        let failed = || batch.failures.items().map(|item| &item.0);
+        for lease in batch.releases.items().chain(failed()) {
             state.leases.remove(lease);
         }
         for lease in batch.releases.items() {
             state.claim_start.note_release(lease);
         }
-        note_exclusive(batch.failures.items().map(|item| &item.0), state);
+        note_exclusive(failed(), state);
     }
     if !batch.checkpoints.is_empty() {
         let checkpoints: Vec<_> = batch.checkpoints.items().map(|item| &**item).collect();

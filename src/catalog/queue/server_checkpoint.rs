@@ -184,6 +184,12 @@ SELECT pair, token FROM advanced",
     )
 });
 
+/// Returns the statement that stores checkpoints.
+#[cfg(test)]
+pub(crate) fn text() -> String {
+    STORE.clone()
+}
+
 /// Returns the columns of the table `metric_result`.
 fn metric_columns() -> Vec<&'static str> {
     let names = MetricRows::COLUMNS.iter().map(|(name, _)| *name);

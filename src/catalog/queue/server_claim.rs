@@ -109,6 +109,20 @@ const CLAIM_BEHIND: &str = claim!(
         SELECT pair FROM behind UNION ALL SELECT pair FROM anywhere"
 );
 
+/// The statements of claims.
+#[cfg(test)]
+pub(crate) const TEXTS: [&str; 5] = [
+    CLAIM,
+    CLAIM_AMONG,
+    CLAIM_BEHIND,
+    CLAIM_EXCLUSIVE,
+    CLAIM_AMONG_EXCLUSIVE,
+];
+
+/// The statements that read the leases of the host.
+#[cfg(test)]
+pub(crate) const EXCLUSIVE: [&str; 2] = [CLAIM_EXCLUSIVE, CLAIM_AMONG_EXCLUSIVE];
+
 /// Where a claim on a server begins: behind this pair among those with the same next stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Behind {

@@ -222,18 +222,39 @@ pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]
     let Some(first) = rows.iter().min() else {
         return Ok(());
     };
-    let statements = table.statements();
+    let listed = query(table.statements().listed).bind(json_array(rows.iter().copied()));
+    let listed = listed.fetch_all(&mut *conn).await?;
     let mut before: Option<i64> = None;
-    if statements.is_chained {
+    if table.statements().is_chained {
         let last = query_scalar(LAST).bind(table.code()).bind(*first);
         before = last.fetch_optional(&mut *conn).await?;
     }
-    let listed = query(statements.listed).bind(json_array(rows.iter().copied()));
-    let mut checksums = Vec::new();
-    for row in &listed.fetch_all(&mut *conn).await? {
+    store_following(conn, table, &listed, before).await
+}
+
+/// Stores the checksums of new or changed rows of a table without chained checksums. The rows are those that a
+/// statement with the columns of [`Statements::listed`] returned.
+pub(crate) async fn store_of_rows(
+    conn: &mut Conn,
+    table: ChecksummedTable,
+    rows: &[Row],
+) -> Result<()> {
+    store_following(conn, table, rows, None).await
+}
+
+/// Stores the checksums of rows that follow a row with the checksum `before`.
+async fn store_following(
+    conn: &mut Conn,
+    table: ChecksummedTable,
+    rows: &[Row],
+    mut before: Option<i64>,
+) -> Result<()> {
+    let is_chained = table.statements().is_chained;
+    let mut checksums = Vec::with_capacity(rows.len());
+    for row in rows {
         let value = checksum(table, row, before)?;
         checksums.push(json!([row.get::<i64>(0)?, value]));
-        before = statements.is_chained.then_some(value);
+        before = is_chained.then_some(value);
     }
     let store = query(if table.is_append_only() {
         APPEND
@@ -241,8 +262,7 @@ pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]
         STORE.into()
     });
     let store = store.bind(table.code());
-    store.bind(json_array(checksums)).execute(conn).await?;
-    Ok(())
+    store.bind(json_array(checksums)).execute(conn).await
 }
 
 /// Returns the first 64 bits of a hash. The hash covers the table, the row's number, the previous checksum, and the

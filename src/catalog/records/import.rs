@@ -7,6 +7,7 @@ use tokio::sync::mpsc;
 
 use crate::catalog::blocks::retired;
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
@@ -58,27 +59,49 @@ pub(crate) const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))";
 
-/// Adds new pairs and updates existing ones. If a path changed, clears the `stat` of that file, so that the next run
-/// reads the file again.
-const UPSERT: &str = "
+/// Builds the text that adds new pairs and updates existing ones, from its items. If a path changed, clears the `stat` of
+/// that file, so that the next run reads the file again. Returns the columns that a checksum needs.
+macro_rules! upsert {
+    ($items:literal) => {
+        concat!(
+            "
 INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior, attributes, imported)
-SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', CAST(value ->> 'face_down' AS bigint),
-    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'prior', value ->> 'attributes', ?2
-FROM json_each(?1) WHERE true
+",
+            $items,
+            "
 ON CONFLICT (name) DO UPDATE SET
     mesh_stat = CASE WHEN pair.mesh_path = excluded.mesh_path THEN pair.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
     print_stat = CASE WHEN pair.print_path = excluded.print_path THEN pair.print_stat ELSE '' END, print_path = excluded.print_path,
     unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
     block = excluded.block, meta = excluded.meta, prior = excluded.prior, attributes = excluded.attributes
-RETURNING id";
+RETURNING id, NULL, NULL, NULL, name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior,
+    attributes, imported"
+        )
+    };
+}
+
+/// Adds and updates pairs. PostgreSQL would parse an item once for each `->>`.
+const UPSERT: Sql = Sql::pair(
+    upsert!(
+        "SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
+    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'prior', value ->> 'attributes', ?2
+FROM json_each(?1) WHERE true"
+    ),
+    upsert!(
+        "SELECT name, mesh, print, unit, face_down, character, block, meta, prior, attributes, ?2
+FROM json_to_recordset(CAST(?1 AS json)) AS item (name text, mesh text, print text, unit text, face_down bigint,
+    character text, block text, meta text, prior text, attributes text)"
+    ),
+);
 
 /// Updates the statistics of PostgreSQL's planner.
 const ANALYZE: &str = "ANALYZE pair, job";
 
+/// Adds jobs for those of some pairs that have none.
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
-SELECT id, 0, 0 FROM pair WHERE name IN (SELECT atom FROM json_each(?1))
-    AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
+SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1) WHERE true
+ON CONFLICT (pair) DO NOTHING";
 
 impl Catalog {
     /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
@@ -195,11 +218,12 @@ pub(crate) async fn import_chunk(
         .enumerate()
         .filter(|(at, row)| last[&row.name] == *at);
     let items = json_array(rows.map(|(_, row)| item(row)));
-    let upsert = query_scalar(UPSERT).bind(items).bind(now);
-    let rows: Vec<i64> = upsert.fetch_all(&mut *conn).await?;
-    checksums::store(conn, ChecksummedTable::Pair, &rows).await?;
-    query(NEW_JOBS).bind(names).execute(conn).await?;
-    Ok(())
+    let upsert = query(UPSERT).bind(items).bind(now);
+    let rows = upsert.fetch_all(&mut *conn).await?;
+    checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
+    let ids: Result<Vec<i64>> = rows.iter().map(|row| row.get(0)).collect();
+    let ids = json_array(ids?);
+    query(NEW_JOBS).bind(ids).execute(conn).await
 }
 
 fn item(row: &ImportRow) -> Value {

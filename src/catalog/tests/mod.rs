@@ -13,6 +13,7 @@ mod model;
 mod place;
 mod protocol;
 mod schema;
+mod server_plans;
 mod staleness;
 mod state_machine;
 mod together;
