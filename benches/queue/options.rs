@@ -33,6 +33,15 @@ pub(super) struct Options {
     /// Measure claims with and without a snapshot that another session holds, instead of several loads
     #[arg(long, requires = "postgres")]
     pub(super) hold_snapshot: bool,
+    /// Connections with `--hold-snapshot`, each with a worker
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub(super) connections: usize,
+    /// Seconds of a line of `--hold-snapshot`; without the snapshot at most 60
+    #[arg(long, value_name = "N", default_value_t = 36)]
+    pub(super) seconds: u64,
+    /// With `--hold-snapshot`, measure only loads that store results
+    #[arg(long, requires = "hold_snapshot")]
+    pub(super) results_only: bool,
     /// Pairs of the demo that are run with real stages, for the catalog's share; 0 for none [default: 12, and none
     /// under `cargo test`]
     #[arg(long, value_name = "N")]
