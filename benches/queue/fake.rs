@@ -21,8 +21,8 @@ pub(super) const ATTRIBUTES: &str = r#"{"scanned_face_down":null,"unit":null}"#;
 pub(super) struct Fake {
     pub(super) worker: WorkerId,
     fingerprints: FingerprintIds,
-    mesh: InputVersion,
-    print: InputVersion,
+    /// A checkpoint of each stage, the same for all pairs.
+    checkpoints: Vec<StageCheckpoint>,
 }
 
 /// Returns the settings of a worker that works on no blocks.
@@ -46,13 +46,13 @@ impl Fake {
             pid: std::process::id(),
             boot_id: None,
         };
+        let inputs = [input(project, "mesh.stl")?, input(project, "print.png")?];
         Ok(Self {
             worker: catalog
                 .register_worker(info, settings(fingerprints), 1)
                 .await?,
             fingerprints,
-            mesh: input(project, "mesh.stl")?,
-            print: input(project, "print.png")?,
+            checkpoints: checkpoints(fingerprints, &inputs),
         })
     }
 
@@ -66,11 +66,11 @@ impl Fake {
             hash: ContentHash::of(name.as_bytes()),
             stat: "1 2 3".to_owned(),
         };
+        let inputs = [version("mesh.stl"), version("print.png")];
         let fake = Self {
             worker: WorkerId(0),
             fingerprints,
-            mesh: version("mesh.stl"),
-            print: version("print.png"),
+            checkpoints: checkpoints(fingerprints, &inputs),
         };
         fake.another_worker(catalog).await
     }
@@ -122,7 +122,17 @@ impl Fake {
 
     /// Returns the checkpoint of a stage.
     pub(super) fn done(&self, stage: Stage) -> StageCheckpoint {
-        let files = ArtifactSet::new();
+        self.checkpoints[stage.index()].clone()
+    }
+}
+
+/// Returns a checkpoint of each stage, from the versions of mesh and print.
+fn checkpoints(
+    fingerprints: FingerprintIds,
+    [mesh, print]: &[InputVersion; 2],
+) -> Vec<StageCheckpoint> {
+    let files = ArtifactSet::new();
+    let checkpoint = |stage: Stage| {
         let last = stage == Stage::Register;
         let metrics = if last { metrics() } else { Vec::new() };
         let outcome = if last {
@@ -136,34 +146,33 @@ impl Fake {
         };
         let outcome = outcome.to_string();
         let reads_print = stage >= Stage::Normalize;
+        // A run stores the versions of both files with the first stage.
+        let inputs = if stage == Stage::Fit {
+            InputVersions {
+                mesh: Some(mesh.clone()),
+                print: Some(print.clone()),
+            }
+        } else {
+            InputVersions::default()
+        };
         StageCheckpoint {
             stage,
-            fingerprint: self.fingerprints.of(stage),
-            mesh_hash: self.mesh.hash,
-            print_hash: reads_print.then_some(self.print.hash),
+            fingerprint: fingerprints.of(stage),
+            mesh_hash: mesh.hash,
+            print_hash: reads_print.then_some(print.hash),
             attributes: ATTRIBUTES.to_owned(),
             result_hash: result_hash(&outcome, &files),
             outcome,
-            files,
+            files: files.clone(),
             metrics,
-            inputs: self.inputs(stage),
+            inputs,
             ms: 1,
             at: 1,
             next_deadline: 2_000,
             alive_since: 0,
         }
-    }
-
-    /// Returns the input files that a stage is the first to read. A run stores their versions with the stage.
-    fn inputs(&self, stage: Stage) -> InputVersions {
-        if stage > Stage::Fit {
-            return InputVersions::default();
-        }
-        InputVersions {
-            mesh: Some(self.mesh.clone()),
-            print: Some(self.print.clone()),
-        }
-    }
+    };
+    Stage::ALL.map(checkpoint).to_vec()
 }
 
 fn input(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
