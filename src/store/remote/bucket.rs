@@ -5,14 +5,19 @@
 
 use std::future::Future;
 use std::io::Write;
-use std::sync::{Arc, mpsc};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
 use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
-use super::client::{LazyClient, runtime};
+use super::client::{LazyClient, runtime, time_scale};
+
+/// While a request waits for its reply, a warning says so at this interval.
+const NOTICE_EVERY: Duration = Duration::from_secs(20);
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -338,8 +343,16 @@ impl Bucket {
         key: &str,
         receiver: &mpsc::Receiver<Result<T, BucketError>>,
     ) -> Result<T, BucketError> {
-        let ended = receiver.recv();
-        ended.unwrap_or_else(|_| Err(self.unavailable(key, "the request ended without a result")))
+        let begun = Instant::now();
+        loop {
+            match receiver.recv_timeout(NOTICE_EVERY / time_scale()) {
+                Ok(reply) => return reply,
+                Err(RecvTimeoutError::Timeout) => warn_of_wait(&self.address_of(key), begun),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(self.unavailable(key, "the request ended without a result"));
+                }
+            }
+        }
     }
 
     fn unavailable(&self, key: &str, reason: &str) -> BucketError {
@@ -348,6 +361,19 @@ impl Bucket {
             reason: reason.to_owned(),
         }
     }
+}
+
+/// Warns that a request has had no reply since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
+fn warn_of_wait(address: &str, begun: Instant) {
+    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let interval = NOTICE_EVERY / time_scale();
+    if last.is_some_and(|last| last.elapsed() < interval) {
+        return;
+    }
+    *last = Some(Instant::now());
+    let seconds = begun.elapsed().as_secs();
+    tracing::warn!("{address}: no reply of the object store for {seconds} s; waiting");
 }
 
 /// Returns the key of an object relative to a folder, or `None` if it is not below the folder.

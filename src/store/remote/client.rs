@@ -8,6 +8,8 @@ use object_store::aws::AmazonS3Builder;
 use object_store::{BackoffConfig, ClientOptions, ObjectStore, RetryConfig};
 use tokio::runtime::{Builder, Runtime};
 
+use crate::failpoint;
+
 /// Longest time to open a connection.
 const CONNECT: Duration = Duration::from_secs(10);
 /// Longest time without a byte of a reply.
@@ -18,6 +20,13 @@ const GIVE_UP: Duration = Duration::from_mins(4);
 const GIVE_UP_FIRST: Duration = Duration::from_secs(5);
 /// Threads that send requests.
 const THREADS: usize = 2;
+
+/// Returns the divisor of time limits in tests.
+pub(super) fn time_scale() -> u32 {
+    static SCALE: LazyLock<u32> =
+        LazyLock::new(|| failpoint::time_scale("MOCBAN_STORE_TIME_SCALE"));
+    *SCALE
+}
 
 static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
     Builder::new_multi_thread()
@@ -62,7 +71,8 @@ impl LazyClient {
     /// # Errors
     /// Returns the reason if a variable of the environment is missing or has a wrong value.
     pub(super) fn get(&self) -> Result<Arc<dyn ObjectStore>, &str> {
-        let made = self.made.get_or_init(|| connect(&self.bucket, GIVE_UP));
+        let give_up = GIVE_UP / time_scale();
+        let made = self.made.get_or_init(|| connect(&self.bucket, give_up));
         made.as_ref().map(Arc::clone).map_err(String::as_str)
     }
 
