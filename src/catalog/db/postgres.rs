@@ -21,7 +21,7 @@ const POOLER_ROUNDS: u32 = 3;
 /// Longest time for one connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Settings of every connection. They are statements instead of parameters of the connection, because PgBouncer refuses
+/// Settings of every connection. They are statements instead of parameters of the connection, because `PgBouncer` refuses
 /// such parameters or ignores them.
 const SETTINGS: &str = "SET standard_conforming_strings = on;
 SET default_transaction_isolation = 'read committed';

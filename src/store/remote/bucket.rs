@@ -5,19 +5,16 @@
 
 use std::future::Future;
 use std::io::Write;
+use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
 use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
-use super::client::{LazyClient, runtime, time_scale};
-
-/// While a request waits for its reply, a warning says so at this interval.
-const NOTICE_EVERY: Duration = Duration::from_secs(20);
+use super::client::{LazyClient, notice_interval, runtime, warn_of_wait};
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -345,7 +342,7 @@ impl Bucket {
     ) -> Result<T, BucketError> {
         let begun = Instant::now();
         loop {
-            match receiver.recv_timeout(NOTICE_EVERY / time_scale()) {
+            match receiver.recv_timeout(notice_interval()) {
                 Ok(reply) => return reply,
                 Err(RecvTimeoutError::Timeout) => warn_of_wait(&self.address_of(key), begun),
                 Err(RecvTimeoutError::Disconnected) => {
@@ -361,19 +358,6 @@ impl Bucket {
             reason: reason.to_owned(),
         }
     }
-}
-
-/// Warns that a request has had no reply since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
-fn warn_of_wait(address: &str, begun: Instant) {
-    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
-    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
-    let interval = NOTICE_EVERY / time_scale();
-    if last.is_some_and(|last| last.elapsed() < interval) {
-        return;
-    }
-    *last = Some(Instant::now());
-    let seconds = begun.elapsed().as_secs();
-    tracing::warn!("{address}: no reply of the object store for {seconds} s; waiting");
 }
 
 /// Returns the key of an object relative to a folder, or `None` if it is not below the folder.
