@@ -11,6 +11,9 @@
 //!   It must name a point on a thread for blocking code: `computed`, `written` or `synced`.
 //! - `MOCBAN_PANIC_AT` panics. It can name the same points as `MOCBAN_HOLD_AT`.
 //!
+//! `MOCBAN_TIME_SCALE=N` divides intervals of heartbeats, leases and recovery by N, and `MOCBAN_STORE_TIME_SCALE=N` the time
+//! limits of an object store.
+//!
 //! Only builds with debug assertions read these variables.
 
 use std::fmt::Display;
@@ -57,6 +60,14 @@ pub(crate) fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>)
 /// Does nothing in a release build.
 #[cfg(not(debug_assertions))]
 pub(crate) fn hit(_stage: impl Display, _point: Point, _name: Option<&dyn Display>) {}
+
+/// Returns the divisor of time limits that a variable of the environment sets for tests, or 1.
+pub(crate) fn time_scale(variable: &str) -> u32 {
+    let scale = cfg!(debug_assertions)
+        .then(|| std::env::var(variable).ok()?.parse().ok())
+        .flatten();
+    scale.unwrap_or(1).max(1)
+}
 
 /// The failpoints that the environment configures.
 #[cfg(debug_assertions)]

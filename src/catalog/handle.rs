@@ -90,7 +90,7 @@ impl Catalog {
     ) -> Result<Self> {
         let address = PostgresAddress::parse(url)?;
         let conn = address.connect(may_create).await?;
-        let readers = ReaderPool::Postgres(address.reader_pool().await?);
+        let readers = ReaderPool::Postgres(address.reader_pool(false).await?);
         let retry_wait: Arc<RetryWait> = Arc::default();
         let writer = WriteConnection::to_server(conn, address, Arc::clone(&retry_wait));
         Ok(Self::start(readers, writer, delay, retry_wait))
@@ -103,7 +103,7 @@ impl Catalog {
     pub async fn connect_read_only(url: &str) -> Result<Self> {
         let address = PostgresAddress::parse(url)?;
         Ok(Self {
-            readers: ReaderPool::Postgres(address.reader_pool().await?),
+            readers: ReaderPool::Postgres(address.reader_pool(true).await?),
             inbox: None,
             delay: CommitDelay::new(),
             retry_wait: Arc::default(),

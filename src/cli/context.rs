@@ -3,6 +3,7 @@
 use std::ffi::OsString;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
@@ -32,6 +33,8 @@ pub(super) struct Context {
     /// Colours of stderr.
     pub(super) stderr: Palette,
     program: String,
+    /// The settings, once they were loaded without an error.
+    settings: OnceLock<Loaded>,
 }
 
 impl Context {
@@ -43,22 +46,30 @@ impl Context {
             stderr: Palette::choose(global.color, std::io::stderr().is_terminal()),
             program: program_name(program),
             global,
+            settings: OnceLock::new(),
         }
     }
 
     /// Returns the same context for another project directory.
     pub(super) fn at(&self, dir: &Path) -> Self {
-        let mut context = self.clone();
+        let mut context = self.with_settings_unread();
         context.global.directory = Some(dir.to_owned());
         context
     }
 
     /// Returns a copy without `--config` and `--set`, for use after their settings were saved in the project's file.
     pub(super) fn without_setting_flags(&self) -> Self {
-        let mut context = self.clone();
+        let mut context = self.with_settings_unread();
         context.global.config = None;
         context.global.set.clear();
         context
+    }
+
+    fn with_settings_unread(&self) -> Self {
+        Self {
+            settings: OnceLock::new(),
+            ..self.clone()
+        }
     }
 
     /// Returns the project's directory, which need not exist.
@@ -222,8 +233,17 @@ impl Context {
         }
     }
 
-    /// Loads the settings in effect for this project.
+    /// Returns the settings in effect for this project. The file is read once, so that all parts of a command have the
+    /// same settings.
     pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
+        if let Some(settings) = self.settings.get() {
+            return Ok(settings.clone());
+        }
+        let settings = self.load_settings()?;
+        Ok(self.settings.get_or_init(|| settings).clone())
+    }
+
+    fn load_settings(&self) -> anyhow::Result<Loaded> {
         let base = match &self.global.config {
             Some(name) => name
                 .parse()

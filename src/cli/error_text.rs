@@ -54,9 +54,11 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     match cause.downcast_ref()? {
         CatalogError::Missing(_) => Some(ExitCode::NoProject),
         CatalogError::NetworkFileSystem { .. }
+        | CatalogError::TransactionPooler(_)
         | CatalogError::MayNotCreateRoles(_)
         | CatalogError::MayNotReview(_)
         | CatalogError::OtherReviewer { .. } => Some(ExitCode::Usage),
+        error if error.is_of_pooler() => Some(ExitCode::Usage),
         error if error.is_of_server() && error.kind() == Some(CatalogErrorKind::ReadOnly) => {
             Some(ExitCode::Usage)
         }
@@ -202,6 +204,9 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
             CatalogError::NotWritable(path.into()).to_string()
         }
+        Some(CatalogErrorKind::Full) if error.is_of_server() => format!(
+            "{path} cannot grow because the disk of the database server is full; {FREE_SPACE}"
+        ),
         Some(CatalogErrorKind::Full) => {
             format!("{path} cannot grow because the disk is full; {FREE_SPACE}")
         }

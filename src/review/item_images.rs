@@ -11,7 +11,7 @@ use tokio::sync::{Mutex, OnceCell, Semaphore};
 
 use super::item::ReviewItem;
 use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{Affine2, Stage};
+use crate::domain::{Affine2, ContentHash, PrintFromMesh, Stage};
 use crate::export::pictures::{PrintView, shaded};
 use crate::export::scan_view::ScanView;
 use crate::export::{InputFileLimits, PictureError, SourcePrint, SourcePrintError};
@@ -60,6 +60,9 @@ pub(super) enum ImageError {
     /// The pair has a new result.
     #[error("this pair has a new result; reload the page")]
     Gone,
+    /// A run computes the pair again, so some of its results are missing.
+    #[error("this pair is being computed again; try again when its new result is stored")]
+    BeingComputed,
     /// The scan cannot be shown in 3D.
     #[error(transparent)]
     Scan(#[from] PictureError),
@@ -82,13 +85,7 @@ impl AlignmentInputs {
     /// # Errors
     /// Returns an error if an artifact cannot be read, or if the pair has a new result.
     fn read(aligned: &PairArtifacts<'_>, item: &ReviewItem) -> Result<Self, ImageError> {
-        let hashes = (
-            aligned.stage(Stage::Depth)?.result_hash,
-            aligned.stage(Stage::Normalize)?.print_hash,
-        );
-        if hashes != (item.view.depth_hash, Some(item.view.print_hash)) {
-            return Err(ImageError::Gone);
-        }
+        require_current(aligned, item)?;
         let depth = aligned.depth()?;
         Ok(Self {
             canvas_mask: aligned.canvas_print_mask()?,
@@ -99,7 +96,7 @@ impl AlignmentInputs {
     }
 
     /// Computes the overlap of stroke and ink mask as results are scored, with the relief placed by `print_from_depth`.
-    pub(super) fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
+    fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
         let map = self.canvas_from_print.after(print_from_depth);
         let (width, height) = (self.canvas_mask.width(), self.canvas_mask.height());
         warp_mask(&self.strokes, &map, width, height).overlap(&self.canvas_mask)
@@ -110,6 +107,30 @@ impl AlignmentInputs {
         let slope = self.depth.scale.height_per_level / self.depth.scale.mesh_unit_per_px;
         png_rgb8(&shaded(&self.depth.levels, slope))
     }
+}
+
+/// Checks that a pair still has the depth map and the print that an item shows.
+///
+/// # Errors
+/// Returns an error if it has others.
+fn require_current(aligned: &PairArtifacts<'_>, item: &ReviewItem) -> Result<(), ImageError> {
+    let hashes = (
+        aligned.stage(Stage::Depth)?.result_hash,
+        aligned.stage(Stage::Normalize)?.print_hash,
+    );
+    if hashes != (item.view.depth_hash, Some(item.view.print_hash)) {
+        return Err(ImageError::Gone);
+    }
+    Ok(())
+}
+
+/// The relief of an item on its print, as a reviewer placed it.
+#[derive(Debug)]
+pub(super) struct PlacedRelief {
+    pub(super) scores: MaskOverlap,
+    pub(super) print_from_mesh: PrintFromMesh,
+    /// Hash of the mesh that the result was computed from.
+    pub(super) mesh_hash: ContentHash,
 }
 
 /// The encoded images of an item, and their frame.
@@ -307,12 +328,44 @@ impl ImageCache {
     ///
     /// # Errors
     /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
-    pub(super) async fn alignment_inputs(
+    async fn alignment_inputs(
         &self,
         item: &Arc<ReviewItem>,
     ) -> Result<AlignmentInputs, ImageError> {
         let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
             AlignmentInputs::read(&PairArtifacts::new(project, pair), item)
+        };
+        self.read(item, read).await
+    }
+
+    /// Checks that the pair of an item still has the result that the item shows.
+    ///
+    /// # Errors
+    /// Returns an error if the pair has a new result, or is being computed again.
+    pub(super) async fn require_current(&self, item: &Arc<ReviewItem>) -> Result<(), ImageError> {
+        let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
+            require_current(&PairArtifacts::new(project, pair), item)
+        };
+        self.read(item, read).await
+    }
+
+    /// Computes what is stored with a manual alignment that places the relief by `print_from_depth`.
+    ///
+    /// # Errors
+    /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
+    pub(super) async fn place(
+        &self,
+        item: &Arc<ReviewItem>,
+        print_from_depth: Affine2,
+    ) -> Result<PlacedRelief, ImageError> {
+        let read = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
+            let artifacts = PairArtifacts::new(project, pair);
+            let inputs = AlignmentInputs::read(&artifacts, item)?;
+            Ok(PlacedRelief {
+                scores: inputs.mask_overlap(&print_from_depth),
+                print_from_mesh: artifacts.print_from_mesh(&print_from_depth)?,
+                mesh_hash: artifacts.stage(Stage::Fit)?.mesh_hash,
+            })
         };
         self.read(item, read).await
     }
@@ -343,6 +396,9 @@ impl ImageCache {
         let permit = permit.map_err(|_closed| ImageError::Gone)?;
         let found = self.catalog.pair(&item.pair).await?;
         let pair = found.ok_or(ImageError::Gone)?.results;
+        if pair.next_stage.is_some() {
+            return Err(ImageError::BeingComputed);
+        }
         let (project, item) = (self.project.clone(), Arc::clone(item));
         tokio::task::spawn_blocking(move || {
             // The task itself holds the permit, because it continues even if the client leaves.

@@ -23,9 +23,9 @@ use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
 use crate::catalog::{CatalogError, ManualAlignment};
-use crate::domain::{PairName, ReviewOrder, Stage, one_line};
+use crate::domain::{PairName, ReviewOrder, one_line};
 use crate::local_server::{START, guard};
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use crate::report::pair_artifacts::PairArtifactsError;
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
@@ -250,6 +250,8 @@ async fn other_verdicts(
 /// Returns the initial state of the alignment editor.
 async fn alignment(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
+    // The images may be cached.
+    state.images.require_current(&item).await?;
     let images = state.images.of(&item).await?;
     let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
     let start = alignment_editor::start(&item, &images, history.alignment(&item));
@@ -289,27 +291,21 @@ async fn align(
     let item = served_item(&state, &body.item)?;
     let images = state.images.of(&item).await?;
     let print_from_depth = body.print_from_depth(&images)?;
-    let inputs = state.images.alignment_inputs(&item).await?;
-    let scores = inputs.mask_overlap(&print_from_depth);
-    let pair = state
-        .catalog
-        .pair(&item.pair)
-        .await?
-        .ok_or(ApiError::NoItem)?;
-    let artifacts = PairArtifacts::new(&state.project, &pair.results);
+    // One read of the results, because a run may store new ones at any time.
+    let placed = state.images.place(&item, print_from_depth).await?;
     let record = ManualAlignment {
         note: body.note()?,
         event: body.event,
         pair: item.pair.clone(),
         reviewer: state.options.queue.reviewer.clone(),
         print_from_depth,
-        print_from_mesh: artifacts.print_from_mesh(&print_from_depth)?,
-        mesh_hash: artifacts.stage(Stage::Fit)?.mesh_hash,
+        print_from_mesh: placed.print_from_mesh,
+        mesh_hash: placed.mesh_hash,
         print_hash: item.view.print_hash,
         depth_hash: item.view.depth_hash,
         seen: item.view.hash(),
-        iou: scores.iou,
-        dice: scores.dice,
+        iou: placed.scores.iou,
+        dice: placed.scores.dice,
     };
     let summary = json!(AlignmentSummary::of(&item, &record));
     let now = (state.options.now)();

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::catalog::{BlockFailureAction, FailureAction};
 use crate::domain::{BlockId, FailureClass, PairId, UnixMillis};
+use crate::failpoint;
 
 /// Attempts of a stage that fails to read or write.
 const IO_ATTEMPTS: u32 = 3;
@@ -99,10 +100,7 @@ impl Timing {
 
     /// Returns the intervals of this build. With debug assertions, `MOCBAN_TIME_SCALE=N` divides them by N for tests.
     pub(super) fn of_this_build() -> Self {
-        let scale = cfg!(debug_assertions)
-            .then(|| std::env::var("MOCBAN_TIME_SCALE").ok()?.parse().ok())
-            .flatten();
-        Self::DEFAULT.divided_by(scale.unwrap_or(1))
+        Self::DEFAULT.divided_by(failpoint::time_scale("MOCBAN_TIME_SCALE"))
     }
 
     fn divided_by(self, scale: u32) -> Self {

@@ -2,6 +2,7 @@
 //! files of a pair in one pack in an object store.
 
 use std::io;
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
@@ -18,6 +19,16 @@ use crate::store::{ArtifactError, NewArtifact};
 
 /// A pack waits this long for the next stages of its pair, so that a pair is usually one object.
 const PACK_WAIT: Duration = Duration::from_secs(2);
+
+/// Pause before an unavailable object store is tried again.
+const STORE_PAUSE: Duration = Duration::from_secs(1);
+
+/// An unavailable object store is waited for at least this long, also after a stage that took almost as long as it may.
+/// Much shorter than the time after a deadline when another process recovers the lease.
+const SHORTEST_STORE_WAIT: Duration = Duration::from_secs(10);
+
+/// Time after a stop request during which results are still stored in an object store.
+const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(5);
 
 /// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
 /// and `false` if an immediate stop left a stage unwritten.
@@ -89,13 +100,20 @@ async fn write_pack(
     }
     let (project, name) = (context.project.clone(), pair.clone());
     let last = batch[batch.len() - 1].stage;
-    let writing = move || {
-        failpoint::hit(last, Point::Written, Some(&name));
-        let locations = project.write_pack(&files)?;
-        failpoint::hit(last, Point::Synced, Some(&name));
-        Ok((files, locations))
+    let files = Arc::new(files);
+    let writing = {
+        let files = Arc::clone(&files);
+        move || {
+            failpoint::hit(last, Point::Written, Some(&name));
+            let locations = project.write_pack(&files)?;
+            failpoint::hit(last, Point::Synced, Some(&name));
+            Ok(locations)
+        }
     };
-    let Some((files, locations)) = finished(context, writing).await? else {
+    let computed = Duration::from_millis(batch.iter().map(|stage| stage.ms).sum());
+    let longest = context.stage_timeout.saturating_sub(computed);
+    let longest = longest.max(SHORTEST_STORE_WAIT);
+    let Some(locations) = stored_in_bucket(context, writing, longest).await? else {
         return Ok((Vec::new(), false));
     };
     let mut located = files.iter().zip(locations);
@@ -108,6 +126,49 @@ async fn write_pack(
     }
     let batch = batch.into_iter().map(|stage| with_times(context, stage));
     Ok((batch.collect(), true))
+}
+
+/// Runs `writing` on a thread for blocking calls, again and again while the object store is unavailable. Returns `None`
+/// if it is still unavailable after `longest`, before another process considers the lease overdue and blames the pair,
+/// or after a stop request.
+///
+/// # Errors
+/// Returns the error of `writing` unless the store is unavailable.
+async fn stored_in_bucket<T: Send + 'static>(
+    context: &RunContext,
+    writing: impl Fn() -> Result<T, ArtifactError> + Clone + Send + 'static,
+    longest: Duration,
+) -> Result<Option<T>, ArtifactError> {
+    let storing = async {
+        loop {
+            match run_blocking(writing.clone()).await {
+                Err(error) if error.is_unavailable() => {
+                    tracing::warn!("{error}; waiting for it to store results");
+                    tokio::time::sleep(STORE_PAUSE).await;
+                }
+                outcome => return outcome.map(Some),
+            }
+        }
+    };
+    let stopped = async {
+        context.stop.reached(StopLevel::Drain).await;
+        tokio::select! {
+            () = context.stop.reached(StopLevel::Now) => {}
+            () = tokio::time::sleep(UNAVAILABLE_AFTER_STOP) => {}
+        }
+    };
+    tokio::select! {
+        biased;
+        outcome = storing => outcome,
+        () = stopped => Ok(None),
+        () = tokio::time::sleep(longest) => {
+            let seconds = longest.as_secs();
+            tracing::warn!(
+                "the object store stored nothing for {seconds} s; the pair is released and computed again"
+            );
+            Ok(None)
+        }
+    }
 }
 
 /// Runs `writing` on a thread for blocking calls. Returns `None`, without waiting for the disk, if an immediate stop is

@@ -140,7 +140,7 @@ fn remove(path: &Path, aside: &Path, before: SystemTime) -> bool {
 #[cfg(test)]
 mod tests {
     use std::fs::File;
-    use std::time::{Duration, SystemTime};
+    use std::time::{Duration, Instant, SystemTime};
 
     use crate::store::remote::ProjectStorage;
     use crate::store::{NewArtifact, Project, ReferencedArtifacts, UnreferencedKind};
@@ -188,6 +188,16 @@ mod tests {
         }
     }
 
+    /// Waits for a condition: objects have the same time until the clock of the store advances.
+    #[track_caller]
+    fn until(mut is_true: impl FnMut() -> bool) {
+        let begun = Instant::now();
+        while !is_true() {
+            assert!(begun.elapsed() < Duration::from_secs(10), "never true");
+            std::thread::yield_now();
+        }
+    }
+
     #[test]
     fn packs_without_a_row_are_removed_when_they_are_old() {
         let dir = tempfile::tempdir().expect("a temporary directory");
@@ -216,10 +226,7 @@ mod tests {
         let unknown = (UnreferencedKind::UnknownFile, false);
         assert_eq!(collect(DAY), [(UnreferencedKind::Orphan, false), unknown]);
         let removed = (UnreferencedKind::Orphan, true);
-        while collect(Duration::ZERO) != [removed, unknown] {
-            // Both objects have the same time until the clock of the store advances.
-            std::thread::yield_now();
-        }
+        until(|| collect(Duration::ZERO) == [removed, unknown]);
         assert_eq!(project.read_artifact(&artifacts[0]).expect("kept"), b"same");
         assert!(bucket.stat("packs/notes.txt").is_ok());
     }
@@ -243,10 +250,7 @@ mod tests {
             seen
         };
         assert!(collect(false).is_empty());
-        while collect(true) != [true] {
-            // Both objects have the same time until the clock of the store advances.
-            std::thread::yield_now();
-        }
+        until(|| collect(true) == [true]);
         assert!(project.check_artifact(files[0].reference(), false).is_ok());
         let gone = files[1].reference().stored_path().expect("no pack");
         assert!(bucket.stat(&gone).is_err());

@@ -70,7 +70,8 @@ mod odd;
 mod one_pair;
 mod page;
 mod parsers;
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
+mod pooler;
 #[cfg(unix)]
 #[path = "../support/postgres_server.rs"]
 mod postgres_server;

@@ -2,8 +2,9 @@
 //! processes are killed.
 
 use std::fs::File;
+use std::io::{BufRead as _, BufReader, Lines};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, SystemTime};
 
@@ -13,7 +14,7 @@ use mocban::store::Project;
 
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::resume::project;
-use crate::s3_server::{Faults, S3Server, proxy};
+use crate::s3_server::{Faults, Outage, S3Server, proxy, proxy_with_outage};
 use crate::uninterrupted::{assert_same_files, files};
 
 const PAIRS: &str = "6";
@@ -153,6 +154,80 @@ fn a_store_that_loses_requests_and_killed_processes_change_no_result() {
         requests.disturbed.load(Ordering::Relaxed) > 5,
         "{requests:?}"
     );
+    remote.assert_same_results();
+}
+
+/// A run with a process of its own, whose object store is given up after a second.
+struct RunInOutage {
+    process: Child,
+    lines: Lines<BufReader<ChildStderr>>,
+}
+
+impl RunInOutage {
+    fn start(command: &mut Command) -> Self {
+        command.env("MOCBAN_STORE_TIME_SCALE", "240");
+        let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut process = command.spawn().expect("the binary starts");
+        let lines = BufReader::new(process.stderr.take().expect("a pipe")).lines();
+        Self { process, lines }
+    }
+
+    /// Waits for a line with this text.
+    #[track_caller]
+    fn wait_for(&mut self, wanted: &str) {
+        let mut seen = Vec::new();
+        for line in self.lines.by_ref() {
+            seen.push(line.expect("text"));
+            if seen.last().is_some_and(|line| line.contains(wanted)) {
+                return;
+            }
+        }
+        panic!("no line with {wanted:?} in {seen:#?}");
+    }
+
+    /// Waits for the end. Returns the exit code and the remaining lines.
+    fn end(mut self) -> (Option<i32>, String) {
+        let lines = self.lines.map(|line| line.expect("text"));
+        let lines = lines.collect::<Vec<_>>().join("\n");
+        (self.process.wait().expect("an exit code").code(), lines)
+    }
+}
+
+#[test]
+fn a_store_that_is_away_is_waited_for_and_nobody_is_blamed() {
+    let Some(remote) = Remote::new() else { return };
+    let outage = Outage::default();
+    let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    outage.begin_at_put();
+    let mut run = RunInOutage::start(&mut remote.command(port, "cache", &["run", "-j", "2"]));
+    run.wait_for("no reply of the object store");
+    // Twice, so the store is away for longer than a request is repeated.
+    run.wait_for("waiting for it to store results");
+    run.wait_for("waiting for it to store results");
+    outage.end();
+    let (code, lines) = run.end();
+    assert_eq!(code, Some(0), "{lines}");
+    remote.assert_same_results();
+}
+
+#[cfg(unix)]
+#[test]
+fn a_stop_request_ends_the_wait_for_a_store_that_is_away() {
+    let Some(remote) = Remote::new() else { return };
+    let outage = Outage::default();
+    let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    outage.begin_at_put();
+    let mut run = RunInOutage::start(&mut remote.command(port, "cache", &["run", "-j", "2"]));
+    run.wait_for("waiting for it to store results");
+    let id = rustix::process::Pid::from_child(&run.process);
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("sent");
+    let (code, lines) = run.end();
+    assert_eq!(code, Some(130), "{lines}");
+    let status = remote.remote(port, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["jobs"]["leased"], 0, "{status}");
+    assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
+    outage.end();
+    remote.remote(port, &["run"]).expect(0);
     remote.assert_same_results();
 }
 

@@ -1,11 +1,15 @@
 //! Manual alignments are stored, exported and scored like results. Items with a duplicate hide them until answered.
 
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
 use crate::page::{NO_CHECKS, Page, answer, open_review};
+use crate::resume::run;
 use crate::review_page::ask;
 
 fn alignments(project: &Project) -> Vec<StoredAlignment> {
@@ -163,5 +167,66 @@ fn page_editor_and_show_report_equal_scores() {
             [number(&details[score]), number(&aligned[score])],
             [shown; 2]
         );
+    }
+}
+
+/// A run that computes the pairs again and stops at a point, until it is let go.
+struct HeldRun {
+    process: std::process::Child,
+    file: std::path::PathBuf,
+}
+
+impl HeldRun {
+    fn start(project: &Project, point: &str, settings: &[&str]) -> Self {
+        let file = project.dir().join("held");
+        let mut command = run(
+            project,
+            &[&["-j", "1", "--rerun", "all"], settings].concat(),
+        );
+        command
+            .env("MOCBAN_HOLD_AT", point)
+            .env("MOCBAN_HOLD_FILE", &file);
+        let command = command.stdout(Stdio::null()).stderr(Stdio::null());
+        let process = command.spawn().expect("the binary starts");
+        let deadline = Instant::now() + Duration::from_mins(2);
+        while !file.exists() {
+            assert!(Instant::now() < deadline, "the point was not reached");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        Self { process, file }
+    }
+
+    fn finish(mut self) {
+        std::fs::remove_file(&self.file).expect("removed");
+        assert!(self.process.wait().expect("an exit code").success());
+    }
+}
+
+#[test]
+fn while_a_pair_is_computed_again_its_editor_says_so_and_then_shows_the_stored_result() {
+    for (settings, code) in [(&[][..], 200), (&["--set", "depth.longest_px=80"], 410)] {
+        let (_dir, project, page) = open_review(&NO_CHECKS);
+        let item = page.queue().remove(0);
+        let (pair, id) = (item["pair"].as_str(), item["id"].as_str());
+        let (pair, id) = (pair.expect("a name"), id.expect("an id"));
+        let editor = || page.get(&format!("/api/alignment/{id}"));
+        let mask = || page.get(&format!("/image/{id}/depth-frame-mask"));
+        let map = editor().json()["view_from_depth"].clone();
+        let save = || {
+            let body = json!({ "event": "a1", "item": id, "view_from_depth": map, "note": null });
+            page.post("/api/align", &body).expect("a reply")
+        };
+        let held = HeldRun::start(&project, &format!("normalize:computed@{pair}"), settings);
+        // The page sends an alignment again after a 503.
+        for reply in [editor(), mask(), save()] {
+            assert_eq!(reply.status, 503);
+            let error = reply.json()["error"].to_string();
+            assert!(error.contains("being computed again"), "{error}");
+        }
+        held.finish();
+        for reply in [editor(), mask(), save()] {
+            assert_eq!(reply.status, code, "{settings:?}");
+        }
+        assert_eq!(alignments(&project).len(), usize::from(code == 200));
     }
 }

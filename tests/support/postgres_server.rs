@@ -109,6 +109,13 @@ impl Server {
         &self.url
     }
 
+    /// Returns the folder of its socket and its files.
+    #[allow(dead_code, reason = "not every test binary uses the folder")]
+    pub(crate) fn folder(&self) -> &Path {
+        let (_, folder) = self.url.split_once("?host=").expect("a folder");
+        Path::new(folder)
+    }
+
     /// Stops the server as in a crash.
     #[allow(dead_code, reason = "not every test binary stops the server")]
     pub(crate) fn stop_at_once(&self) {
@@ -138,7 +145,7 @@ impl Server {
 
 /// Returns a command that changes the user if this process is root's, and gives the folder to that user.
 #[cfg(unix)]
-fn other_user(dir: &Path) -> &'static str {
+pub(crate) fn other_user(dir: &Path) -> &'static str {
     if !rustix::process::geteuid().is_root() {
         return "";
     }
@@ -148,7 +155,7 @@ fn other_user(dir: &Path) -> &'static str {
 }
 
 #[cfg(not(unix))]
-const fn other_user(_dir: &Path) -> &'static str {
+pub(crate) const fn other_user(_dir: &Path) -> &'static str {
     ""
 }
 

@@ -4,7 +4,7 @@ use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, Once};
 use std::time::Duration;
 
@@ -220,6 +220,33 @@ pub(crate) struct Faults {
     pub(crate) slow: u32,
 }
 
+/// An outage of the store behind a proxy: all requests lose their connection.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Outage {
+    begins_at_put: Arc<AtomicBool>,
+    is_away: Arc<AtomicBool>,
+}
+
+impl Outage {
+    /// Begins at the next `PUT` request, which is lost too.
+    pub(crate) fn begin_at_put(&self) {
+        self.begins_at_put.store(true, Ordering::SeqCst);
+    }
+
+    /// Ends.
+    pub(crate) fn end(&self) {
+        self.is_away.store(false, Ordering::SeqCst);
+    }
+
+    /// Returns whether a request is lost.
+    fn takes(&self, request: &[u8]) -> bool {
+        if request.starts_with(b"PUT") && self.begins_at_put.swap(false, Ordering::SeqCst) {
+            self.is_away.store(true, Ordering::SeqCst);
+        }
+        self.is_away.load(Ordering::SeqCst)
+    }
+}
+
 /// Numbers of requests that a proxy has passed on, by method.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
@@ -233,6 +260,16 @@ pub(crate) struct Requests {
 
 /// Starts a proxy. It ends with this process.
 pub(crate) fn proxy(server: u16, faults: Faults) -> (u16, Arc<Requests>) {
+    proxy_with_outage(server, faults, &Outage::default())
+}
+
+/// Starts a proxy to a store with an outage. It ends with this process.
+pub(crate) fn proxy_with_outage(
+    server: u16,
+    faults: Faults,
+    outage: &Outage,
+) -> (u16, Arc<Requests>) {
+    let outage = outage.clone();
     let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a port");
     let port = listener.local_addr().expect("an address").port();
     let requests = Arc::new(Requests::default());
@@ -241,10 +278,11 @@ pub(crate) fn proxy(server: u16, faults: Faults) -> (u16, Arc<Requests>) {
     std::thread::spawn(move || {
         for client in listener.incoming().flatten() {
             let (counted, dice) = (Arc::clone(&counted), Arc::clone(&dice));
+            let outage = outage.clone();
             std::thread::spawn(move || {
                 let roll = || dice.lock().expect("no panic").random_range(0..100_u32);
                 // An error ends the connection, as the client expects of a bad network.
-                let _ = serve(client, server, faults, &counted, roll);
+                let _ = serve(client, server, (faults, &outage), &counted, roll);
             });
         }
     });
@@ -255,11 +293,14 @@ pub(crate) fn proxy(server: u16, faults: Faults) -> (u16, Arc<Requests>) {
 fn serve(
     mut client: TcpStream,
     server: u16,
-    faults: Faults,
+    (faults, outage): (Faults, &Outage),
     counted: &Requests,
     roll: impl Fn() -> u32,
 ) -> std::io::Result<()> {
     let request = read_request(&mut client)?;
+    if outage.takes(&request) {
+        return Ok(());
+    }
     let dice = roll();
     if dice < faults.refused {
         counted.disturbed.fetch_add(1, Ordering::Relaxed);

@@ -101,6 +101,11 @@ pub enum CatalogError {
         /// Whether the server may answer later.
         is_unavailable: bool,
     },
+    /// A connection pooler changes the server process between transactions.
+    #[error(
+        "{0} leads to a connection pooler such as PgBouncer that pools by transaction, so settings of a connection would be lost; set pool_mode = session there, or connect to PostgreSQL directly"
+    )]
+    TransactionPooler(String),
     /// The database has no catalog.
     #[error("there is no catalog at {0}; `mocban import` creates it")]
     NoSchema(String),

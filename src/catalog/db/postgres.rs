@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use sqlx::migrate::Migrator;
 use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions, PgSslMode};
-use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Transaction};
+use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Row as _, Transaction};
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
@@ -16,19 +16,30 @@ pub(crate) const SCHEMA: &str = "mocban";
 const OLDEST_SERVER: u32 = 15;
 /// Read connections per process.
 const READERS: u32 = 2;
+/// Other clients of a pooler may take the process in between, so it is asked for several times.
+const POOLER_ROUNDS: u32 = 3;
 /// Longest time for one connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
+/// Settings of every connection. They are statements instead of parameters of the connection, because `PgBouncer` refuses
+/// such parameters or ignores them. Compiling a plan (`jit`) takes longer than running most of our statements.
+const SETTINGS: &str = "SET standard_conforming_strings = on;
+SET default_transaction_isolation = 'read committed';
+SET idle_in_transaction_session_timeout = '60s';
+SET client_min_messages = warning;
+SET jit = off;";
 /// Settings of the write connection, for group commits. Each of their statements finds a few rows of large tables by an
 /// index. The planner would read whole tables instead while it has no statistics about them, as after an import. The
 /// plans do not depend on the parameters.
-const BY_INDEX: [(&str, &str); 5] = [
-    ("plan_cache_mode", "force_generic_plan"),
-    ("enable_bitmapscan", "off"),
-    ("enable_hashjoin", "off"),
-    ("enable_mergejoin", "off"),
-    ("enable_seqscan", "off"),
-];
+const BY_INDEX: &str = "SET plan_cache_mode = force_generic_plan;
+SET enable_bitmapscan = off;
+SET enable_hashjoin = off;
+SET enable_mergejoin = off;
+SET enable_seqscan = off;";
+/// Setting of the read connections.
+const READ_ONLY: &str = "SET default_transaction_read_only = on;";
+/// Returns the server process that serves a connection.
+const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 
 static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
 
@@ -74,15 +85,8 @@ impl PostgresAddress {
                 "the schema {schema} is not allowed; use lower-case letters, digits and _"
             )));
         }
-        let options = options.application_name("mocban").options([
-            ("search_path", schema.as_str()),
-            ("standard_conforming_strings", "on"),
-            ("default_transaction_isolation", "read committed"),
-            ("idle_in_transaction_session_timeout", "60s"),
-            ("client_min_messages", "warning"),
-            // Compiling a plan takes longer than running most of our statements.
-            ("jit", "off"),
-        ]);
+        // Since PostgreSQL 12, floating-point numbers have all digits anyway, and PgBouncer refuses this parameter.
+        let options = options.application_name("mocban").extra_float_digits(None);
         Ok(Self { options, schema })
     }
 
@@ -107,10 +111,11 @@ impl PostgresAddress {
     /// Opens a connection for writing. If `may_create` is set, creates a missing schema.
     ///
     /// # Errors
-    /// Returns an error if the server does not answer or refuses, or if the schema is missing or has another version.
+    /// Returns an error if the server does not answer or refuses, if a connection pooler pools by transaction, or if the
+    /// schema is missing or has another version.
     pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
-        let options = self.options.clone().options(BY_INDEX);
-        let mut conn = self.connect_to_server(&options).await?;
+        let mut conn = self.connect_with(BY_INDEX).await?;
+        self.require_session(&mut conn).await?;
         if self.version(&mut conn).await?.is_none() {
             if !may_create {
                 return Err(CatalogError::NoSchema(self.text()));
@@ -121,20 +126,57 @@ impl PostgresAddress {
         Ok(conn)
     }
 
-    /// Opens read connections.
+    /// Opens the write connection again.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`], except that it asks for no pooler.
+    pub(crate) async fn reconnect(&self) -> Result<PgConnection> {
+        let mut conn = self.connect_with(BY_INDEX).await?;
+        self.require_current(&mut conn).await?;
+        Ok(conn)
+    }
+
+    /// Opens read connections. `asks_for_pooler` must be set if this process has no write connection.
     ///
     /// # Errors
     /// As for [`Self::connect`].
-    pub(crate) async fn reader_pool(&self) -> Result<PgPool> {
-        let mut conn = self.connect_to_server(&self.options).await?;
+    pub(crate) async fn reader_pool(&self, asks_for_pooler: bool) -> Result<PgPool> {
+        let mut conn = self.connect_with(READ_ONLY).await?;
+        if asks_for_pooler {
+            self.require_session(&mut conn).await?;
+        }
         self.require_current(&mut conn).await?;
         conn.close().await?;
-        let options = self.options.clone();
-        let options = options.options([("default_transaction_read_only", "on")]);
+        let settings = self.settings(READ_ONLY);
         let pool = PgPoolOptions::new()
             .max_connections(READERS)
-            .acquire_timeout(CONNECT_TIMEOUT);
-        Ok(pool.connect_lazy_with(options))
+            .acquire_timeout(CONNECT_TIMEOUT)
+            .after_connect(move |conn, _| {
+                let settings = settings.clone();
+                Box::pin(async move { configure(conn, settings).await })
+            });
+        Ok(pool.connect_lazy_with(self.options.clone()))
+    }
+
+    /// Checks that a connection keeps its server process to itself while it is idle. A pooler by transaction gives this
+    /// process to the next statement of another connection.
+    ///
+    /// # Errors
+    /// Returns an error if the process is shared, or if the server does not answer or refuses.
+    async fn require_session(&self, conn: &mut PgConnection) -> Result<()> {
+        let first = server_process(conn).await?;
+        let mut other = self.connect_with(READ_ONLY).await?;
+        let second = server_process(&mut other).await?;
+        let mut is_kept = first != second;
+        for _ in 0..POOLER_ROUNDS {
+            is_kept &= server_process(conn).await? == first;
+            is_kept &= server_process(&mut other).await? == second;
+        }
+        other.close().await?;
+        if is_kept {
+            return Ok(());
+        }
+        Err(CatalogError::TransactionPooler(self.text()))
     }
 
     /// Opens a connection, whether or not the database has a catalog.
@@ -142,11 +184,24 @@ impl PostgresAddress {
     /// # Errors
     /// Returns an error if the server does not answer or refuses.
     pub(crate) async fn connect_to_database(&self) -> Result<PgConnection> {
-        self.connect_to_server(&self.options).await
+        self.connect_with("").await
     }
 
-    async fn connect_to_server(&self, options: &PgConnectOptions) -> Result<PgConnection> {
-        let connected = tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await;
+    /// Returns the statements that configure a connection.
+    fn settings(&self, more: &str) -> String {
+        // Lower-case letters, digits and `_` only.
+        let schema = &self.schema;
+        format!("SET search_path = {schema};\n{SETTINGS}\n{more}")
+    }
+
+    /// Opens a connection with these settings besides those of every connection.
+    async fn connect_with(&self, settings: &str) -> Result<PgConnection> {
+        let connecting = async {
+            let mut conn = self.options.connect().await?;
+            configure(&mut conn, self.settings(settings)).await?;
+            Ok(conn)
+        };
+        let connected = tokio::time::timeout(CONNECT_TIMEOUT, connecting).await;
         let connected = connected.unwrap_or_else(|_| {
             let error = std::io::Error::from(std::io::ErrorKind::TimedOut);
             Err(sqlx::Error::Io(error))
@@ -226,6 +281,18 @@ impl PostgresAddress {
     }
 }
 
+/// Runs statements that configure a connection.
+async fn configure(conn: &mut PgConnection, settings: String) -> sqlx::Result<()> {
+    let statements = sqlx::raw_sql(sqlx::AssertSqlSafe(settings));
+    statements.execute(conn).await.map(drop)
+}
+
+/// Returns the server process that serves a connection. Prepares no statement, which a pooler could refuse.
+async fn server_process(conn: &mut PgConnection) -> sqlx::Result<i32> {
+    let row = sqlx::raw_sql(SERVER_PROCESS).fetch_one(conn).await?;
+    row.try_get(0)
+}
+
 /// Takes the lock of a catalog until the end of the transaction. All writes except group commits take it, so that they
 /// run one after another, as in SQLite.
 pub(crate) const LOCK: &str =
@@ -278,6 +345,9 @@ fn connection_error(error: &sqlx::Error) -> String {
         }
         Some("3D000") => format!("{text}; create it with `createdb`, or correct the address"),
         Some("53300") => format!("{text}; close other programs, or raise max_connections"),
+        _ if text.contains("unsupported startup parameter") => {
+            format!("{text}; PgBouncer permits it with `ignore_startup_parameters`")
+        }
         _ => text.to_owned(),
     }
 }

@@ -107,7 +107,7 @@ impl WriteConnection {
         };
         let mut attempt = 0;
         loop {
-            match server.address.connect(false).await {
+            match server.address.reconnect().await {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;

@@ -5,14 +5,16 @@
 
 use std::future::Future;
 use std::io::Write;
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Instant;
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
 use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
-use super::client::{LazyClient, runtime};
+use super::client::{LazyClient, notice_interval, runtime, warn_of_wait};
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -338,8 +340,16 @@ impl Bucket {
         key: &str,
         receiver: &mpsc::Receiver<Result<T, BucketError>>,
     ) -> Result<T, BucketError> {
-        let ended = receiver.recv();
-        ended.unwrap_or_else(|_| Err(self.unavailable(key, "the request ended without a result")))
+        let begun = Instant::now();
+        loop {
+            match receiver.recv_timeout(notice_interval()) {
+                Ok(reply) => return reply,
+                Err(RecvTimeoutError::Timeout) => warn_of_wait(&self.address_of(key), begun),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(self.unavailable(key, "the request ended without a result"));
+                }
+            }
+        }
     }
 
     fn unavailable(&self, key: &str, reason: &str) -> BucketError {

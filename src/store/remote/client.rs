@@ -1,12 +1,14 @@
 //! The client of S3-compatible stores: its time limits and repetitions, its keys, and the threads of its requests.
 
 use std::io;
-use std::sync::{Arc, LazyLock, OnceLock};
-use std::time::Duration;
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use object_store::aws::AmazonS3Builder;
 use object_store::{BackoffConfig, ClientOptions, ObjectStore, RetryConfig};
 use tokio::runtime::{Builder, Runtime};
+
+use crate::failpoint;
 
 /// Longest time to open a connection.
 const CONNECT: Duration = Duration::from_secs(10);
@@ -16,8 +18,35 @@ const SILENCE: Duration = Duration::from_secs(30);
 const GIVE_UP: Duration = Duration::from_mins(4);
 /// A first request that only shows whether the store answers is given up after this time.
 const GIVE_UP_FIRST: Duration = Duration::from_secs(5);
+/// While a request waits for its reply, a warning says so at this interval.
+const NOTICE_EVERY: Duration = Duration::from_secs(20);
 /// Threads that send requests.
 const THREADS: usize = 2;
+
+/// Returns the divisor of time limits in tests.
+fn time_scale() -> u32 {
+    static SCALE: LazyLock<u32> =
+        LazyLock::new(|| failpoint::time_scale("MOCBAN_STORE_TIME_SCALE"));
+    *SCALE
+}
+
+/// Returns the interval of warnings about a request without a reply.
+pub(super) fn notice_interval() -> Duration {
+    NOTICE_EVERY / time_scale()
+}
+
+/// Warns that a request has had no reply since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
+pub(super) fn warn_of_wait(address: &str, begun: Instant) {
+    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let interval = notice_interval();
+    if last.is_some_and(|last| last.elapsed() < interval) {
+        return;
+    }
+    *last = Some(Instant::now());
+    let seconds = begun.elapsed().as_secs();
+    tracing::warn!("{address}: no reply of the object store for {seconds} s; waiting");
+}
 
 static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
     Builder::new_multi_thread()
@@ -62,7 +91,8 @@ impl LazyClient {
     /// # Errors
     /// Returns the reason if a variable of the environment is missing or has a wrong value.
     pub(super) fn get(&self) -> Result<Arc<dyn ObjectStore>, &str> {
-        let made = self.made.get_or_init(|| connect(&self.bucket, GIVE_UP));
+        let give_up = GIVE_UP / time_scale();
+        let made = self.made.get_or_init(|| connect(&self.bucket, give_up));
         made.as_ref().map(Arc::clone).map_err(String::as_str)
     }
 

@@ -1,0 +1,108 @@
+//! A catalog in PostgreSQL behind the connection pooler `PgBouncer`.
+
+use std::io::Write as _;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::cli::{Call, binary, call, empty, mocban};
+use crate::postgres_server::{Server, other_user};
+use crate::resume::{copy_folder, project};
+
+/// A running pooler, which ends with this value.
+struct Pooler {
+    process: Child,
+    url: String,
+}
+
+impl Pooler {
+    /// Starts a pooler with a mode in the folder of a server.
+    fn start(program: &Path, server: &Server, mode: &str) -> Self {
+        let folder = server.folder();
+        let settings = folder.join("pooler.ini");
+        let socket = folder.display();
+        let text = format!(
+            "[databases]\npostgres = host={socket} user=mocban\n[pgbouncer]\nlisten_addr =\nunix_socket_dir = {socket}\n\
+             listen_port = 6432\nauth_type = any\npool_mode = {mode}\n"
+        );
+        std::fs::write(&settings, text).expect("written");
+        // The pooler refuses to run as root.
+        let user = other_user(folder);
+        let mut words = user.split_whitespace().chain(program.to_str());
+        let mut command = Command::new(words.next().expect("a program"));
+        command.args(words).arg(&settings);
+        let command = command.stdout(Stdio::null()).stderr(Stdio::null());
+        let process = command.spawn().expect("the pooler starts");
+        let deadline = Instant::now() + Duration::from_mins(1);
+        while UnixStream::connect(folder.join(".s.PGSQL.6432")).is_err() {
+            assert!(Instant::now() < deadline, "the pooler did not start");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let url = server.url().replace("localhost/", "localhost:6432/");
+        Self { process, url }
+    }
+
+    fn call(&self, dir: &Path, args: &[&str]) -> Call {
+        let mut command = binary();
+        command.current_dir(dir);
+        call(
+            command
+                .args(["-C", "shared", "--catalog", &self.url])
+                .args(args),
+        )
+    }
+}
+
+impl Drop for Pooler {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Returns the pooler's program, or prints that there is none.
+fn program() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::env::split_paths(&path).chain(["/usr/sbin".into()]);
+    let mut files = folders.map(|folder| folder.join("pgbouncer"));
+    let found = files.find(|file| file.is_file());
+    if found.is_none() {
+        let text = "skipped: pgbouncer is not installed, so no test uses a connection pooler\n";
+        let _ = std::io::stderr().write_all(text.as_bytes());
+    }
+    found
+}
+
+#[test]
+fn a_pooler_by_session_works_and_one_by_transaction_is_refused_in_one_sentence() {
+    let (Some(program), Some(server)) = (program(), Server::start()) else {
+        return;
+    };
+    let dir = empty();
+    let file = project(dir.path(), "file", "4");
+    copy_folder(file.dir(), &dir.path().join("shared"));
+    std::fs::remove_file(dir.path().join("shared/catalog.sqlite")).expect("removed");
+
+    let pooler = Pooler::start(&program, &server, "session");
+    mocban(dir.path(), &["copy", "file", &pooler.url]).expect(0);
+    mocban(dir.path(), &["-C", "file", "run"]).expect(0);
+    let report = mocban(dir.path(), &["-C", "file", "report"]).expect(0).out;
+    pooler.call(dir.path(), &["plan"]).expect(0);
+    let worker = || pooler.call(dir.path(), &["worker", "-j", "1"]).expect(0);
+    std::thread::scope(|scope| [(); 2].map(|()| scope.spawn(worker)).map(drop));
+    let pooled = pooler.call(dir.path(), &["report"]).expect(0).out;
+    assert_eq!(pooled, report);
+    drop(pooler);
+
+    let pooler = Pooler::start(&program, &server, "transaction");
+    for command in [&["status"][..], &["worker"], &["run"], &["plan"]] {
+        let refused = pooler.call(dir.path(), command).expect(2);
+        assert!(
+            refused.err.contains("pools by transaction") && refused.err.contains("pool_mode"),
+            "{}",
+            refused.err
+        );
+        assert_eq!(refused.err.trim_end().lines().count(), 1, "{}", refused.err);
+    }
+}
