@@ -44,6 +44,7 @@ mod retry;
 mod review;
 mod run;
 mod run_progress;
+mod run_text;
 mod screen;
 mod select;
 mod show;
