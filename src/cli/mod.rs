@@ -60,6 +60,7 @@ mod verdict;
 mod verdict_file;
 mod view;
 mod worker;
+mod worker_totals;
 
 use std::ffi::OsString;
 
