@@ -3,6 +3,7 @@
 mod bucket;
 mod bucket_error;
 mod cache;
+mod cache_files;
 mod client;
 mod listing;
 mod pack;
