@@ -6,6 +6,7 @@ mod cache;
 mod cache_files;
 mod client;
 mod listing;
+mod object_stat;
 mod pack;
 mod recent;
 mod storage;
