@@ -18,6 +18,7 @@ use super::import::{self, ImportArgs};
 use super::import_blocks::{self, BlockSource};
 use super::report;
 use super::run::{self, drive};
+use super::run_text;
 use super::screen::Palette;
 use super::table::count;
 use crate::config::{Origin, Tree};
@@ -128,10 +129,10 @@ async fn align(
     let (project, catalog) = context.open().await?;
     let options = run::from_config(&config);
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
-    run::print_outcome(&summary, &failures, context);
+    run_text::print_outcome(&summary, &failures, context);
     let done = summary.status.jobs.get(&JobStatus::Done).copied();
     if summary.stopped || done.unwrap_or(0) == 0 {
-        for command in run::next_steps(&summary, &failures) {
+        for command in run_text::next_steps(&summary, &failures) {
             context.next(&command);
         }
         return Ok(run::code(&summary));

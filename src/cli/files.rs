@@ -136,13 +136,23 @@ pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyh
     write_atomic(path, bytes).with_context(failed)
 }
 
-/// Lists a directory.
+/// Lists the files of a directory, without its subdirectories and links to directories.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| refusal("list", dir, &error);
-    let entries = std::fs::read_dir(dir).map_err(refuse)?;
-    entries
-        .map(|entry| Ok(entry.map_err(refuse)?.path()))
-        .collect()
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(refuse)? {
+        let entry = entry.map_err(refuse)?;
+        let path = entry.path();
+        // The listing has the type already; only a link must be followed.
+        let is_dir = match entry.file_type() {
+            Ok(kind) if !kind.is_symlink() => kind.is_dir(),
+            _ => path.is_dir(),
+        };
+        if !is_dir {
+            files.push(path);
+        }
+    }
+    Ok(files)
 }
 
 /// Returns whether a file holds JSON Lines. If its extension is unknown, the first character decides.

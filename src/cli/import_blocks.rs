@@ -8,8 +8,7 @@ use serde_json::{Value, json};
 use super::context::{Context, now};
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::on_disk;
-use super::manifest_file::{missing_file, refuse};
+use super::manifest_file::{locate_file, refuse};
 use super::missing_files::MissingFiles;
 use super::new_project::import_with;
 use super::table::count;
@@ -191,13 +190,7 @@ fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut Miss
     let (line, name) = (row.line, row.name.clone());
     let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();
     for (kind, path) in required.chain(row.labels.as_mut().map(|path| ("labels", path))) {
-        let is_below_root = path
-            .to_str()
-            .is_some_and(|path| project.is_below_root(path));
-        if !is_below_root && let Some(found) = on_disk(path) {
-            *path = found;
-        }
-        if let Some(line) = missing_file(label, line, (kind, path), &name, project) {
+        if let Some(line) = locate_file((label, line), kind, path, &name, project) {
             missing.add(line);
         }
     }

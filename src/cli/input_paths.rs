@@ -1,17 +1,29 @@
 //! Finds the files of a list under the names that they have on disk.
 
+use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use unicode_normalization::UnicodeNormalization as _;
 
-/// Returns the path of a file whose name is written differently in a list: with the other Unicode form of accented
-/// letters (macOS writes some names decomposed, Windows and Linux composed), or with the backslashes of Windows.
-/// Returns `None` if the path exists as written, or under no such name.
-pub(super) fn on_disk(path: &Path) -> Option<PathBuf> {
-    // An error, such as a folder that cannot be entered, is reported with the path as written.
-    if !matches!(path.try_exists(), Ok(false)) {
-        return None;
+/// Replaces the path of a file whose name is written differently in a list by its path on disk: with the other Unicode
+/// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), or without the
+/// backslashes of Windows. Returns whether the file exists.
+///
+/// # Errors
+/// Returns an error if this cannot be found out, such as for a folder that cannot be entered.
+pub(super) fn find_on_disk(path: &mut PathBuf) -> io::Result<bool> {
+    if path.try_exists()? {
+        return Ok(true);
     }
+    let found = written_differently(path);
+    if let Some(found) = &found {
+        path.clone_from(found);
+    }
+    Ok(found.is_some())
+}
+
+/// Returns the path of a file whose name is written differently.
+fn written_differently(path: &Path) -> Option<PathBuf> {
     let text = path.to_str()?;
     let slashes = (cfg!(unix) && text.contains('\\')).then(|| text.replace('\\', "/"));
     let mut written = [Some(text.to_owned()), slashes].into_iter().flatten();
@@ -38,7 +50,7 @@ fn in_any_form(path: &Path) -> Option<PathBuf> {
 mod tests {
     use std::fs;
 
-    use super::on_disk;
+    use super::find_on_disk;
 
     #[test]
     fn other_unicode_forms_and_backslashes_are_found() {
@@ -47,11 +59,18 @@ mod tests {
         fs::create_dir(dir.path().join(decomposed)).expect("a folder");
         let file = dir.path().join(decomposed).join(format!("{composed}.stl"));
         fs::write(&file, "").expect("written");
-        let written = dir.path().join(format!("{composed}\\{decomposed}.stl"));
-        assert_eq!(on_disk(&written), Some(file.clone()));
-        let composed = dir.path().join(composed).join(format!("{composed}.stl"));
-        assert_eq!(on_disk(&composed), Some(file.clone()));
-        assert_eq!(on_disk(&file), None);
-        assert_eq!(on_disk(&dir.path().join("other.stl")), None);
+        for written in [
+            format!("{composed}\\{decomposed}.stl"),
+            format!("{composed}/{composed}.stl"),
+            format!("{decomposed}/{composed}.stl"),
+        ] {
+            let mut path = dir.path().join(&written);
+            assert!(find_on_disk(&mut path).expect("readable"), "{written}");
+            assert_eq!(path, file, "{written}");
+        }
+        let other = dir.path().join("other.stl");
+        let mut path = other.clone();
+        assert!(!find_on_disk(&mut path).expect("readable"));
+        assert_eq!(path, other);
     }
 }

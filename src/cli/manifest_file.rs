@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::on_disk;
+use super::input_paths::find_on_disk;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 use crate::store::Project;
@@ -92,7 +92,7 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> anyhow::Result<Self> {
-        let found = pair_folders(&plain_files(meshes)?, &plain_files(prints)?)
+        let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
             .map_err(|problems| refuse(meshes, &problems))?;
         let mut rows = found.rows;
         let mut similar = SimilarIds::default();
@@ -122,14 +122,11 @@ impl Listing {
                 .is_some_and(|path| project.is_below_root(path))
         };
         let mut each = |mut row: ManifestRow| {
-            for path in [&mut row.mesh, &mut row.print] {
-                if !is_below_root(path)
-                    && let Some(found) = on_disk(path)
-                {
-                    *path = found;
-                }
-            }
-            let missing = missing_files(&self.row_label, &row, project);
+            let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
+            let place = (self.row_label.as_str(), row.line);
+            let missing = files
+                .filter_map(|(kind, path)| locate_file(place, kind, path, &row.name, project))
+                .collect();
             each(row, missing);
         };
         match &self.source {
@@ -190,24 +187,18 @@ impl SimilarIds {
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
 
-fn missing_files(label: &str, row: &ManifestRow, project: &Project) -> Vec<String> {
-    let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
-    files
-        .filter_map(|(kind, path)| missing_file(label, row.line, (kind, path), &row.name, project))
-        .collect()
-}
-
-/// Describes a file of a row that does not exist or cannot be read. Returns `None` if it exists.
-pub(super) fn missing_file(
-    label: &str,
-    line: usize,
-    (kind, path): (&str, &Path),
+/// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
+/// row with a label and a number; returns `None` if it exists.
+pub(super) fn locate_file(
+    (label, line): (&str, usize),
+    kind: &str,
+    path: &mut PathBuf,
     name: &dyn std::fmt::Display,
     project: &Project,
 ) -> Option<String> {
     let exists = match path.to_str() {
         Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
-        _ => path.try_exists(),
+        _ => find_on_disk(path),
     };
     let problem = match exists {
         Ok(true) => return None,
@@ -216,13 +207,6 @@ pub(super) fn missing_file(
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
     Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
-}
-
-/// Lists the files of a directory, without its subdirectories.
-fn plain_files(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let mut files = files::list(dir)?;
-    files.retain(|path| !path.is_dir());
-    Ok(files)
 }
 
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.

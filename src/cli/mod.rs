@@ -44,6 +44,7 @@ mod retry;
 mod review;
 mod run;
 mod run_progress;
+mod run_text;
 mod screen;
 mod select;
 mod show;
@@ -59,6 +60,7 @@ mod verdict;
 mod verdict_file;
 mod view;
 mod worker;
+mod worker_totals;
 
 use std::ffi::OsString;
 

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use super::time_text::rough_duration;
+use super::worker_totals::{WorkerTotals, is_present};
 use crate::catalog::{Catalog, WorkerRecord, WorkerState};
-use crate::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMetrics};
+use crate::domain::UnixMillis;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
 const SHOWN_MS: i64 = 24 * 3_600_000;
@@ -23,138 +24,6 @@ pub(super) struct WorkerTable {
 pub(super) async fn read(catalog: &Catalog, now: UnixMillis) -> anyhow::Result<WorkerTable> {
     let workers = catalog.workers(now - SHOWN_MS).await?;
     Ok(WorkerTable::new(workers, now))
-}
-
-/// Sums over one or more workers.
-#[derive(Debug, Default)]
-struct Totals {
-    jobs: u64,
-    leased: u64,
-    done: u64,
-    failed: u64,
-    stages: BTreeMap<Stage, ComputeTimes>,
-    wait_ms: BTreeMap<WaitReason, u64>,
-    /// Time that all jobs had in milliseconds.
-    job_ms: u64,
-    peak_memory_bytes: Option<u64>,
-}
-
-impl Totals {
-    /// Sums up the workers. Jobs and memory are those of the workers that are present.
-    fn of<'w>(workers: impl IntoIterator<Item = &'w WorkerRecord>, now: UnixMillis) -> Self {
-        let mut totals = Self::default();
-        for worker in workers {
-            totals.leased += worker.leased;
-            if let Some(metrics) = &worker.metrics {
-                totals.add(metrics);
-                if is_present(worker.state(now)) {
-                    totals.occupy(metrics);
-                }
-            }
-        }
-        totals
-    }
-
-    /// Returns the numbers of one worker.
-    fn of_one(worker: &WorkerRecord) -> Self {
-        let mut totals = Self {
-            leased: worker.leased,
-            ..Self::default()
-        };
-        if let Some(metrics) = &worker.metrics {
-            totals.add(metrics);
-            totals.occupy(metrics);
-        }
-        totals
-    }
-
-    /// Adds what a worker has done.
-    fn add(&mut self, metrics: &WorkerMetrics) {
-        self.done += metrics.done;
-        self.failed += metrics.failed;
-        self.job_ms += metrics.jobs * metrics.elapsed_ms;
-        for (stage, times) in &metrics.stages {
-            let sum = self.stages.entry(*stage).or_default();
-            sum.count += times.count;
-            sum.ms += times.ms;
-        }
-        for (reason, ms) in &metrics.wait_ms {
-            *self.wait_ms.entry(*reason).or_default() += ms;
-        }
-    }
-
-    /// Adds what a worker occupies on its host.
-    fn occupy(&mut self, metrics: &WorkerMetrics) {
-        self.jobs += metrics.jobs;
-        if let Some(bytes) = metrics.peak_memory_bytes {
-            *self.peak_memory_bytes.get_or_insert_default() += bytes;
-        }
-    }
-
-    /// Returns the mean computing time of a stage in milliseconds. `None` if the stage was not computed.
-    fn stage_ms(&self, stage: Stage) -> Option<f64> {
-        let times = self.stages.get(&stage).filter(|times| times.count > 0)?;
-        Some(times.ms as f64 / times.count as f64)
-    }
-
-    /// Returns the share of their time that the jobs waited.
-    fn wait_share(&self, reasons: &[WaitReason]) -> Option<f64> {
-        let waits = reasons.iter().filter_map(|reason| self.wait_ms.get(reason));
-        let waited: u64 = waits.sum();
-        (self.job_ms > 0).then(|| waited as f64 / self.job_ms as f64)
-    }
-
-    fn json(&self) -> Map<String, Value> {
-        let stages = Stage::ALL.map(|stage| (stage, rounded(self.stage_ms(stage), 1e1)));
-        let waits = WaitReason::ALL.map(|reason| {
-            let share = self.wait_share(&[reason]);
-            (reason, rounded(share, 1e4))
-        });
-        let object = json!({
-            "jobs": self.jobs,
-            "leased": self.leased,
-            "done": self.done,
-            "failed": self.failed,
-            "mean_stage_ms": BTreeMap::from(stages),
-            "wait_share": BTreeMap::from(waits),
-            "peak_memory_bytes": self.peak_memory_bytes,
-        });
-        match object {
-            Value::Object(fields) => fields,
-            _ => Map::new(),
-        }
-    }
-
-    /// Returns the cells of a row after the state.
-    fn cells(&self) -> Vec<String> {
-        let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-        let percent = |share: f64| format!("{:.1} %", share * 100.0);
-        let mut cells = vec![self.done.to_string(), self.failed.to_string()];
-        for stage in Stage::ALL {
-            let ms = self.stage_ms(stage);
-            cells.push(dash(ms.map(|ms| format!("{ms:.1}"))));
-        }
-        for reasons in [
-            &[WaitReason::Database] as &[_],
-            &[WaitReason::Inputs, WaitReason::Artifacts],
-        ] {
-            cells.push(dash(self.wait_share(reasons).map(percent)));
-        }
-        let mib = self
-            .peak_memory_bytes
-            .map(|bytes| format!("{} MiB", bytes >> 20));
-        cells.push(dash(mib));
-        cells
-    }
-}
-
-/// Returns a number rounded to a multiple of `1 / scale`.
-fn rounded(number: Option<f64>, scale: f64) -> Option<f64> {
-    number.map(|number| (number * scale).round() / scale)
-}
-
-const fn is_present(state: WorkerState) -> bool {
-    matches!(state, WorkerState::Alive | WorkerState::Stopping)
 }
 
 impl WorkerTable {
@@ -175,10 +44,10 @@ impl WorkerTable {
     pub(super) fn json(&self) -> Value {
         let hosts = self.hosts.iter().map(|(host, workers)| {
             let rows: Vec<_> = workers.iter().map(|worker| self.worker(worker)).collect();
-            let total = Totals::of(workers, self.now).json();
+            let total = WorkerTotals::of(workers, self.now).json();
             json!({"host": host, "workers": rows, "total": total})
         });
-        let all = Totals::of(self.hosts.values().flatten(), self.now).json();
+        let all = WorkerTotals::of(self.hosts.values().flatten(), self.now).json();
         json!({"schema": 1, "hosts": hosts.collect::<Vec<_>>(), "total": all})
     }
 
@@ -192,7 +61,7 @@ impl WorkerTable {
             "since": worker.started,
             "heartbeat_age_ms": self.age_ms(worker.heartbeat),
         });
-        let totals = Totals::of_one(worker).json();
+        let totals = WorkerTotals::of_one(worker).json();
         if let Value::Object(fields) = &mut object {
             fields.extend(totals);
         }
@@ -227,7 +96,7 @@ impl WorkerTable {
             let state = format!("{} of {} alive", present.count(), workers.len());
             let start = [strong(host), String::new(), state];
             let blank = [const { String::new() }; 2];
-            let cells = Totals::of(workers, self.now).cells();
+            let cells = WorkerTotals::of(workers, self.now).cells();
             rows.push([&start[..], &blank, &cells].concat());
             rows.extend(workers.iter().map(|worker| self.row(worker, palette)));
         }
@@ -262,7 +131,7 @@ impl WorkerTable {
             rough_duration(running),
             format!("{} ago", rough_duration(self.age_ms(worker.heartbeat))),
         ];
-        [&start[..], &Totals::of_one(worker).cells()].concat()
+        [&start[..], &WorkerTotals::of_one(worker).cells()].concat()
     }
 }
 

@@ -4,10 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mocban::store::Project;
 use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
+use serde_json::{Value, json};
 
 use crate::cli::{binary, mocban, shell};
-use crate::page::Page;
+use crate::page::{Page, answer};
+use crate::review_page::check_answers;
 use crate::source_text::package_dir;
 
 /// Returns the Markdown files of a folder and its subfolders.
@@ -210,7 +213,7 @@ fn own_files(dir: &Path) {
         for entry in fs::read_dir(dir.join("mocban-demo/data").join(from)).expect("a folder") {
             let file = entry.expect("an entry").path();
             let stem = file.file_stem().expect("a name").to_string_lossy();
-            let number = stem.trim_start_matches("upright-000");
+            let number = stem.trim_start_matches("upright-00");
             let extension = file.extension().expect("an extension").to_string_lossy();
             let name = format!("chữ số {number}.{extension}");
             fs::copy(&file, dir.join(to).join(name)).expect("copied");
@@ -218,16 +221,58 @@ fn own_files(dir: &Path) {
     }
 }
 
+/// Judges all results of a review page: the first two fail, the others pass. Attention checks pass too.
+fn judge(page: &Page, project: &Project) {
+    let mut failed = 0;
+    for (number, item) in page.queue().iter().enumerate() {
+        let checks = check_answers(project).len();
+        let event = format!("e{number}");
+        let post = |path: &str, body: &Value| {
+            let reply = page.post(path, body).expect("a reply");
+            let text = String::from_utf8_lossy(&reply.body);
+            assert_eq!(reply.status, 200, "{text}");
+        };
+        post("/api/answer", &answer(&event, item, "pass"));
+        if failed < 2 && check_answers(project).len() == checks {
+            post("/api/undo", &json!({ "event": event }));
+            let mut second = answer(&format!("{event}-again"), item, "fail");
+            second["reason"] = json!("angle");
+            post("/api/answer", &second);
+            failed += 1;
+        }
+    }
+}
+
+/// Checks the numbers of the report about a project whose 20 results were judged by [`judge`].
+fn check_report(project: &Project) {
+    let report = mocban(project.dir(), &["--json", "report"]).expect(0).out;
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let rows = report["rows"].as_array().expect("rows");
+    let row = rows.iter().find(|row| row["metric"] == "ensemble");
+    let row = row.expect("the judged metric");
+    let counts = ["n", "judged", "passed", "failed", "unsure", "stale"].map(|name| &row[name]);
+    assert_eq!(counts, [20, 20, 18, 2, 0, 0], "{row}");
+    assert_eq!(row["acc"], 0.9);
+    // The Wilson interval of 18 of 20.
+    for (end, expected) in [0.698_97, 0.972_13].into_iter().enumerate() {
+        let found = row["acc_ci95"][end].as_f64().expect("a number");
+        assert!((found - expected).abs() < 1e-4, "{row}");
+    }
+    assert_eq!(report["provenance"]["reviewers"], 1);
+    assert!(check_answers(project).len() >= 5);
+}
+
 #[test]
 fn the_commands_of_the_tutorial_work_in_order() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let commands = MarkdownPage::read(&package_dir().join("docs/tutorial/first-hour.md")).commands;
+    let project = Project::at(&dir.path().join("khối-4"));
     let path = [binary_folder(), "/usr/bin".into(), "/bin".into()];
     let path = std::env::join_paths(path).expect("a search path");
     for line in &commands {
         let line = match line.as_str() {
-            // The demo is smaller, and other files of a reader are copies of its files.
-            "mocban demo" => "mocban demo --pairs 6",
+            // The demo has just the results to judge, and other files of a reader are copies of its files.
+            "mocban demo" => "mocban demo --pairs 20",
             other => other,
         };
         if line.contains(" import ") {
@@ -240,6 +285,10 @@ fn the_commands_of_the_tutorial_work_in_order() {
             // A server runs until a person presses Ctrl-C.
             let words = line.split(' ').skip(1).chain(["--no-open", "--json"]);
             let mut page = Page::of(binary().current_dir(dir.path()).args(words));
+            if line.contains(" review ") {
+                page = page.with_session();
+                judge(&page, &project);
+            }
             rustix::process::kill_process(page.pid(), rustix::process::Signal::INT).expect("sent");
             assert_eq!(page.exit_code(), Some(0), "{line}");
             continue;
@@ -260,4 +309,5 @@ fn the_commands_of_the_tutorial_work_in_order() {
     ] {
         assert!(dir.path().join(file).is_file(), "{file}");
     }
+    check_report(&project);
 }

@@ -182,7 +182,7 @@ impl RunInOutage {
                 return;
             }
         }
-        panic!("no line with {wanted:?} in {seen:#?}");
+        unreachable!("no line with {wanted:?} in {seen:#?}");
     }
 
     /// Waits for the end. Returns the exit code and the remaining lines.

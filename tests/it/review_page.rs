@@ -22,7 +22,8 @@ pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -
     })
 }
 
-fn check_answers(project: &Project) -> Vec<AttentionCheckAnswer> {
+/// Returns the answers to attention checks and duplicates.
+pub(crate) fn check_answers(project: &Project) -> Vec<AttentionCheckAnswer> {
     ask(project, async |catalog| {
         catalog.attention_check_answers().await.expect("answers")
     })

@@ -232,8 +232,8 @@ pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]
     store_following(conn, table, &listed, before).await
 }
 
-/// Stores the checksums of new or changed rows of a table without chained checksums. The rows are those that a
-/// statement with the columns of [`Statements::listed`] returned.
+/// Stores the checksums of new or changed rows of a table without chained checksums: the rows that a statement with the
+/// columns of [`Statements::listed`] returned.
 pub(crate) async fn store_of_rows(
     conn: &mut Conn,
     table: ChecksummedTable,

@@ -11,10 +11,11 @@ use std::time::Instant;
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
-use object_store::{GetOptions, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload};
+use object_store::{GetOptions, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
 use super::client::{LazyClient, notice_interval, runtime, warn_of_wait};
+use super::object_stat::ObjectStat;
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -24,35 +25,6 @@ pub(in crate::store) struct Bucket {
     prefix: Path,
     /// The address without a slash at its end, such as `s3://scans/2024`.
     address: String,
-}
-
-/// Length, version and time of an object.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::store) struct ObjectStat {
-    /// Length in bytes.
-    pub(in crate::store) bytes: u64,
-    /// Changes if the content changes: the length and the entity tag, or the time of the last change.
-    pub(in crate::store) version: String,
-    /// The entity tag, if the store has one.
-    pub(super) tag: Option<String>,
-    /// Time of the last change by the clock of the store, in milliseconds since 1970.
-    pub(in crate::store) modified: i64,
-}
-
-impl From<&ObjectMeta> for ObjectStat {
-    fn from(meta: &ObjectMeta) -> Self {
-        let modified = meta.last_modified.timestamp_millis();
-        let id = match &meta.e_tag {
-            Some(tag) => tag.trim_matches('"').to_owned(),
-            None => modified.to_string(),
-        };
-        Self {
-            bytes: meta.size,
-            version: format!("{}:{id}", meta.size),
-            tag: meta.e_tag.clone(),
-            modified,
-        }
-    }
 }
 
 impl Bucket {

@@ -14,13 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
+use super::cache_files;
 use crate::domain::ContentHash;
 use crate::platform::rename;
 
 /// The store is not asked again whether an object has changed within this time.
 const FRESH: Duration = Duration::from_mins(1);
-/// Copies are removed until this share of the space is free again.
-const FREE_SHARE: f64 = 0.1;
 
 /// A folder of copies.
 #[derive(Debug)]
@@ -247,46 +246,17 @@ impl ObjectCache {
         let mut state = self.lock();
         let total = match state.bytes {
             Some(before) => before + bytes,
-            None => self.list().iter().map(|file| file.bytes).sum(),
+            None => cache_files::list(&self.folder)
+                .iter()
+                .map(|file| file.bytes)
+                .sum(),
         };
         // Copies of other processes are counted only here.
         state.bytes = Some(if total > self.max_bytes {
-            self.remove_oldest()
+            cache_files::remove_oldest(&self.folder, self.max_bytes)
         } else {
             total
         });
-    }
-
-    /// Removes the copies that were not used for the longest time. Returns the length of the others.
-    fn remove_oldest(&self) -> u64 {
-        let mut files = self.list();
-        files.sort_by_key(|file| file.used);
-        let mut total: u64 = files.iter().map(|file| file.bytes).sum();
-        let wanted = (self.max_bytes as f64 * (1.0 - FREE_SHARE)) as u64;
-        for file in files {
-            if total <= wanted {
-                break;
-            }
-            // Another process may have removed it. A file that another process reads stays readable.
-            if std::fs::remove_file(&file.path).is_ok() {
-                total = total.saturating_sub(file.bytes);
-            }
-        }
-        total
-    }
-
-    /// Returns all files of the cache.
-    fn list(&self) -> Vec<CacheFile> {
-        let folders = std::fs::read_dir(&self.folder)
-            .into_iter()
-            .flatten()
-            .flatten();
-        let inside = folders.flat_map(|entry| match std::fs::read_dir(entry.path()) {
-            Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
-            Err(error) if error.kind() == ErrorKind::NotADirectory => vec![entry.path()],
-            Err(_) => Vec::new(),
-        });
-        inside.filter_map(|path| CacheFile::of(&path)).collect()
     }
 }
 
@@ -301,29 +271,12 @@ impl Known {
     }
 }
 
-/// A file of the cache.
-struct CacheFile {
-    path: PathBuf,
-    bytes: u64,
-    used: SystemTime,
-}
-
-impl CacheFile {
-    fn of(path: &Path) -> Option<Self> {
-        let meta = std::fs::metadata(path).ok()?;
-        Some(Self {
-            path: path.to_owned(),
-            bytes: meta.len(),
-            used: meta.modified().ok()?,
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Read as _;
 
     use super::super::bucket::Bucket;
+    use super::super::cache_files::list;
     use super::{BucketError, ObjectCache};
 
     fn text(cache: &ObjectCache, bucket: &Bucket, key: &str) -> String {
@@ -361,7 +314,7 @@ mod tests {
             bucket.write(&key, vec![number; 500]).expect("written");
             drop(cache.open(&bucket, &key, 1000).expect("an object"));
         }
-        let left: u64 = cache.list().iter().map(|file| file.bytes).sum();
+        let left: u64 = list(&cache.folder).iter().map(|file| file.bytes).sum();
         assert!((500..=3500).contains(&left), "{left}");
         assert_eq!(text(&cache, &bucket, "19.png").as_bytes(), [19; 500]);
     }
@@ -373,7 +326,7 @@ mod tests {
         bucket.write("1.obj", b"whole".to_vec()).expect("written");
         let cache = ObjectCache::new(dir.path().to_owned(), 1000);
         assert_eq!(text(&cache, &bucket, "1.obj"), "whole");
-        for file in cache.list() {
+        for file in list(&cache.folder) {
             if file.bytes == 5 {
                 std::fs::write(&file.path, b"wh").expect("cut");
             }

@@ -3,8 +3,10 @@
 mod bucket;
 mod bucket_error;
 mod cache;
+mod cache_files;
 mod client;
 mod listing;
+mod object_stat;
 mod pack;
 mod recent;
 mod storage;
