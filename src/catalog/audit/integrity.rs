@@ -57,6 +57,8 @@ SELECT what FROM (
     FROM metric_result AS m WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = m.pair)
     UNION ALL SELECT 'attempt row ' || a.id || ' names a pair that is not there'
     FROM attempt AS a WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = a.pair)
+    UNION ALL SELECT 'job row ' || j.pair || ' names a pair that is not there' FROM job AS j
+    WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.id = j.pair)
     UNION ALL SELECT 'job row ' || j.pair || ' names a fingerprint that is not there' FROM job AS j
     WHERE j.fingerprint IS NOT NULL AND NOT EXISTS (SELECT 1 FROM fingerprint AS f WHERE f.id = j.fingerprint)
     UNION ALL SELECT 'job row ' || j.pair || ' names a worker that is not there' FROM job AS j

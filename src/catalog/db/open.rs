@@ -2,12 +2,16 @@
 
 use std::io::{ErrorKind, Read as _};
 use std::path::Path;
+use std::sync::LazyLock;
 use std::time::Duration;
 
+use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{AssertSqlSafe, ConnectOptions, Connection as _, Row as _, SqliteConnection};
+use sqlx::{
+    AssertSqlSafe, ConnectOptions, Connection as _, Row as _, SqlSafeStr as _, SqliteConnection,
+};
 
 use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::error::{CatalogError, Result};
@@ -25,7 +29,12 @@ pub(crate) const SCHEMA_VERSION: i64 = 11;
 /// Read connections per process.
 const READERS: u32 = 4;
 
-pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx_macros::migrate!("./migrations/sqlite");
+/// The migrations of SQLite. The macro of sqlx that reads the folder would compile sqlx a second time.
+pub(crate) static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| {
+    let sql = include_str!("../../../migrations/sqlite/0001_initial.sql").into_sql_str();
+    let kind = MigrationType::Simple;
+    Migrator::with_migrations(vec![Migration::new(1, "initial".into(), kind, sql, false)])
+});
 
 /// Returns the options of every connection.
 fn options(path: &Path) -> SqliteConnectOptions {

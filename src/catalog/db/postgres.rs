@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use sqlx::migrate::Migrator;
 use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions, PgSslMode};
 use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Row as _, Transaction};
 
@@ -41,7 +40,8 @@ const READ_ONLY: &str = "SET default_transaction_read_only = on;";
 /// Returns the server process that serves a connection.
 const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 
-static MIGRATOR: Migrator = sqlx_macros::migrate!("./migrations/postgres");
+/// The statements that create the schema.
+const CREATE: &str = include_str!("../../../migrations/postgres/0001_initial.sql");
 
 /// Where a catalog is: a server, a database and a schema.
 #[derive(Debug, Clone)]
@@ -272,11 +272,7 @@ impl PostgresAddress {
         sqlx::raw_sql(sqlx::AssertSqlSafe(create))
             .execute(&mut **transaction)
             .await?;
-        for migration in MIGRATOR.iter() {
-            sqlx::raw_sql(migration.sql.clone())
-                .execute(&mut **transaction)
-                .await?;
-        }
+        sqlx::raw_sql(CREATE).execute(&mut **transaction).await?;
         Ok(true)
     }
 }

@@ -54,10 +54,16 @@ pub struct PairChange {
     pub fields: Vec<&'static str>,
 }
 
-/// Selects the attributes of pairs by their names.
-pub(crate) const SELECT: &str = "
+/// Selects the attributes of pairs by their names. The planner of PostgreSQL, which does not know how many names there
+/// are, would join the names with the whole table.
+pub(crate) const SELECT: Sql = Sql::pair(
+    "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
-FROM pair WHERE name IN (SELECT atom FROM json_each(?1))";
+FROM pair WHERE name IN (SELECT atom FROM json_each(?1))",
+    "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
+FROM pair WHERE name = ANY (ARRAY(SELECT atom FROM json_each(?1)))",
+);
 
 /// Builds the text that adds new pairs and updates existing ones, from its items. If a path changed, clears the `stat` of
 /// that file, so that the next run reads the file again. Returns the columns that a checksum needs.
