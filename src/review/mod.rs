@@ -6,6 +6,7 @@
 mod alignment_editor;
 mod answer;
 mod assets;
+mod cache_slots;
 mod check_items;
 mod examples;
 mod history;
