@@ -33,7 +33,8 @@
 //! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
 //!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
 //!     turns by SQLite's lock (`busy_retry.rs`)
-//! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
+//! 14. `src/catalog/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a finished
+//!     stage and renew or end the lease
 //! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
 //!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
 //! 16. `src/report/build.rs`: iterates over all pairs
@@ -86,8 +87,13 @@
 //! The catalog is a file of SQLite, or in PostgreSQL so that several computers can share it. `db/conn.rs` holds a connection
 //! to either, `db/query.rs` and `db/script.rs` run statements, and `db/value.rs` and `db/row.rs` read values, the same for
 //! both. Most statements have one text: `db/dialect.rs` translates it, and `migrations/postgres` creates the functions of
-//! SQLite that it uses. The statements of claims and checkpoints have two. All writes except group commits hold one lock,
-//! so they run one after another in both databases. Every test of the catalog runs on both.
+//! SQLite that it uses. All writes except group commits hold one lock, so they run one after another in both databases.
+//! Every test of the catalog runs on both.
+//!
+//! Claims and checkpoints have statements for each database. In SQLite, a group commit is one transaction
+//! (`db/group_commit.rs`). In PostgreSQL, each claim, and the checkpoints of a batch, are one statement that commits by
+//! itself (`db/server_commit.rs`, `queue/server_claim.rs`, `queue/server_checkpoint.rs`). Its rows are one array per column
+//! (`db/column_arrays.rs`), and settings of the write connection keep the planner to indexes (`db/postgres.rs`).
 //!
 //! In PostgreSQL, claims begin behind the last claimed pair (`queue/claim_start.rs`), because they would otherwise pass over
 //! all pairs claimed before while another session holds a snapshot. So they do not always lease the most advanced pairs
@@ -124,9 +130,9 @@
 //! Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
-//! `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job only if the worker and the token equal those of the
-//! lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock. If a statement
-//! returns no row for a job, `group_commit.rs` stores nothing of that job's request, and the worker learns it from the
+//! `src/catalog/queue/checkpoint.rs`, `server_checkpoint.rs` and `fail.rs` change a job only if the worker and the token
+//! equal those of the lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock.
+//! If a statement returns no row for a job, nothing of that job's request is stored, and the worker learns it from the
 //! reply of `src/catalog/queue/api.rs`:
 //!
 //! | refused write | reply | noticed in | what happens |

@@ -85,15 +85,15 @@ async fn claim(
     request: &ClaimRequest,
     state: &mut CatalogServerState,
 ) -> Result<Vec<Lease>> {
+    // Before the claim, because nothing may fail between its commit and its reply.
+    let unknown = state.leases.unknown(conn, request.worker).await?;
     let began = Instant::now();
     let start = state.claim_start.of(request, began);
     let mut claimed = server_claim::claim(conn, request, start).await?;
     let times = [began, Instant::now()];
     state.claim_start.note(request, start, &claimed, times);
-    state.leases.add(&claimed);
-    let unknown = state.leases.unknown(conn, request.worker).await?;
-    state.leases.add(&unknown);
     claimed.extend(unknown);
+    state.leases.add(&claimed);
     Ok(claimed)
 }
 
