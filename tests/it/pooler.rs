@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use sqlx::postgres::PgConnectOptions;
+use sqlx::{ConnectOptions as _, Row as _};
+
 use crate::cli::{Call, binary, call, empty, mocban};
 use crate::postgres_server::{Server, other_user};
 use crate::resume::{copy_folder, project};
@@ -52,6 +55,27 @@ impl Pooler {
                 .args(args),
         )
     }
+}
+
+/// Returns settings of the program that other clients of a pooler would get.
+fn left_settings(url: &str) -> Vec<String> {
+    const LEFT: &str = "SELECT name FROM pg_settings WHERE source = 'session'
+        AND name IN ('default_transaction_read_only', 'enable_seqscan', 'jit', 'plan_cache_mode', 'search_path')";
+    let options: PgConnectOptions = url.parse().expect("a URL");
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(async {
+        // The pooler refuses this parameter.
+        let mut conn = options
+            .extra_float_digits(None)
+            .connect()
+            .await
+            .expect("a connection");
+        let rows = sqlx::raw_sql(LEFT)
+            .fetch_all(&mut conn)
+            .await
+            .expect("rows");
+        rows.iter().map(|row| row.get(0)).collect()
+    })
 }
 
 impl Drop for Pooler {
@@ -104,5 +128,6 @@ fn a_pooler_by_session_works_and_one_by_transaction_is_refused_in_one_sentence()
             refused.err
         );
         assert_eq!(refused.err.trim_end().lines().count(), 1, "{}", refused.err);
+        assert!(left_settings(&pooler.url).is_empty(), "{command:?}");
     }
 }

@@ -114,8 +114,8 @@ impl PostgresAddress {
     /// Returns an error if the server does not answer or refuses, if a connection pooler pools by transaction, or if the
     /// schema is missing or has another version.
     pub(crate) async fn connect(&self, may_create: bool) -> Result<PgConnection> {
-        let mut conn = self.connect_with(BY_INDEX).await?;
-        self.require_session(&mut conn).await?;
+        let mut conn = self.connect_to_own_process().await?;
+        self.configure(&mut conn, BY_INDEX).await?;
         if self.version(&mut conn).await?.is_none() {
             if !may_create {
                 return Err(CatalogError::NoSchema(self.text()));
@@ -131,7 +131,8 @@ impl PostgresAddress {
     /// # Errors
     /// As for [`Self::connect`], except that it asks for no pooler.
     pub(crate) async fn reconnect(&self) -> Result<PgConnection> {
-        let mut conn = self.connect_with(BY_INDEX).await?;
+        let mut conn = self.connect_unconfigured().await?;
+        self.configure(&mut conn, BY_INDEX).await?;
         self.require_current(&mut conn).await?;
         Ok(conn)
     }
@@ -141,10 +142,12 @@ impl PostgresAddress {
     /// # Errors
     /// As for [`Self::connect`].
     pub(crate) async fn reader_pool(&self, asks_for_pooler: bool) -> Result<PgPool> {
-        let mut conn = self.connect_with(READ_ONLY).await?;
-        if asks_for_pooler {
-            self.require_session(&mut conn).await?;
-        }
+        let mut conn = if asks_for_pooler {
+            self.connect_to_own_process().await?
+        } else {
+            self.connect_unconfigured().await?
+        };
+        self.configure(&mut conn, READ_ONLY).await?;
         self.require_current(&mut conn).await?;
         conn.close().await?;
         let settings = self.settings(READ_ONLY);
@@ -158,23 +161,24 @@ impl PostgresAddress {
         Ok(pool.connect_lazy_with(self.options.clone()))
     }
 
-    /// Checks that a connection keeps its server process to itself while it is idle. A pooler by transaction gives this
-    /// process to the next statement of another connection.
+    /// Opens a connection, and checks that it keeps its server process to itself while it is idle. A pooler by transaction
+    /// gives this process to the next statement of another connection. So nothing is configured before the check.
     ///
     /// # Errors
     /// Returns an error if the process is shared, or if the server does not answer or refuses.
-    async fn require_session(&self, conn: &mut PgConnection) -> Result<()> {
-        let first = server_process(conn).await?;
-        let mut other = self.connect_with(READ_ONLY).await?;
+    async fn connect_to_own_process(&self) -> Result<PgConnection> {
+        let mut conn = self.connect_unconfigured().await?;
+        let mut other = self.connect_unconfigured().await?;
+        let first = server_process(&mut conn).await?;
         let second = server_process(&mut other).await?;
         let mut is_kept = first != second;
         for _ in 0..POOLER_ROUNDS {
-            is_kept &= server_process(conn).await? == first;
+            is_kept &= server_process(&mut conn).await? == first;
             is_kept &= server_process(&mut other).await? == second;
         }
         other.close().await?;
         if is_kept {
-            return Ok(());
+            return Ok(conn);
         }
         Err(CatalogError::TransactionPooler(self.text()))
     }
@@ -182,9 +186,11 @@ impl PostgresAddress {
     /// Opens a connection, whether or not the database has a catalog.
     ///
     /// # Errors
-    /// Returns an error if the server does not answer or refuses.
+    /// Returns an error if the server does not answer or refuses, or if a connection pooler pools by transaction.
     pub(crate) async fn connect_to_database(&self) -> Result<PgConnection> {
-        self.connect_with("").await
+        let mut conn = self.connect_to_own_process().await?;
+        self.configure(&mut conn, "").await?;
+        Ok(conn)
     }
 
     /// Returns the statements that configure a connection.
@@ -194,23 +200,21 @@ impl PostgresAddress {
         format!("SET search_path = {schema};\n{SETTINGS}\n{more}")
     }
 
-    /// Opens a connection with these settings besides those of every connection.
-    async fn connect_with(&self, settings: &str) -> Result<PgConnection> {
-        let connecting = async {
-            let mut conn = self.options.connect().await?;
-            configure(&mut conn, self.settings(settings)).await?;
-            Ok(conn)
-        };
-        let connected = tokio::time::timeout(CONNECT_TIMEOUT, connecting).await;
-        let connected = connected.unwrap_or_else(|_| {
-            let error = std::io::Error::from(std::io::ErrorKind::TimedOut);
-            Err(sqlx::Error::Io(error))
-        });
-        let conn = connected.map_err(|error| CatalogError::NotConnected {
-            address: self.text(),
-            reason: connection_error(&error),
-            is_unavailable: CatalogErrorKind::of(&error) == Some(CatalogErrorKind::Unavailable),
-        })?;
+    /// Sets the settings of every connection, and these.
+    async fn configure(&self, conn: &mut PgConnection, settings: &str) -> Result<()> {
+        let configuring = configure(conn, self.settings(settings));
+        let configured = tokio::time::timeout(CONNECT_TIMEOUT, configuring).await;
+        configured
+            .unwrap_or_else(|_| Err(timed_out()))
+            .map_err(|error| self.not_connected(&error))
+    }
+
+    /// Opens a connection with the settings of the server.
+    async fn connect_unconfigured(&self) -> Result<PgConnection> {
+        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.options.connect()).await;
+        let conn = connected
+            .unwrap_or_else(|_| Err(timed_out()))
+            .map_err(|error| self.not_connected(&error))?;
         let version = conn.server_version_num().unwrap_or(0) / 10_000;
         if version < OLDEST_SERVER {
             return Err(CatalogError::NotConnected {
@@ -220,6 +224,14 @@ impl PostgresAddress {
             });
         }
         Ok(conn)
+    }
+
+    fn not_connected(&self, error: &sqlx::Error) -> CatalogError {
+        CatalogError::NotConnected {
+            address: self.text(),
+            reason: connection_error(error),
+            is_unavailable: CatalogErrorKind::of(error) == Some(CatalogErrorKind::Unavailable),
+        }
     }
 
     /// Returns the version of the schema, or `None` if there is no catalog.
@@ -275,6 +287,11 @@ impl PostgresAddress {
         sqlx::raw_sql(CREATE).execute(&mut **transaction).await?;
         Ok(true)
     }
+}
+
+/// Returns the error of a connection attempt that took too long.
+fn timed_out() -> sqlx::Error {
+    sqlx::Error::Io(std::io::Error::from(std::io::ErrorKind::TimedOut))
 }
 
 /// Runs statements that configure a connection.
