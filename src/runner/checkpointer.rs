@@ -28,7 +28,7 @@ pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// `false` if an immediate stop left a stage unstored. A lost lease does not change this flag.
+    /// `false` if a stage is unstored because of a stop request or an unavailable object store. A lost lease does not change this flag.
     is_complete: bool,
 }
 
@@ -44,8 +44,8 @@ impl StoredStages {
         }
     }
 
-    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or an
-    /// immediate stop left a stage unstored.
+    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or a
+    /// stage is unstored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let end = match &self.lease {
             CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
@@ -76,7 +76,7 @@ impl Checkpointer {
     }
 
     /// Sends a computed stage to be stored. Returns `false` if the task has ended: the lease is lost, the disk or the
-    /// catalog returned an error, or an immediate stop was requested.
+    /// catalog returned an error, or a stage was not stored because of a stop request or an unavailable object store.
     pub(super) fn store(&self, stage: ComputedStage) -> bool {
         self.stages.send(stage).is_ok()
     }

@@ -5,8 +5,8 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
-use tokio::time::{Instant, timeout_at};
+use tokio::sync::{Notify, mpsc};
+use tokio::time::{Instant, timeout, timeout_at};
 
 use super::compute_thread::{ComputedStage, run_blocking};
 use super::error::RunError;
@@ -27,11 +27,14 @@ const STORE_PAUSE: Duration = Duration::from_secs(1);
 /// Much shorter than the time after a deadline when another process recovers the lease.
 const SHORTEST_STORE_WAIT: Duration = Duration::from_secs(10);
 
-/// Time after a stop request during which results are still stored in an object store.
-const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(5);
+/// An object store is considered unavailable if it has not stored results for this long.
+const SLOW_WRITE: Duration = Duration::from_secs(20);
+
+/// Time after a stop request during which an unavailable object store is still waited for.
+const STORE_WAIT_AFTER_STOP: Duration = Duration::from_secs(5);
 
 /// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
-/// and `false` if an immediate stop left a stage unwritten.
+/// and `false` if a stage is unwritten because of a stop request or an unavailable object store.
 pub(super) async fn write_batch(
     context: &RunContext,
     pair: &PairName,
@@ -129,8 +132,8 @@ async fn write_pack(
 }
 
 /// Runs `writing` on a thread for blocking calls, again and again while the object store is unavailable. Returns `None`
-/// if it is still unavailable after `longest`, before another process considers the lease overdue and blames the pair,
-/// or after a stop request.
+/// if nothing is stored after `longest`, before another process considers the lease overdue and blames the pair. After a
+/// stop request, it also returns `None` if the store is unavailable, or at once if the stop is immediate.
 ///
 /// # Errors
 /// Returns the error of `writing` unless the store is unavailable.
@@ -139,32 +142,39 @@ async fn stored_in_bucket<T: Send + 'static>(
     writing: impl Fn() -> Result<T, ArtifactError> + Clone + Send + 'static,
     longest: Duration,
 ) -> Result<Option<T>, ArtifactError> {
+    let unavailable = Notify::new();
     let storing = async {
+        let mut warned = false;
         loop {
             match run_blocking(writing.clone()).await {
                 Err(error) if error.is_unavailable() => {
-                    tracing::warn!("{error}; waiting for it to store results");
+                    unavailable.notify_one();
+                    if !warned {
+                        tracing::warn!("{error}; waiting for it to store results");
+                    }
+                    warned = true;
                     tokio::time::sleep(STORE_PAUSE).await;
                 }
                 outcome => return outcome.map(Some),
             }
         }
     };
-    let stopped = async {
+    let gave_up = async {
+        // Returns at once if the store was unavailable before.
+        let _ = timeout(SLOW_WRITE, unavailable.notified()).await;
         context.stop.reached(StopLevel::Drain).await;
-        tokio::select! {
-            () = context.stop.reached(StopLevel::Now) => {}
-            () = tokio::time::sleep(UNAVAILABLE_AFTER_STOP) => {}
-        }
+        tokio::time::sleep(STORE_WAIT_AFTER_STOP).await;
     };
     tokio::select! {
         biased;
         outcome = storing => outcome,
-        () = stopped => Ok(None),
+        () = context.stop.reached(StopLevel::Now) => Ok(None),
+        () = gave_up => Ok(None),
         () = tokio::time::sleep(longest) => {
             let seconds = longest.as_secs();
             tracing::warn!(
-                "the object store stored nothing for {seconds} s; the pair is released and computed again"
+                "the results of a pair were not stored within {seconds} s; the pair is released and computed again. \
+                 If the object store works but the network is slow, increase run.stage_timeout_s"
             );
             Ok(None)
         }

@@ -32,6 +32,14 @@ pub enum BucketError {
         /// What was tried, without the reply of the store.
         reason: String,
     },
+    /// The store refuses the request for another reason, which will be the same next time.
+    #[error("{address}: the object store refuses the request ({reason})")]
+    Failed {
+        /// Which object or folder.
+        address: String,
+        /// The store's error code, such as `EntityTooLarge`, or the HTTP status.
+        reason: String,
+    },
     /// The address is not that of a folder in a bucket, or the environment lacks something.
     #[error("{address}: {reason}")]
     Address {
@@ -80,16 +88,47 @@ impl BucketError {
                 address,
                 code: code.unwrap_or("permission denied").to_owned(),
             },
-            (_, Some(code)) => Self::Unavailable {
+            (error, code) => Self::of_reply(address, error, code),
+        }
+    }
+
+    /// Converts an error that is not about access.
+    fn of_reply(address: String, error: &object_store::Error, code: Option<&str>) -> Self {
+        let status = status_of(error);
+        let status_text = status.map(|status| format!("HTTP status {status}"));
+        let reason = code.map(str::to_owned).or(status_text);
+        match reason {
+            Some(reason) if !is_temporary(code, status) => Self::Failed { address, reason },
+            reason => Self::Unavailable {
                 address,
-                reason: code.to_owned(),
-            },
-            (error, None) => Self::Unavailable {
-                address,
-                reason: innermost(error),
+                reason: reason.unwrap_or_else(|| innermost(error)),
             },
         }
     }
+}
+
+/// Returns whether a reply with this code and HTTP status may be another one later.
+fn is_temporary(code: Option<&str>, status: Option<u16>) -> bool {
+    match (code, status) {
+        // 507 is a full store.
+        (_, Some(408 | 429 | 500..=506 | 508..)) => true,
+        (Some(code), _) => matches!(
+            code,
+            "InternalError"
+                | "OperationAborted"
+                | "RequestTimeout"
+                | "ServiceUnavailable"
+                | "SlowDown"
+        ),
+        (None, status) => status.is_none(),
+    }
+}
+
+/// Returns the HTTP status of the reply that an error quotes.
+fn status_of(error: &object_store::Error) -> Option<u16> {
+    let text = error.to_string();
+    let (_, rest) = text.split_once("status code: ")?;
+    rest.get(..3)?.parse().ok()
 }
 
 /// Returns whether the code of an error is about credentials or permissions, whatever its HTTP status is.
@@ -151,5 +190,31 @@ mod tests {
         assert!(matches!(error, BucketError::NoBucket(_)), "{error}");
         let error = BucketError::of("s3://b", &generic("<html>AKIASECRET</html>"));
         assert!(error.to_string().contains("unexpected reply"), "{error}");
+    }
+
+    #[test]
+    fn only_replies_that_may_change_are_waited_for() {
+        let is_waited_for = |text: &str| {
+            let error = BucketError::of("s3://b/x", &generic(text));
+            matches!(error, BucketError::Unavailable { .. })
+        };
+        for temporary in [
+            "Server returned non-2xx status code: 503 Service Unavailable: <Code>SlowDown</Code>",
+            "Server returned non-2xx status code: 502 Bad Gateway: <html></html>",
+            "Server returned non-2xx status code: 429 Too Many Requests: ",
+            "Server returned non-2xx status code: 400 Bad Request: <Code>RequestTimeout</Code>",
+            "Server returned error response: <Error><Code>InternalError</Code></Error>",
+            "connection refused",
+        ] {
+            assert!(is_waited_for(temporary), "{temporary}");
+        }
+        for lasting in [
+            "Server returned non-2xx status code: 400 Bad Request: <Code>EntityTooLarge</Code>",
+            "Server returned non-2xx status code: 413 Payload Too Large: <html></html>",
+            "Server returned non-2xx status code: 507 Insufficient Storage: <Code>XMinioStorageFull</Code>",
+            "Server returned error response: <Error><Code>QuotaExceeded</Code></Error>",
+        ] {
+            assert!(!is_waited_for(lasting), "{lasting}");
+        }
     }
 }

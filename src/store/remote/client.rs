@@ -18,7 +18,7 @@ const SILENCE: Duration = Duration::from_secs(30);
 const GIVE_UP: Duration = Duration::from_mins(4);
 /// A first request that only shows whether the store answers is given up after this time.
 const GIVE_UP_FIRST: Duration = Duration::from_secs(5);
-/// While a request waits for its reply, a warning says so at this interval.
+/// While a request lasts, a warning says so at this interval.
 const NOTICE_EVERY: Duration = Duration::from_secs(20);
 /// Threads that send requests.
 const THREADS: usize = 2;
@@ -30,12 +30,12 @@ fn time_scale() -> u32 {
     *SCALE
 }
 
-/// Returns the interval of warnings about a request without a reply.
+/// Returns the interval of warnings about a request that lasts.
 pub(super) fn notice_interval() -> Duration {
     NOTICE_EVERY / time_scale()
 }
 
-/// Warns that a request has had no reply since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
+/// Warns that a request has not ended since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
 pub(super) fn warn_of_wait(address: &str, begun: Instant) {
     static LAST: Mutex<Option<Instant>> = Mutex::new(None);
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
@@ -45,7 +45,7 @@ pub(super) fn warn_of_wait(address: &str, begun: Instant) {
     }
     *last = Some(Instant::now());
     let seconds = begun.elapsed().as_secs();
-    tracing::warn!("{address}: no reply of the object store for {seconds} s; waiting");
+    tracing::warn!("{address}: a request to the object store has taken {seconds} s; waiting");
 }
 
 static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
