@@ -21,7 +21,8 @@ use std::fmt::Display;
 /// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Point {
-    /// The claim is written but not committed. `@PAIR` never matches here.
+    /// The claim is written but not committed. In PostgreSQL, it is committed and its reply is not used yet. `@PAIR` never
+    /// matches here.
     Claiming,
     /// The pair is leased, nothing is computed.
     Claimed,
@@ -31,7 +32,7 @@ pub(crate) enum Point {
     Written,
     /// The stage's files are on the disk, no row names them.
     Synced,
-    /// The stage's rows are written but not committed. `@PAIR` never matches here.
+    /// The stage's rows are written but not committed. In PostgreSQL, they are not sent yet. `@PAIR` never matches here.
     Recorded,
     /// The stage's rows are committed.
     Committed,

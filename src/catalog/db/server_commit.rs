@@ -16,7 +16,22 @@ use crate::catalog::queue::{server_checkpoint, server_claim};
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
 /// reply was lost.
+///
+/// # Errors
+/// Returns an error if a database operation fails. A part of the batch may be stored nevertheless.
 pub(crate) async fn commit(
+    batch: &Batch,
+    conn: &mut Conn,
+    state: &mut CatalogServerState,
+) -> Result<BatchReply> {
+    let outcome = commit_parts(batch, conn, state).await;
+    if outcome.is_err() {
+        state.leases.replies_may_be_lost();
+    }
+    outcome
+}
+
+async fn commit_parts(
     batch: &Batch,
     conn: &mut Conn,
     state: &mut CatalogServerState,
@@ -92,9 +107,15 @@ async fn claim(
     let mut claimed = server_claim::claim(conn, request, start).await?;
     let times = [began, Instant::now()];
     state.claim_start.note(request, start, &claimed, times);
-    claimed.extend(unknown);
+    claimed.extend(without_pairs_of(unknown, &claimed));
     state.leases.add(&claimed);
     Ok(claimed)
+}
+
+/// Returns leases without those of a pair that was leased again meanwhile.
+fn without_pairs_of(mut leases: Vec<Lease>, later: &[Lease]) -> Vec<Lease> {
+    leases.retain(|lease| later.iter().all(|other| other.pair != lease.pair));
+    leases
 }
 
 /// Lets claims search from the beginning after an exclusive lease, which prevented claims.

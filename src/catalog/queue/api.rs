@@ -10,10 +10,12 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{UnixMillis, WorkerId, WorkerMetrics};
 
 impl Catalog {
-    /// Leases up to `slots` ready pairs, or none if the worker has ended or its heartbeat is before `alive_since`.
+    /// Leases up to `slots` ready pairs, or none if the worker has ended or its heartbeat is before `alive_since`. May also
+    /// return leases of an earlier claim whose reply was lost.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is leased.
+    /// Returns an error if a database operation fails. On a server, pairs may be leased nevertheless. A later claim of the
+    /// worker returns them.
     pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
         self.grouped(|reply| Request::Claim(request, reply)).await
     }
@@ -49,13 +51,13 @@ impl Catalog {
             .await
     }
 
-    /// Stores finished stages in one transaction and advances the job. The stages must be in the order they were
+    /// Stores finished stages and advances the job, both or neither. The stages must be in the order they were
     /// computed, and their artifacts must be on disk already. The commit may be delayed so that later requests can
     /// share it. Call [`Catalog::waiting`] to turn the delay off.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is stored, and the lease remains until it
-    /// is recovered.
+    /// Returns an error if a database operation fails. In that case nothing is stored, unless a server stored it and the
+    /// reply was lost. The lease remains until it is recovered.
     pub async fn checkpoint(
         &self,
         lease: Lease,
