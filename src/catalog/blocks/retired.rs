@@ -23,15 +23,30 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 
     CAST(value ->> 4 AS bigint), CAST(value ->> 5 AS bigint), ?2 FROM json_each(?1) WHERE true
 ON CONFLICT (pair) DO NOTHING";
 
-/// Gives retired pairs of these names their jobs back. A job whose pair changed meanwhile is stale, so it is dirty. A
-/// pair stays quarantined if its failure is stored. The first condition saves looking up all names.
-const RESTORE: &str = "
+/// Builds the statement that gives retired pairs of some names their jobs back, from the condition on the name. A job
+/// whose pair changed meanwhile is stale, so it is dirty. A pair stays quarantined if its failure is stored. The first
+/// condition saves looking up all names.
+macro_rules! restore {
+    ($has_name:literal) => {
+        concat!(
+            "
 INSERT INTO job (pair, stage, status, token, fingerprint, dirty, low_confidence)
 SELECT r.pair, r.stage, CASE WHEN r.stage = 4 THEN 3 WHEN r.is_quarantined = 1 AND f.pair IS NOT NULL THEN 4 ELSE 0 END,
     r.token + 1, r.fingerprint, 1, r.low_confidence
 FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair LEFT JOIN failure AS f ON f.pair = r.pair
-WHERE EXISTS (SELECT 1 FROM retired_pair) AND p.name IN (SELECT atom FROM json_each(?1))
-RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint";
+WHERE EXISTS (SELECT 1 FROM retired_pair) AND ",
+            $has_name,
+            "
+RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
+        )
+    };
+}
+
+/// Restores the jobs of these names. With `IN`, PostgreSQL may read all pairs while it has no statistics.
+const RESTORE: Sql = Sql::pair(
+    restore!("p.name IN (SELECT atom FROM json_each(?1))"),
+    restore!("p.name = ANY (ARRAY(SELECT atom FROM json_each(?1)))"),
+);
 
 const CLEAR: &str = "
 DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
