@@ -58,9 +58,9 @@ pub(super) enum ImageError {
     /// The pair has a new result.
     #[error("this pair has a new result; reload the page")]
     Gone,
-    /// A run computes the pair again, so some of its results are missing.
-    #[error("this pair is being computed again; try again when its new result is stored")]
-    BeingComputed,
+    /// A run computes the pair again, or it failed, so some of its results are missing.
+    #[error("this pair has no complete result at the moment; try again when a run has computed it")]
+    Incomplete,
     /// The scan cannot be shown in 3D.
     #[error(transparent)]
     Scan(#[from] PictureError),
@@ -289,7 +289,7 @@ impl ImageCache {
     /// Checks that the pair of an item still has the result that the item shows.
     ///
     /// # Errors
-    /// Returns an error if the pair has a new result, or is being computed again.
+    /// Returns an error if the pair has a new result, or no complete result.
     pub(super) async fn require_current(&self, item: &Arc<ReviewItem>) -> Result<(), ImageError> {
         let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
             require_current(&PairArtifacts::new(project, pair), item)
@@ -345,7 +345,7 @@ impl ImageCache {
         let found = self.catalog.pair(&item.pair).await?;
         let pair = found.ok_or(ImageError::Gone)?.results;
         if pair.next_stage.is_some() {
-            return Err(ImageError::BeingComputed);
+            return Err(ImageError::Incomplete);
         }
         let (project, item) = (self.project.clone(), Arc::clone(item));
         tokio::task::spawn_blocking(move || {

@@ -221,7 +221,7 @@ fn while_a_pair_is_computed_again_its_editor_says_so_and_then_shows_the_stored_r
         for reply in [editor(), mask(), save()] {
             assert_eq!(reply.status, 503);
             let error = reply.json()["error"].to_string();
-            assert!(error.contains("being computed again"), "{error}");
+            assert!(error.contains("no complete result"), "{error}");
         }
         held.finish();
         for reply in [editor(), mask(), save()] {
