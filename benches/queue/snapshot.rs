@@ -135,9 +135,17 @@ async fn lines(
             let at = (finished.claims.len().saturating_sub(1) as f64 * share) as usize;
             finished.claims.get(at).map_or(0.0, Duration::as_secs_f64) * 1e3
         };
+        let last_time = LAST_TIME.min(limit).as_secs_f64();
+        let at_end = format!("{:.0}", finished.last_pairs as f64 / last_time);
+        // Otherwise no pairs were left before the end.
+        let at_end = if time >= limit {
+            at_end
+        } else {
+            "-".to_owned()
+        };
         writeln!(
             table,
-            "| {} | {} | {} | {} | {:.0} | {:.0} | {:.1} / {:.1} |",
+            "| {} | {} | {} | {} | {:.0} | {} | {:.1} / {:.1} |",
             if load.has_results {
                 "results of four stages"
             } else {
@@ -147,7 +155,7 @@ async fn lines(
             if is_snapshot_held { "yes" } else { "no" },
             finished.pairs,
             finished.pairs as f64 / time.as_secs_f64(),
-            finished.last_pairs as f64 / LAST_TIME.min(limit).as_secs_f64(),
+            at_end,
             ms(0.5),
             ms(0.95)
         )?;

@@ -1,4 +1,4 @@
-//! Group commit: stores a batch of requests in one transaction, with two round trips.
+//! Group commit: stores a batch of requests in one transaction. On a server, only the rarer requests share one.
 
 use std::sync::Arc;
 
@@ -151,12 +151,13 @@ impl Batch {
     }
 
     /// Adds the statements of the second round trip, which store results, failures and counters. Returns the replies.
+    /// `found` are the jobs of failures and releases that an earlier commit has stored.
     fn add_records(
         &self,
         script: &mut Script,
         statements: &JobStatements,
         rows: &ScriptRows,
-        stored_before: &[FencedRow],
+        found: &[FencedRow],
     ) -> Result<BatchReply> {
         let mut deltas = Deltas::default();
         let advanced = rows.read_if_any(statements.advanced.as_ref())?;
@@ -185,10 +186,10 @@ impl Batch {
             heartbeats: heartbeats.collect::<Result<_>>()?,
             checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
             failures: failures
-                .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(stored_before))
+                .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(found))
                 .collect(),
             releases: releases
-                .map(|lease| lease.is_in(&released) || lease.is_in(stored_before))
+                .map(|lease| lease.is_in(&released) || lease.is_in(found))
                 .collect(),
             claims,
         })

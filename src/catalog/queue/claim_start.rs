@@ -48,14 +48,15 @@ impl ClaimStart {
         })
     }
 
-    /// Records what a claim found, in the order of the claim. `began` is when its transaction began.
+    /// Records what a claim found, in the order of the claim. `times` are when the claim began and ended.
     pub(crate) fn note(
         &mut self,
         request: &ClaimRequest,
         behind: Option<Behind>,
         leases: &[Lease],
-        [began, now]: [Instant; 2],
+        times: [Instant; 2],
     ) {
+        let [began, now] = times;
         if !Self::applies_to(request) {
             return;
         }

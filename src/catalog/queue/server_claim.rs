@@ -11,7 +11,7 @@ use crate::catalog::queue::lease::Lease;
 /// Builds the text that selects ready jobs from the tables, a condition and a limit. It skips jobs that another process
 /// is about to lease.
 macro_rules! ready {
-    ($from:literal, $condition:literal, $limit:literal) => {
+    ($from:expr, $condition:literal, $limit:literal) => {
         concat!(
             "SELECT j.pair FROM ",
             $from,
@@ -22,6 +22,13 @@ macro_rules! ready {
             $limit,
             " FOR UPDATE OF j SKIP LOCKED"
         )
+    };
+}
+
+/// The tables of a claim that leases only the pairs `?6`.
+macro_rules! among {
+    () => {
+        "json_each(?6) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)"
     };
 }
 
@@ -69,22 +76,11 @@ const CLAIM_EXCLUSIVE: &str = claim!("", ready!("job AS j", " AND j.exclusive = 
 /// Like [`CLAIM`], but leases only the pairs `?6`.
 const CLAIM_AMONG: &str = claim!(
     " AND other.exclusive = 1",
-    ready!(
-        "json_each(?6) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)",
-        " AND j.exclusive = 0",
-        "?5"
-    )
+    ready!(among!(), " AND j.exclusive = 0", "?5")
 );
 
 /// Like [`CLAIM_EXCLUSIVE`], but leases only one of the pairs `?6`.
-const CLAIM_AMONG_EXCLUSIVE: &str = claim!(
-    "",
-    ready!(
-        "json_each(?6) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)",
-        " AND j.exclusive = 1",
-        "?5"
-    )
-);
+const CLAIM_AMONG_EXCLUSIVE: &str = claim!("", ready!(among!(), " AND j.exclusive = 1", "?5"));
 
 /// Like [`CLAIM`], but leases jobs with the turn `?6` behind the pair `?7` first, and others only if there are too few
 /// and the limit `?8` permits it. The two conditions on `turn` are an equality that the planner does not recognize. With
