@@ -26,8 +26,8 @@ const END: &str = "
 WITH ended AS (
     UPDATE job SET status = 3, stage = 4, worker = NULL, deadline = NULL
     WHERE pair = ANY ($1) AND worker = $2 AND status = 1 RETURNING 1)
-INSERT INTO counter_part (slot, stage, status, fingerprint, n)
-SELECT pg_backend_pid() % 256, stage, status, 0, sign * (SELECT count(*) FROM ended)
+INSERT INTO counter_part (stage, status, fingerprint, n)
+SELECT stage, status, 0, sign * (SELECT count(*) FROM ended)
 FROM (VALUES (0, 1, -1), (4, 3, 1)) AS item (stage, status, sign)
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n";
 

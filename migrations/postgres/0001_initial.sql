@@ -196,9 +196,11 @@ CREATE TRIGGER pair_changed AFTER UPDATE OF mesh_hash, print_hash, attributes ON
 WHEN (OLD.mesh_hash <> NEW.mesh_hash OR OLD.print_hash <> NEW.print_hash OR OLD.attributes <> NEW.attributes)
 EXECUTE FUNCTION mark_dirty();
 
--- Each process changes the rows of one slot, so that processes do not wait for each other. `counter` adds them up.
+-- Each process changes the rows of one slot, so that processes do not wait for each other. `counter` adds them up. Every
+-- 10 s it takes another slot: while a session holds a snapshot, the server keeps all versions of a row, and each change
+-- reads them. Rows of earlier slots are added to slot 0.
 CREATE TABLE counter_part (
-    slot bigint NOT NULL,
+    slot bigint NOT NULL DEFAULT CAST(extract(epoch FROM now()) AS bigint) / 10 * 256 + pg_backend_pid() % 256,
     stage bigint NOT NULL CHECK (stage BETWEEN 0 AND 4),
     status bigint NOT NULL CHECK (status BETWEEN 0 AND 4),
     fingerprint bigint NOT NULL,

@@ -10,7 +10,7 @@ use crate::catalog::db::known_leases::stored_before;
 use crate::catalog::db::write_connection::CatalogServerState;
 use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::ClaimRequest;
-use crate::catalog::queue::counters::DONE;
+use crate::catalog::queue::counters::{self, DONE};
 use crate::catalog::queue::lease::Lease;
 use crate::catalog::queue::{server_checkpoint, server_claim};
 
@@ -37,6 +37,9 @@ async fn commit_parts(
     state: &mut CatalogServerState,
 ) -> Result<BatchReply> {
     let mut reply = BatchReply::default();
+    if !batch.heartbeats.is_empty() {
+        counters::fold(conn, false).await?;
+    }
     if batch.has_shared_transaction() {
         reply = batch.apply(conn, state.leases.is_searching()).await?;
         if !batch.heartbeats.is_empty() {

@@ -7,7 +7,7 @@ use serde_json::json;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::query::query_as;
+use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::row::from_row;
 use crate::catalog::db::script::Script;
 use crate::domain::{JobStatus, Stage};
@@ -17,11 +17,27 @@ const CHANGE: Sql = Sql::pair(
 UPDATE counter SET n = n + CAST(d.value ->> 3 AS bigint) FROM jsonb_each(?) AS d
 WHERE counter.stage = CAST(d.value ->> 0 AS bigint) AND counter.status = CAST(d.value ->> 1 AS bigint) AND counter.fingerprint = CAST(d.value ->> 2 AS bigint)",
     "
-INSERT INTO counter_part (slot, stage, status, fingerprint, n)
-SELECT pg_backend_pid() % 256, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint),
+INSERT INTO counter_part (stage, status, fingerprint, n)
+SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint),
     CAST(value ->> 3 AS bigint) FROM json_array_elements(CAST(? AS json))
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n",
 );
+
+/// Adds the counters of earlier slots to slot 0, in PostgreSQL. Rows that another process changes stay until the next
+/// time. `?1` is the number of last time intervals to consider.
+const FOLD: &str = "
+WITH earlier AS (
+    DELETE FROM counter_part WHERE ctid = ANY (ARRAY(
+        SELECT ctid FROM counter_part
+        WHERE slot > 0 AND slot >= (CAST(extract(epoch FROM now()) AS bigint) / 10 - ?1) * 256
+            AND slot < (CAST(extract(epoch FROM now()) AS bigint) / 10 - 1) * 256
+        FOR UPDATE SKIP LOCKED))
+    RETURNING stage, status, fingerprint, n)
+INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+SELECT 0, stage, status, fingerprint, sum(n) FROM earlier GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
+ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n";
+/// Intervals to consider at each heartbeat. Earlier ones are left if the processes ended before.
+const LAST_SLOTS: i64 = 6;
 
 /// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
@@ -139,6 +155,17 @@ pub(crate) async fn counters(conn: &mut Conn) -> Result<BTreeMap<CounterKey, u64
         .into_iter()
         .map(|group| (group.key, group.n))
         .collect())
+}
+
+/// Adds the counters of earlier slots to slot 0, in PostgreSQL, so that few rows remain. Considers those of the last minute,
+/// or `all`, which takes longer while a session holds a snapshot.
+pub(crate) async fn fold(conn: &mut Conn, all: bool) -> Result<()> {
+    let Conn::Postgres(_) = conn else {
+        return Ok(());
+    };
+    let last = if all { i64::from(i32::MAX) } else { LAST_SLOTS };
+    query(FOLD).bind(last).execute(conn).await?;
+    Ok(())
 }
 
 /// Adds up numbers of jobs by cursor and status.

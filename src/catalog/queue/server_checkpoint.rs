@@ -160,11 +160,11 @@ input AS (
     WHERE pair.id = new.pair AND (new.mesh_hash <> coalesce(pair.mesh_hash, '') OR new.mesh_stat <> coalesce(pair.mesh_stat, '')
         OR new.print_hash <> coalesce(pair.print_hash, '') OR new.print_stat <> coalesce(pair.print_stat, ''))),
 counted AS (
-    INSERT INTO counter_part (slot, stage, status, fingerprint, n)
-    SELECT pg_backend_pid() % 256, moved.stage, moved.status, moved.fingerprint, sum(moved.n)
+    INSERT INTO counter_part (stage, status, fingerprint, n)
+    SELECT moved.stage, moved.status, moved.fingerprint, sum(moved.n)
     FROM advanced AS a CROSS JOIN LATERAL (VALUES
         (a.stage, 1, a.counted_fingerprint, -1), (a.next, a.status, a.fingerprint, 1)) AS moved (stage, status, fingerprint, n)
-    GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
+    GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
     ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
 SELECT pair, token FROM advanced",
         jobs = jobs.unnest(),

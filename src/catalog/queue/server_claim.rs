@@ -54,10 +54,10 @@ WITH claimed AS (
             ")
     RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive),
 counted AS (
-    INSERT INTO counter_part (slot, stage, status, fingerprint, n)
-    SELECT pg_backend_pid() % 256, c.stage, moved.status, coalesce(c.fingerprint, 0), sum(moved.n)
+    INSERT INTO counter_part (stage, status, fingerprint, n)
+    SELECT c.stage, moved.status, coalesce(c.fingerprint, 0), sum(moved.n)
     FROM claimed AS c, (VALUES (0, -1), (1, 1)) AS moved (status, n)
-    GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
+    GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
     ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
 SELECT * FROM claimed"
         )

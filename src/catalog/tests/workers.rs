@@ -1,6 +1,7 @@
 //! The list of workers with their metrics.
 
 use super::{World, register};
+use crate::catalog::db::conn::Conn;
 use crate::catalog::{WorkerRecord, WorkerState};
 use crate::domain::{ComputeTimes, Stage, WorkerId, WorkerMetrics};
 
@@ -86,4 +87,39 @@ async fn workers_before_a_time_and_workers_that_ended_without_metrics_are_not_li
     let ended = world.catalog.end_worker(world.worker, 60, None).await;
     ended.expect("ended");
     assert_eq!(since(0).await, [other]);
+}
+
+/// In PostgreSQL: a process changes counters of its own in each time interval.
+#[tokio::test]
+async fn heartbeats_and_new_workers_add_up_the_counters_of_earlier_slots() {
+    const LEFT: &str = "SELECT slot FROM counter_part WHERE slot > 0";
+    let world = World::new(5).await;
+    let Conn::Postgres(mut conn) = world.place.conn().await else {
+        return;
+    };
+    let mut rows = async |sql: &'static str| {
+        let rows = sqlx::raw_sql(sql).fetch_all(&mut *conn).await;
+        rows.expect("rows").len()
+    };
+    world.claim(2).await;
+    let counted = world.catalog.counters().await.expect("counters");
+    // As if the claim had been half a minute ago.
+    let earlier = "UPDATE counter_part SET slot = slot - 3 * 256 WHERE slot > 0 RETURNING slot";
+    assert_ne!(rows(earlier).await, 0);
+    let beat = world.catalog.heartbeat(world.worker, 50, 0, None).await;
+    assert!(beat.expect("an answer"));
+    assert_eq!(rows(LEFT).await, 0);
+    assert_eq!(world.catalog.counters().await.expect("counters"), counted);
+
+    world.claim(2).await;
+    // As if all processes had ended two minutes ago.
+    let earlier = "UPDATE counter_part SET slot = slot - 12 * 256 WHERE slot > 0 RETURNING slot";
+    assert_ne!(rows(earlier).await, 0);
+    let beat = world.catalog.heartbeat(world.worker, 60, 0, None).await;
+    assert!(beat.expect("an answer"));
+    assert_ne!(rows(LEFT).await, 0);
+    register(&world.catalog).await;
+    assert_eq!(rows(LEFT).await, 0);
+    let recount = world.catalog.recount().await.expect("a recount");
+    assert_eq!(world.catalog.counters().await.expect("counters"), recount);
 }
