@@ -10,7 +10,7 @@ use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
-use crate::catalog::db::postgres::PostgresAddress;
+use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::db::request::{Message, Reply};
 use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::db::write_connection::{Work, WriteConnection};

@@ -16,6 +16,7 @@ pub(crate) mod log_watch;
 pub(crate) mod network_fs;
 pub(crate) mod open;
 pub(crate) mod postgres;
+pub(crate) mod postgres_address;
 pub(crate) mod query;
 pub(crate) mod request;
 pub(crate) mod retry_wait;

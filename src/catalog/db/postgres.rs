@@ -2,15 +2,14 @@
 
 use std::time::Duration;
 
-use sqlx::postgres::{PgConnectOptions, PgPool, PgPoolOptions, PgSslMode};
+use sqlx::postgres::{PgPool, PgPoolOptions};
 use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Row as _, Transaction};
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::SCHEMA_VERSION;
+use crate::catalog::db::postgres_address::PostgresAddress;
 
-/// Schema of the tables, unless the URL sets another `search_path`.
-pub(crate) const SCHEMA: &str = "mocban";
 /// Oldest supported major version of the server.
 const OLDEST_SERVER: u32 = 15;
 /// Read connections per process.
@@ -43,71 +42,7 @@ const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 /// The statements that create the schema.
 const CREATE: &str = include_str!("../../../migrations/postgres/0001_initial.sql");
 
-/// Where a catalog is: a server, a database and a schema.
-#[derive(Debug, Clone)]
-pub(crate) struct PostgresAddress {
-    options: PgConnectOptions,
-    schema: String,
-}
-
 impl PostgresAddress {
-    /// Parses a URL such as `postgres://user@host/database`. The password may also come from the environment variable
-    /// `PGPASSWORD` or the file `.pgpass`.
-    ///
-    /// # Errors
-    /// Returns an error if the URL is invalid, or allows a connection without encryption to another machine.
-    pub(crate) fn parse(url: &str) -> Result<Self> {
-        let options: PgConnectOptions = url.parse().map_err(|error| {
-            let shown = without_password(url);
-            CatalogError::CatalogUrl(format!("{shown} is not a URL of PostgreSQL: {error}"))
-        })?;
-        let is_local = options.get_socket().is_some()
-            || options.get_host().starts_with('/')
-            || ["localhost", "127.0.0.1", "::1", "[::1]"].contains(&options.get_host());
-        let has_mode = url.contains("sslmode=");
-        let options = match options.get_ssl_mode() {
-            PgSslMode::Prefer if !is_local && !has_mode => options.ssl_mode(PgSslMode::VerifyFull),
-            PgSslMode::Disable | PgSslMode::Allow | PgSslMode::Prefer if !is_local => {
-                let shown = without_password(url);
-                return Err(CatalogError::CatalogUrl(format!(
-                    "{shown} allows a connection without encryption; use sslmode=verify-full, or require in a network you trust"
-                )));
-            }
-            _ => options,
-        };
-        let given = options.get_options().unwrap_or_default();
-        let given = given.split("search_path=").nth(1);
-        let schema = given.and_then(|rest| rest.split_whitespace().next());
-        let schema = schema.unwrap_or(SCHEMA).to_owned();
-        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        if !schema.chars().all(is_plain) {
-            return Err(CatalogError::CatalogUrl(format!(
-                "the schema {schema} is not allowed; use lower-case letters, digits and _"
-            )));
-        }
-        // Since PostgreSQL 12, floating-point numbers have all digits anyway, and PgBouncer refuses this parameter.
-        let options = options.application_name("mocban").extra_float_digits(None);
-        Ok(Self { options, schema })
-    }
-
-    /// Returns the schema of the tables.
-    pub(crate) fn schema(&self) -> &str {
-        &self.schema
-    }
-
-    /// Returns the address as text, without the password.
-    pub(crate) fn text(&self) -> String {
-        let options = &self.options;
-        let database = options.get_database().unwrap_or_default();
-        format!(
-            "postgres://{}@{}:{}/{database}?schema={}",
-            options.get_username(),
-            options.get_host(),
-            options.get_port(),
-            self.schema
-        )
-    }
-
     /// Opens a connection for writing. If `may_create` is set, creates a missing schema.
     ///
     /// # Errors
@@ -318,29 +253,6 @@ SELECT set_config(name, 'on', true) FROM (VALUES ('enable_bitmapscan'), ('enable
 UNION ALL SELECT set_config('plan_cache_mode', 'auto', true)
 UNION ALL SELECT CAST(pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482)) AS text)";
 
-/// Returns whether a URL contains a password.
-pub fn has_password(url: &str) -> bool {
-    let rest = url.split_once("://").map_or(url, |(_, rest)| rest);
-    let (address, parameters) = rest.split_once('?').unwrap_or((rest, ""));
-    let user = address.rsplit_once('@').map_or("", |(user, _)| user);
-    user.contains(':') || parameters.contains("password=")
-}
-
-/// Removes the password from a URL, for messages.
-pub(crate) fn without_password(url: &str) -> String {
-    let Some((scheme, rest)) = url.split_once("://") else {
-        return "the catalog's address".to_owned();
-    };
-    let rest = rest.split(['?', '#']).next().unwrap_or_default();
-    match rest.rsplit_once('@') {
-        Some((user, host)) => {
-            let user = user.split(':').next().unwrap_or_default();
-            format!("{scheme}://{user}@{host}")
-        }
-        None => format!("{scheme}://{rest}"),
-    }
-}
-
 /// Describes why a connection failed, with what to do.
 fn connection_error(error: &sqlx::Error) -> String {
     let Some(refused) = error.as_database_error() else {
@@ -362,40 +274,5 @@ fn connection_error(error: &sqlx::Error) -> String {
             format!("{text}; PgBouncer permits it with `ignore_startup_parameters`")
         }
         _ => text.to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{PostgresAddress, without_password};
-
-    #[test]
-    fn passwords_are_not_shown() {
-        for url in [
-            "postgres://me:secret@db.example/lab",
-            "postgres://me:se@cret@db.example/lab?sslmode=disable",
-            "postgres://db.example:5432/lab?password=secret",
-        ] {
-            assert!(!without_password(url).contains("cret"), "{url}");
-        }
-        let address =
-            PostgresAddress::parse("postgres://me:secret@localhost/lab").expect("an address");
-        assert_eq!(
-            address.text(),
-            "postgres://me@localhost:5432/lab?schema=mocban"
-        );
-    }
-
-    #[test]
-    fn connections_to_other_machines_are_encrypted() {
-        let refused = PostgresAddress::parse("postgres://me@db.example/lab?sslmode=disable");
-        assert!(
-            refused
-                .expect_err("no encryption")
-                .to_string()
-                .contains("verify-full")
-        );
-        PostgresAddress::parse("postgres://me@db.example/lab?sslmode=require").expect("encrypted");
-        PostgresAddress::parse("postgres://me@localhost/lab?sslmode=disable").expect("local");
     }
 }

@@ -3,7 +3,7 @@
 use sqlx::{AssertSqlSafe, Connection as _, PgConnection};
 
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::db::postgres::{PostgresAddress, SCHEMA};
+use crate::catalog::db::postgres_address::{PostgresAddress, SCHEMA};
 
 /// SQL that creates the roles and gives them their rights, with `{schema}` for the schema of the catalog.
 const SQL: &str = include_str!("../../../migrations/roles/postgres.sql");

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::open;
-use crate::catalog::db::postgres::PostgresAddress;
+use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::{Catalog, Result};
 use crate::postgres_server;
 
