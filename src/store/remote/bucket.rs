@@ -1,21 +1,21 @@
 //! A folder in a bucket of an S3-compatible store, with blocking calls.
 //!
-//! Requests run on threads of their own, so the calls may be made on any thread that may wait. The client repeats a
-//! request after a reply such as 503 and after a lost connection, with growing pauses.
+//! The calls may be made on any thread that may wait. The client repeats a request after a reply such as 503 and after a
+//! lost connection, with growing pauses.
 
 use std::future::Future;
 use std::io::Write;
 use std::sync::Arc;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Instant;
+use std::sync::mpsc;
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt as _, PutPayload};
 
 use super::bucket_error::BucketError;
-use super::client::{LazyClient, notice_interval, runtime, warn_of_wait};
+use super::client::LazyClient;
 use super::object_stat::ObjectStat;
+use super::request::start;
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -111,7 +111,7 @@ impl Bucket {
     ) -> Result<Option<(W, ObjectStat)>, BucketError> {
         let (store, path) = (self.store()?, self.path(key)?);
         let address = self.address_of(key);
-        self.wait(key, async move {
+        let request = async move {
             let options = GetOptions {
                 if_none_match: unless,
                 ..GetOptions::default()
@@ -140,7 +140,8 @@ impl Bucket {
                     })?;
             }
             Ok(Some((target, stat)))
-        })
+        };
+        start(self.address_of(key), request)?.wait()
     }
 
     /// Returns length and version of an object.
@@ -190,7 +191,7 @@ impl Bucket {
         let address = self.address_of(folder);
         let prefix = self.prefix.clone();
         let (sender, found) = mpsc::sync_channel::<(String, ObjectStat)>(4096);
-        let listing = self.start(async move {
+        let request = async move {
             let mut objects = store.list(Some(&path));
             while let Some(meta) = objects
                 .try_next()
@@ -205,11 +206,12 @@ impl Bucket {
                 tokio::task::block_in_place(|| sender.send((key, stat))).ok();
             }
             Ok(())
-        })?;
+        };
+        let listing = start(self.address_of(folder), request)?;
         for (key, stat) in found {
             each(key, stat);
         }
-        self.reply(folder, &listing)
+        listing.wait()
     }
 
     /// Calls `each` with the key and stat of every object in `folder`, without those of its subfolders.
@@ -241,12 +243,13 @@ impl Bucket {
         let store = store.map_err(|reason| self.unusable(&reason))?;
         let prefix = self.prefix.clone();
         let address = self.address.clone();
-        self.wait("", async move {
+        let request = async move {
             let first = store.list(Some(&prefix)).try_next().await;
             first
                 .map(drop)
                 .map_err(|error| BucketError::of(&address, &error))
-        })
+        };
+        start(self.address.clone(), request)?.wait()
     }
 
     fn store(&self) -> Result<Arc<dyn ObjectStore>, BucketError> {
@@ -278,57 +281,12 @@ impl Bucket {
         F: Future<Output = object_store::Result<T>> + Send + 'static,
     {
         let (address, reply) = (self.address_of(key), send(self.store()?, self.path(key)?));
-        self.wait(key, async move {
+        let place = address.clone();
+        let outcome = async move {
             let outcome = reply.await;
-            outcome.map_err(|error| BucketError::of(&address, &error))
-        })
-    }
-
-    /// Runs a request on the threads of the client and waits for its outcome.
-    fn wait<T: Send + 'static>(
-        &self,
-        key: &str,
-        request: impl Future<Output = Result<T, BucketError>> + Send + 'static,
-    ) -> Result<T, BucketError> {
-        let receiver = self.start(request)?;
-        self.reply(key, &receiver)
-    }
-
-    fn start<T: Send + 'static>(
-        &self,
-        request: impl Future<Output = Result<T, BucketError>> + Send + 'static,
-    ) -> Result<mpsc::Receiver<Result<T, BucketError>>, BucketError> {
-        let runtime = runtime().map_err(|error| self.unavailable("", &error.to_string()))?;
-        let (sender, receiver) = mpsc::sync_channel(1);
-        runtime.spawn(async move {
-            // The caller may have been given up.
-            let _ = sender.send(request.await);
-        });
-        Ok(receiver)
-    }
-
-    fn reply<T>(
-        &self,
-        key: &str,
-        receiver: &mpsc::Receiver<Result<T, BucketError>>,
-    ) -> Result<T, BucketError> {
-        let begun = Instant::now();
-        loop {
-            match receiver.recv_timeout(notice_interval()) {
-                Ok(reply) => return reply,
-                Err(RecvTimeoutError::Timeout) => warn_of_wait(&self.address_of(key), begun),
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(self.unavailable(key, "the request ended without a result"));
-                }
-            }
-        }
-    }
-
-    fn unavailable(&self, key: &str, reason: &str) -> BucketError {
-        BucketError::Unavailable {
-            address: self.address_of(key),
-            reason: reason.to_owned(),
-        }
+            outcome.map_err(|error| BucketError::of(&place, &error))
+        };
+        start(address, outcome)?.wait()
     }
 }
 

@@ -1,12 +1,10 @@
-//! The client of S3-compatible stores: its time limits and repetitions, its keys, and the threads of its requests.
+//! The client of S3-compatible stores: its time limits and repetitions, and its keys.
 
-use std::io;
-use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, LazyLock, OnceLock};
+use std::time::Duration;
 
 use object_store::aws::AmazonS3Builder;
 use object_store::{BackoffConfig, ClientOptions, ObjectStore, RetryConfig};
-use tokio::runtime::{Builder, Runtime};
 
 use crate::failpoint;
 
@@ -18,47 +16,12 @@ const SILENCE: Duration = Duration::from_secs(30);
 const GIVE_UP: Duration = Duration::from_mins(4);
 /// A first request that only shows whether the store answers is given up after this time.
 const GIVE_UP_FIRST: Duration = Duration::from_secs(5);
-/// While a request lasts, a warning says so at this interval.
-const NOTICE_EVERY: Duration = Duration::from_secs(20);
-/// Threads that send requests.
-const THREADS: usize = 2;
 
 /// Returns the divisor of time limits in tests.
-fn time_scale() -> u32 {
+pub(super) fn time_scale() -> u32 {
     static SCALE: LazyLock<u32> =
         LazyLock::new(|| failpoint::time_scale("MOCBAN_STORE_TIME_SCALE"));
     *SCALE
-}
-
-/// Returns the interval of warnings about a request that lasts.
-pub(super) fn notice_interval() -> Duration {
-    NOTICE_EVERY / time_scale()
-}
-
-/// Warns that a request has not ended since `begun`, at most once every [`NOTICE_EVERY`] whatever the number of requests.
-pub(super) fn warn_of_wait(address: &str, begun: Instant) {
-    static LAST: Mutex<Option<Instant>> = Mutex::new(None);
-    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
-    let interval = notice_interval();
-    if last.is_some_and(|last| last.elapsed() < interval) {
-        return;
-    }
-    *last = Some(Instant::now());
-    let seconds = begun.elapsed().as_secs();
-    tracing::warn!("{address}: a request to the object store has taken {seconds} s; waiting");
-}
-
-static RUNTIME: LazyLock<io::Result<Runtime>> = LazyLock::new(|| {
-    Builder::new_multi_thread()
-        .worker_threads(THREADS)
-        .thread_name("object store")
-        .enable_all()
-        .build()
-});
-
-/// Returns the runtime whose threads send requests.
-pub(super) fn runtime() -> Result<&'static Runtime, &'static io::Error> {
-    RUNTIME.as_ref()
 }
 
 /// A client of a bucket that is made at its first use, because commands such as `status` send no requests and need no keys.

@@ -9,6 +9,7 @@ mod listing;
 mod object_stat;
 mod pack;
 mod recent;
+mod request;
 mod storage;
 
 pub use bucket_error::BucketError;
