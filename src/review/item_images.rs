@@ -8,15 +8,17 @@ use std::sync::Arc;
 use serde::Deserialize;
 use tokio::sync::{Mutex, Semaphore};
 
+use super::alignment_inputs::{AlignmentInputs, PlacedRelief, require_current};
 use super::cache_slots::CacheSlots;
+use super::image_error::ImageError;
 use super::item::ReviewItem;
-use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{Affine2, ContentHash, PrintFromMesh, Stage};
-use crate::export::pictures::{PrintView, shaded};
+use crate::catalog::{Catalog, PairResults};
+use crate::domain::{Affine2, Stage};
+use crate::export::pictures::PrintView;
 use crate::export::scan_view::ScanView;
-use crate::export::{InputFileLimits, PictureError, SourcePrint, SourcePrintError};
-use crate::raster::{self, DepthMap, Mask, MaskOverlap, png_grey8, png_mask, png_rgb8, warp_mask};
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use crate::export::{InputFileLimits, SourcePrint};
+use crate::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
+use crate::report::pair_artifacts::PairArtifacts;
 use crate::stages::normalize::PrintMasks;
 use crate::stages::register::StrokeMap;
 use crate::store::Project;
@@ -44,91 +46,6 @@ pub(super) enum ImageLayer {
     DepthFrameMask,
     /// Ink mask on the canvas on which scores are computed.
     CanvasMask,
-}
-
-/// Why the images of an item cannot be rendered.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum ImageError {
-    #[error(transparent)]
-    Catalog(#[from] CatalogError),
-    #[error(transparent)]
-    PairArtifacts(#[from] PairArtifactsError),
-    #[error(transparent)]
-    Print(#[from] SourcePrintError),
-    /// The pair has a new result.
-    #[error("this pair has a new result; reload the page")]
-    Gone,
-    /// A run computes the pair again, or it failed, so some of its results are missing.
-    #[error("this pair has no complete result at the moment; try again when a run has computed it")]
-    Incomplete,
-    /// The scan cannot be shown in 3D.
-    #[error(transparent)]
-    Scan(#[from] PictureError),
-    #[error("rendering stopped: {0}")]
-    Stopped(#[from] tokio::task::JoinError),
-}
-
-/// The depth map of an item, and the canvas on which its scores are computed.
-#[derive(Debug)]
-pub(super) struct AlignmentInputs {
-    canvas_mask: Mask,
-    canvas_from_print: Affine2,
-    depth: DepthMap,
-    strokes: Mask,
-}
-
-impl AlignmentInputs {
-    /// Reads the inputs of an item.
-    ///
-    /// # Errors
-    /// Returns an error if an artifact cannot be read, or if the pair has a new result.
-    fn read(aligned: &PairArtifacts<'_>, item: &ReviewItem) -> Result<Self, ImageError> {
-        require_current(aligned, item)?;
-        let depth = aligned.depth()?;
-        Ok(Self {
-            canvas_mask: aligned.canvas_print_mask()?,
-            canvas_from_print: aligned.canvas_from_print()?,
-            strokes: depth.stroke_mask(item.view.level),
-            depth,
-        })
-    }
-
-    /// Computes the overlap of stroke and ink mask as results are scored, with the relief placed by `print_from_depth`.
-    fn mask_overlap(&self, print_from_depth: &Affine2) -> MaskOverlap {
-        let map = self.canvas_from_print.after(print_from_depth);
-        let (width, height) = (self.canvas_mask.width(), self.canvas_mask.height());
-        warp_mask(&self.strokes, &map, width, height).overlap(&self.canvas_mask)
-    }
-
-    /// Returns the shaded relief in the depth map's frame.
-    fn relief(&self) -> Vec<u8> {
-        let slope = self.depth.scale.height_per_level / self.depth.scale.mesh_unit_per_px;
-        png_rgb8(&shaded(&self.depth.levels, slope))
-    }
-}
-
-/// Checks that a pair still has the depth map and the print that an item shows.
-///
-/// # Errors
-/// Returns an error if it has others.
-fn require_current(aligned: &PairArtifacts<'_>, item: &ReviewItem) -> Result<(), ImageError> {
-    let hashes = (
-        aligned.stage(Stage::Depth)?.result_hash,
-        aligned.stage(Stage::Normalize)?.print_hash,
-    );
-    if hashes != (item.view.depth_hash, Some(item.view.print_hash)) {
-        return Err(ImageError::Gone);
-    }
-    Ok(())
-}
-
-/// The relief of an item on its print, as a reviewer placed it.
-#[derive(Debug)]
-pub(super) struct PlacedRelief {
-    pub(super) scores: MaskOverlap,
-    pub(super) print_from_mesh: PrintFromMesh,
-    /// Hash of the mesh that the result was computed from.
-    pub(super) mesh_hash: ContentHash,
 }
 
 /// The encoded images of an item, and their frame.

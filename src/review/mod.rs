@@ -4,6 +4,7 @@
 //! acknowledged only after it is on the disk. Attention checks are served like results, so they cannot be recognized.
 
 mod alignment_editor;
+mod alignment_inputs;
 mod answer;
 mod assets;
 mod cache_slots;
@@ -11,6 +12,7 @@ mod check_items;
 mod examples;
 mod history;
 mod i18n;
+mod image_error;
 mod item;
 mod item_images;
 mod keys;

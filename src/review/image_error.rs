@@ -1,0 +1,27 @@
+//! Why the images of an item cannot be rendered.
+
+use crate::catalog::CatalogError;
+use crate::export::{PictureError, SourcePrintError};
+use crate::report::pair_artifacts::PairArtifactsError;
+
+/// Why the images of an item cannot be rendered.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum ImageError {
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    #[error(transparent)]
+    PairArtifacts(#[from] PairArtifactsError),
+    #[error(transparent)]
+    Print(#[from] SourcePrintError),
+    /// The pair has a new result.
+    #[error("this pair has a new result; reload the page")]
+    Gone,
+    /// A run computes the pair again, or it failed, so some of its results are missing.
+    #[error("this pair has no complete result at the moment; try again when a run has computed it")]
+    Incomplete,
+    /// The scan cannot be shown in 3D.
+    #[error(transparent)]
+    Scan(#[from] PictureError),
+    #[error("rendering stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
