@@ -97,7 +97,8 @@
 //!
 //! In PostgreSQL, claims begin behind the last claimed pair (`queue/claim_start.rs`), because they would otherwise pass over
 //! all pairs claimed before while another session holds a snapshot. So they do not always lease the most advanced pairs
-//! first that other processes released.
+//! first that other processes released. For the same reason, each process counts jobs in a new row every ten seconds
+//! (`queue/counters.rs`).
 //!
 //! In PostgreSQL, `db init --roles` gives the tables to group roles (`db/roles.rs`, `migrations/roles/postgres.sql`): the
 //! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
@@ -111,12 +112,12 @@
 //! ## Files in an object store
 //!
 //! `store/input_place.rs` decides where an input is: at a path, below a named root, or in an object store. All readers take
-//! the resulting `Input`. `store/remote/` has the rest: `client.rs` and `bucket.rs` send requests, `cache.rs` keeps local
-//! copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair, or of a
-//! stage of a block, into one object. Meshes and prints of cut characters are inputs of pairs, so they are objects of their
-//! own (`store/artifact_object.rs`). `runner/stage_files.rs` collects the stages of a pair for a pack, `runner/prefetch.rs` reads the inputs of leased
-//! pairs before they start, and `store/collect.rs` removes packs without a row. The row of a stage names pack and offset of
-//! each artifact, but the hash of a result does not include them.
+//! the resulting `Input`. `store/remote/` has the rest: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs`
+//! keeps local copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair, or
+//! of a stage of a block, into one object. Meshes and prints of cut characters are inputs of pairs, so they are objects of
+//! their own (`store/artifact_object.rs`). `runner/stage_files.rs` collects the stages of a pair for a pack,
+//! `runner/prefetch.rs` reads the inputs of leased pairs before they start, and `store/collect.rs` removes packs without a
+//! row. The row of a stage names pack and offset of each artifact, but the hash of a result does not include them.
 //!
 //! ## A lost lease
 //!
