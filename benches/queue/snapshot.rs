@@ -25,7 +25,7 @@ const SCHEMA: &str = "bench_snapshot";
 const END: &str = "
 WITH ended AS (
     UPDATE job SET status = 3, stage = 4, worker = NULL, deadline = NULL
-    WHERE pair = ANY ($1) AND worker = $2 AND status = 1 RETURNING 1)
+    WHERE pair = ANY ($1) AND worker = $2 AND status + 0 = 1 RETURNING 1)
 INSERT INTO counter_part (stage, status, fingerprint, n)
 SELECT stage, status, 0, sign * (SELECT count(*) FROM ended)
 FROM (VALUES (0, 1, -1), (4, 3, 1)) AS item (stage, status, sign)
