@@ -198,7 +198,7 @@ EXECUTE FUNCTION mark_dirty();
 
 -- Each process changes the rows of one slot, so that processes do not wait for each other. `counter` adds them up. Every
 -- 10 s it takes another slot: while a session holds a snapshot, the server keeps all versions of a row, and each change
--- reads them. Rows of earlier slots are added to slot 0.
+-- steps over them. Rows of earlier slots are added to slot 0.
 CREATE TABLE counter_part (
     slot bigint NOT NULL DEFAULT CAST(extract(epoch FROM now()) AS bigint) / 10 * 256 + pg_backend_pid() % 256,
     stage bigint NOT NULL CHECK (stage BETWEEN 0 AND 4),

@@ -27,7 +27,7 @@ const STORE_PAUSE: Duration = Duration::from_secs(1);
 /// Much shorter than the time after a deadline when another process recovers the lease.
 const SHORTEST_STORE_WAIT: Duration = Duration::from_secs(10);
 
-/// An object store is considered unavailable if it has not stored results for this long.
+/// An object store is considered unavailable if it has not finished a write for this long.
 const SLOW_WRITE: Duration = Duration::from_secs(20);
 
 /// Time after a stop request during which an unavailable object store is still waited for.
@@ -132,7 +132,7 @@ async fn write_pack(
 }
 
 /// Runs `writing` on a thread for blocking calls, again and again while the object store is unavailable. Returns `None`
-/// if nothing is stored after `longest`, before another process considers the lease overdue and blames the pair. After a
+/// if nothing is stored within `longest`, before another process considers the lease overdue and blames the pair. After a
 /// stop request, it also returns `None` if the store is unavailable, or at once if the stop is immediate.
 ///
 /// # Errors

@@ -43,6 +43,9 @@ DELETE FROM stage_result WHERE (pair, stage) IN (
         (SELECT 0 AS stage UNION ALL SELECT 1 UNION ALL SELECT 2 UNION ALL SELECT 3) AS later
     WHERE later.stage >= CAST(item.value ->> 1 AS bigint))";
 
+/// Keeps heartbeats, which move counters to other rows without the catalog's lock, out until the end of the transaction.
+const LOCK_COUNTERS: &str = "LOCK TABLE counter_part IN SHARE ROW EXCLUSIVE MODE";
+
 /// Recreates every counter with the value 0.
 const RESET_COUNTERS: [Sql; 3] = [
     Sql::pair("DELETE FROM counter", "DELETE FROM counter_part"),
@@ -90,6 +93,9 @@ impl Catalog {
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
+                if let Conn::Postgres(_) = conn {
+                    query(LOCK_COUNTERS).execute(&mut *conn).await?;
+                }
                 let marks = [FIX_FINGERPRINTS, MARK_DIRTY].map(Sql::from);
                 for sql in marks.iter().chain(&RESET_COUNTERS) {
                     query(*sql).execute(&mut *conn).await?;

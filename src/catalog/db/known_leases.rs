@@ -13,7 +13,7 @@ use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::domain::{JobStatus, PairId, WorkerId};
 
-/// Time after a reconnection during which unknown leases are searched for. A server may execute a commit of the broken connection
+/// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit of the broken connection
 /// until it notices that the connection is broken.
 const SEARCH_TIME: Duration = Duration::from_mins(2);
 
@@ -70,7 +70,7 @@ impl KnownLeases {
     }
 
     /// Returns the leases of a worker that this process has not received. Queries the server only for `SEARCH_TIME` after
-    /// a reconnection.
+    /// a reconnection or a failed claim.
     pub(crate) async fn unknown(&self, conn: &mut Conn, worker: WorkerId) -> Result<Vec<Lease>> {
         if !self.is_searching() {
             return Ok(Vec::new());

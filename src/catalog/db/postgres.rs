@@ -36,6 +36,19 @@ SET enable_mergejoin = off;
 SET enable_seqscan = off;";
 /// Setting of the read connections.
 const READ_ONLY: &str = "SET default_transaction_read_only = on;";
+/// Returns whether each of two connections keeps a server process of its own.
+async fn keep_processes(one: &mut PgConnection, other: &mut PgConnection) -> sqlx::Result<bool> {
+    let (first, second) = (server_process(one).await?, server_process(other).await?);
+    let mut is_kept = first != second;
+    for _ in 0..POOLER_ROUNDS {
+        // Twice, because a pooler may hand out two idle processes by turns.
+        is_kept &= server_process(one).await? == first;
+        is_kept &= server_process(one).await? == first;
+        is_kept &= server_process(other).await? == second;
+    }
+    Ok(is_kept)
+}
+
 /// Returns the server process that serves a connection.
 const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 
@@ -97,20 +110,19 @@ impl PostgresAddress {
     }
 
     /// Opens a connection, and checks that it keeps its server process to itself while it is idle. A pooler by transaction
-    /// gives this process to the next statement of another connection. So nothing is configured before the check.
+    /// gives this process to the next statement of another connection. Therefore nothing is configured before the check.
     ///
     /// # Errors
     /// Returns an error if the process is shared, or if the server does not answer or refuses.
     async fn connect_to_own_process(&self) -> Result<PgConnection> {
         let mut conn = self.connect_unconfigured().await?;
         let mut other = self.connect_unconfigured().await?;
-        let first = server_process(&mut conn).await?;
-        let second = server_process(&mut other).await?;
-        let mut is_kept = first != second;
-        for _ in 0..POOLER_ROUNDS {
-            is_kept &= server_process(&mut conn).await? == first;
-            is_kept &= server_process(&mut other).await? == second;
-        }
+        // A pooler without a free connection to the server answers late.
+        let checking = tokio::time::timeout(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other));
+        let is_kept = checking
+            .await
+            .unwrap_or_else(|_| Err(timed_out()))
+            .map_err(|error| self.not_connected(&error))?;
         other.close().await?;
         if is_kept {
             return Ok(conn);

@@ -25,7 +25,8 @@ pub(crate) async fn commit(
     state: &mut CatalogServerState,
 ) -> Result<BatchReply> {
     let outcome = commit_parts(batch, conn, state).await;
-    if outcome.is_err() {
+    // The leases may exist although the claim failed.
+    if outcome.is_err() && !batch.claims.is_empty() {
         state.leases.replies_may_be_lost();
     }
     outcome
@@ -37,13 +38,15 @@ async fn commit_parts(
     state: &mut CatalogServerState,
 ) -> Result<BatchReply> {
     let mut reply = BatchReply::default();
-    if !batch.heartbeats.is_empty() {
-        counters::fold(conn, false).await?;
-    }
     if batch.has_shared_transaction() {
         reply = batch.apply(conn, state.leases.is_searching()).await?;
         if !batch.heartbeats.is_empty() {
             state.claim_start.begin_again();
+            // The reply does not depend on it. A broken connection shows at the next statement.
+            match counters::fold(conn, !state.has_folded_all).await {
+                Ok(()) => state.has_folded_all = true,
+                Err(error) => tracing::debug!(%error, "counters are added up later"),
+            }
         }
         let failed = || batch.failures.items().map(|item| &item.0);
         for lease in batch.releases.items().chain(failed()) {

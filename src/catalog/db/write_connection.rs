@@ -49,6 +49,8 @@ struct Server {
 pub(crate) struct CatalogServerState {
     pub(crate) leases: KnownLeases,
     pub(crate) claim_start: ClaimStart,
+    /// Whether counters of all earlier slots were added up since the last connection.
+    pub(crate) has_folded_all: bool,
 }
 
 impl WriteConnection {
@@ -113,6 +115,7 @@ impl WriteConnection {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;
                     server.state.leases.replies_may_be_lost();
+                    server.state.has_folded_all = false;
                     tracing::info!("connected to the database server again");
                     return true;
                 }

@@ -14,8 +14,8 @@ impl Catalog {
     /// return leases of an earlier claim whose reply was lost.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. On a server, pairs may be leased nevertheless. A later claim of the
-    /// worker returns them.
+    /// Returns an error if a database operation fails. On a server, pairs may be leased nevertheless. The worker's
+    /// claims of the next two minutes return them.
     pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
         self.grouped(|reply| Request::Claim(request, reply)).await
     }

@@ -48,7 +48,7 @@ impl ClaimStart {
         })
     }
 
-    /// Records what a claim found, in the order of the claim. `times` are when the claim began and ended.
+    /// Records what a claim found, in the order of the claim. `times` says when the claim began and ended.
     pub(crate) fn note(
         &mut self,
         request: &ClaimRequest,

@@ -23,8 +23,8 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n",
 );
 
-/// Adds the counters of earlier slots to slot 0, in PostgreSQL. Rows that another process changes stay until the next
-/// time. `?1` is the number of last time intervals to consider.
+/// Adds the counters of earlier slots to slot 0, in PostgreSQL. Rows that another process has locked are left for the
+/// next time. `?1` is how many recent intervals to consider.
 const FOLD: &str = "
 WITH earlier AS (
     DELETE FROM counter_part WHERE ctid = ANY (ARRAY(
@@ -36,7 +36,7 @@ WITH earlier AS (
 INSERT INTO counter_part (slot, stage, status, fingerprint, n)
 SELECT 0, stage, status, fingerprint, sum(n) FROM earlier GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n";
-/// Intervals to consider at each heartbeat. Earlier ones are left if the processes ended before.
+/// Intervals to consider at each heartbeat but the first of a connection.
 const LAST_SLOTS: i64 = 6;
 
 /// Counters that are not 0.

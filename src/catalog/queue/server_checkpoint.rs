@@ -332,7 +332,8 @@ fn metric_row(position: i64, pair: i64, result: &MetricResult) -> Result<MetricR
     })
 }
 
-/// Returns a number, or `None` if it is not finite. Then the database refuses the row, as in SQLite, where rows are JSON.
+/// Returns a number, or `None` if it is not finite, as in SQLite, where rows are JSON. The database refuses a row without a
+/// number, except the confidence.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

@@ -4,7 +4,7 @@ use crate::catalog::blocks::model::BlockSettings;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
-use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor, fold};
+use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::{Catalog, Result};
@@ -191,7 +191,6 @@ async fn insert_worker(
     settings: WorkerSettings,
     now: UnixMillis,
 ) -> Result<WorkerId> {
-    fold(conn, true).await?;
     let id: i64 = query_scalar(
         "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints, block_settings)
         VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6) RETURNING id",

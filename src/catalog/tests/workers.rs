@@ -91,7 +91,7 @@ async fn workers_before_a_time_and_workers_that_ended_without_metrics_are_not_li
 
 /// In PostgreSQL: a process changes counters of its own in each time interval.
 #[tokio::test]
-async fn heartbeats_and_new_workers_add_up_the_counters_of_earlier_slots() {
+async fn heartbeats_add_up_the_counters_of_earlier_slots() {
     const LEFT: &str = "SELECT slot FROM counter_part WHERE slot > 0";
     let world = World::new(5).await;
     let Conn::Postgres(mut conn) = world.place.conn().await else {
@@ -106,6 +106,14 @@ async fn heartbeats_and_new_workers_add_up_the_counters_of_earlier_slots() {
     // As if the claim had been half a minute ago.
     let earlier = "UPDATE counter_part SET slot = slot - 3 * 256 WHERE slot > 0 RETURNING slot";
     assert_ne!(rows(earlier).await, 0);
+    // Another process changes one of these rows.
+    rows("BEGIN").await;
+    rows("SELECT 1 FROM counter_part WHERE slot > 0 LIMIT 1 FOR UPDATE").await;
+    let beat = world.catalog.heartbeat(world.worker, 50, 0, None).await;
+    assert!(beat.expect("an answer"));
+    assert_eq!(rows(LEFT).await, 1);
+    assert_eq!(world.catalog.counters().await.expect("counters"), counted);
+    rows("COMMIT").await;
     let beat = world.catalog.heartbeat(world.worker, 50, 0, None).await;
     assert!(beat.expect("an answer"));
     assert_eq!(rows(LEFT).await, 0);
@@ -118,7 +126,9 @@ async fn heartbeats_and_new_workers_add_up_the_counters_of_earlier_slots() {
     let beat = world.catalog.heartbeat(world.worker, 60, 0, None).await;
     assert!(beat.expect("an answer"));
     assert_ne!(rows(LEFT).await, 0);
-    register(&world.catalog).await;
+    let another = world.place.open().await.expect("another process");
+    let beat = another.heartbeat(world.worker, 60, 0, None).await;
+    assert!(beat.expect("an answer"));
     assert_eq!(rows(LEFT).await, 0);
     let recount = world.catalog.recount().await.expect("a recount");
     assert_eq!(world.catalog.counters().await.expect("counters"), recount);

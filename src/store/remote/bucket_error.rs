@@ -75,6 +75,9 @@ impl BucketError {
         let code = code_of(error);
         match (error, code.as_deref()) {
             (_, Some("NoSuchBucket")) => Self::NoBucket(address),
+            (_, Some("InvalidObjectState" | "QuotaExceeded")) => {
+                Self::of_reply(address, error, code.as_deref())
+            }
             (object_store::Error::NotFound { .. }, _) => Self::NotThere(address),
             (_, Some(code)) if is_refusal(code) => Self::Refused {
                 address,
@@ -95,6 +98,11 @@ impl BucketError {
     /// Converts an error that is not about access.
     fn of_reply(address: String, error: &object_store::Error, code: Option<&str>) -> Self {
         let status = status_of(error);
+        if is_redirect(error, status) {
+            let reason = "it redirects to another place; check AWS_REGION and AWS_ENDPOINT_URL";
+            let reason = reason.to_owned();
+            return Self::Failed { address, reason };
+        }
         let status_text = status.map(|status| format!("HTTP status {status}"));
         let reason = code.map(str::to_owned).or(status_text);
         match reason {
@@ -107,18 +115,31 @@ impl BucketError {
     }
 }
 
-/// Returns whether a reply with this code and HTTP status may be another one later.
+/// Returns whether the store sends the client to another region or address.
+fn is_redirect(error: &object_store::Error, status: Option<u16>) -> bool {
+    matches!(status, Some(301 | 308)) || error.to_string().contains("redirect without LOCATION")
+}
+
+/// Returns whether the reply to the same request may differ later.
 fn is_temporary(code: Option<&str>, status: Option<u16>) -> bool {
     match (code, status) {
-        // 507 is a full store.
-        (_, Some(408 | 429 | 500..=506 | 508..)) => true,
+        // 501 is an unknown function, 507 a full store.
+        (_, Some(307 | 408 | 425 | 429 | 500 | 502..=504 | 508..)) => true,
         (Some(code), _) => matches!(
             code,
-            "InternalError"
+            "BadDigest"
+                | "ConcurrentModification"
+                | "ConditionalRequestConflict"
+                | "IncompleteBody"
+                | "InternalError"
                 | "OperationAborted"
                 | "RequestTimeout"
                 | "ServiceUnavailable"
                 | "SlowDown"
+                | "SlowDownRead"
+                | "SlowDownWrite"
+                | "Throttling"
+                | "XAmzContentSHA256Mismatch"
         ),
         (None, status) => status.is_none(),
     }
@@ -204,6 +225,7 @@ mod tests {
             "Server returned non-2xx status code: 429 Too Many Requests: ",
             "Server returned non-2xx status code: 400 Bad Request: <Code>RequestTimeout</Code>",
             "Server returned error response: <Error><Code>InternalError</Code></Error>",
+            "Server returned non-2xx status code: 400 Bad Request: <Code>IncompleteBody</Code>",
             "connection refused",
         ] {
             assert!(is_waited_for(temporary), "{temporary}");
@@ -212,9 +234,18 @@ mod tests {
             "Server returned non-2xx status code: 400 Bad Request: <Code>EntityTooLarge</Code>",
             "Server returned non-2xx status code: 413 Payload Too Large: <html></html>",
             "Server returned non-2xx status code: 507 Insufficient Storage: <Code>XMinioStorageFull</Code>",
-            "Server returned error response: <Error><Code>QuotaExceeded</Code></Error>",
+            "Server returned non-2xx status code: 501 Not Implemented: <Code>NotImplemented</Code>",
+            "Received redirect without LOCATION, this normally indicates an incorrectly configured region",
         ] {
             assert!(!is_waited_for(lasting), "{lasting}");
         }
+        // A full quota is not a matter of keys.
+        let source = "status code: 403 Forbidden: <Code>QuotaExceeded</Code>";
+        let full = object_store::Error::PermissionDenied {
+            path: "x".to_owned(),
+            source: source.into(),
+        };
+        let error = BucketError::of("s3://b/x", &full);
+        assert!(matches!(error, BucketError::Failed { .. }), "{error}");
     }
 }

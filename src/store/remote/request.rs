@@ -83,5 +83,7 @@ fn warn_of_wait(address: &str, begun: Instant) {
     }
     *last = Some(Instant::now());
     let seconds = begun.elapsed().as_secs();
-    tracing::warn!("{address}: a request to the object store has taken {seconds} s; waiting");
+    tracing::warn!(
+        "{address}: a request to the object store has been running for {seconds} s; waiting"
+    );
 }
