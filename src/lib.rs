@@ -112,12 +112,13 @@
 //! ## Files in an object store
 //!
 //! `store/input_place.rs` decides where an input is: at a path, below a named root, or in an object store. All readers take
-//! the resulting `Input`. `store/remote/` has the rest: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs`
-//! keeps local copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the artifacts of a pair, or
-//! of a stage of a block, into one object. Meshes and prints of cut characters are inputs of pairs, so they are objects of
-//! their own (`store/artifact_object.rs`). `runner/stage_files.rs` collects the stages of a pair for a pack,
-//! `runner/prefetch.rs` reads the inputs of leased pairs before they start, and `store/collect.rs` removes packs without a
-//! row. The row of a stage names pack and offset of each artifact, but the hash of a result does not include them.
+//! the resulting `Input`. `store/remote/` has the rest: `client.rs`, `request.rs` and `bucket.rs` send requests,
+//! `cache.rs` keeps local copies of inputs, `listing.rs` lists folders to notice changes, and `pack.rs` puts the
+//! artifacts of a pair, or of a stage of a block, into one object. Meshes and prints of cut characters are inputs of
+//! pairs, so they are objects of their own (`store/artifact_object.rs`). `runner/stage_files.rs` collects the stages
+//! of a pair for a pack, `runner/prefetch.rs` reads the inputs of leased pairs before they start, and
+//! `store/collect.rs` removes packs without a row. The row of a stage names pack and offset of each artifact, but the
+//! hash of a result does not include them.
 //!
 //! ## A lost lease
 //!

@@ -135,13 +135,12 @@ async fn lines(
             let at = (finished.claims.len().saturating_sub(1) as f64 * share) as usize;
             finished.claims.get(at).map_or(0.0, Duration::as_secs_f64) * 1e3
         };
-        let last_time = LAST_TIME.min(limit).as_secs_f64();
-        let at_end = format!("{:.0}", finished.last_pairs as f64 / last_time);
-        // Otherwise no pairs were left before the end.
-        let at_end = if time >= limit {
-            at_end
-        } else {
+        let at_end = if time < limit {
+            // No pairs were left.
             "-".to_owned()
+        } else {
+            let last_time = LAST_TIME.min(limit).as_secs_f64();
+            format!("{:.0}", finished.last_pairs as f64 / last_time)
         };
         writeln!(
             table,

@@ -28,7 +28,8 @@ pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// `false` if a stage is unstored because of a stop request or an unavailable object store. A lost lease does not change this flag.
+    /// `false` if a stage is unstored because of a stop request or an unavailable object store. A lost lease does not
+    /// change this flag.
     is_complete: bool,
 }
 
@@ -44,8 +45,8 @@ impl StoredStages {
         }
     }
 
-    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or a
-    /// stage is unstored.
+    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or a stage
+    /// is unstored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let end = match &self.lease {
             CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,

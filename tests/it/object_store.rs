@@ -202,6 +202,8 @@ fn a_store_that_is_away_is_waited_for_and_nobody_is_blamed() {
     let mut run = RunInOutage::start(&mut remote.command(port, "cache", &["run", "-j", "2"]));
     run.wait_for("a request to the object store has been running");
     run.wait_for("waiting for it to store results");
+    // The store is away for longer than a request is repeated.
+    run.wait_for("a request to the object store has been running");
     outage.end();
     let (code, lines) = run.end();
     assert_eq!(code, Some(0), "{lines}");

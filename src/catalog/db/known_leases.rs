@@ -13,8 +13,8 @@ use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::domain::{JobStatus, PairId, WorkerId};
 
-/// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit of the broken connection
-/// until it notices that the connection is broken.
+/// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit
+/// of the broken connection until it notices that the connection is broken.
 const SEARCH_TIME: Duration = Duration::from_mins(2);
 
 /// Selects the leases of a worker.

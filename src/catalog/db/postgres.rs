@@ -36,19 +36,6 @@ SET enable_mergejoin = off;
 SET enable_seqscan = off;";
 /// Setting of the read connections.
 const READ_ONLY: &str = "SET default_transaction_read_only = on;";
-/// Returns whether each of two connections keeps a server process of its own.
-async fn keep_processes(one: &mut PgConnection, other: &mut PgConnection) -> sqlx::Result<bool> {
-    let (first, second) = (server_process(one).await?, server_process(other).await?);
-    let mut is_kept = first != second;
-    for _ in 0..POOLER_ROUNDS {
-        // Twice, because a pooler may hand out two idle processes by turns.
-        is_kept &= server_process(one).await? == first;
-        is_kept &= server_process(one).await? == first;
-        is_kept &= server_process(other).await? == second;
-    }
-    Ok(is_kept)
-}
-
 /// Returns the server process that serves a connection.
 const SERVER_PROCESS: &str = "SELECT pg_backend_pid()";
 
@@ -104,7 +91,7 @@ impl PostgresAddress {
             .acquire_timeout(CONNECT_TIMEOUT)
             .after_connect(move |conn, _| {
                 let settings = settings.clone();
-                Box::pin(async move { configure(conn, settings).await })
+                Box::pin(async move { run_settings(conn, settings).await })
             });
         Ok(pool.connect_lazy_with(self.options.clone()))
     }
@@ -149,7 +136,7 @@ impl PostgresAddress {
 
     /// Sets the settings of every connection, and these.
     async fn configure(&self, conn: &mut PgConnection, settings: &str) -> Result<()> {
-        let configuring = configure(conn, self.settings(settings));
+        let configuring = run_settings(conn, self.settings(settings));
         let configured = tokio::time::timeout(CONNECT_TIMEOUT, configuring).await;
         configured
             .unwrap_or_else(|_| Err(timed_out()))
@@ -242,9 +229,22 @@ fn timed_out() -> sqlx::Error {
 }
 
 /// Runs statements that configure a connection.
-async fn configure(conn: &mut PgConnection, settings: String) -> sqlx::Result<()> {
+async fn run_settings(conn: &mut PgConnection, settings: String) -> sqlx::Result<()> {
     let statements = sqlx::raw_sql(sqlx::AssertSqlSafe(settings));
     statements.execute(conn).await.map(drop)
+}
+
+/// Returns whether each of two connections keeps a server process of its own.
+async fn keep_processes(one: &mut PgConnection, other: &mut PgConnection) -> sqlx::Result<bool> {
+    let (first, second) = (server_process(one).await?, server_process(other).await?);
+    let mut is_kept = first != second;
+    for _ in 0..POOLER_ROUNDS {
+        // Twice, because a pooler may hand out two idle processes by turns.
+        is_kept &= server_process(one).await? == first;
+        is_kept &= server_process(one).await? == first;
+        is_kept &= server_process(other).await? == second;
+    }
+    Ok(is_kept)
 }
 
 /// Returns the server process that serves a connection. Prepares no statement, which a pooler could refuse.

@@ -49,7 +49,7 @@ struct Server {
 pub(crate) struct CatalogServerState {
     pub(crate) leases: KnownLeases,
     pub(crate) claim_start: ClaimStart,
-    /// Whether counters of all earlier slots were added up since the last connection.
+    /// Whether the counters of all earlier slots were added up over this connection.
     pub(crate) has_folded_all: bool,
 }
 

@@ -24,7 +24,7 @@ ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n 
 );
 
 /// Adds the counters of earlier slots to slot 0, in PostgreSQL. Rows that another process has locked are left for the
-/// next time. `?1` is how many recent intervals to consider.
+/// next time. `?1` is how many intervals before this one to consider.
 const FOLD: &str = "
 WITH earlier AS (
     DELETE FROM counter_part WHERE ctid = ANY (ARRAY(
@@ -36,8 +36,10 @@ WITH earlier AS (
 INSERT INTO counter_part (slot, stage, status, fingerprint, n)
 SELECT 0, stage, status, fingerprint, sum(n) FROM earlier GROUP BY 2, 3, 4 ORDER BY 2, 3, 4
 ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n";
-/// Intervals to consider at each heartbeat but the first of a connection.
-const LAST_SLOTS: i64 = 6;
+/// The intervals of the last minute.
+const LAST_INTERVALS: i64 = 6;
+/// More intervals than since 1970.
+const ALL_INTERVALS: i64 = 1 << 32;
 
 /// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
@@ -163,8 +165,8 @@ pub(crate) async fn fold(conn: &mut Conn, all: bool) -> Result<()> {
     let Conn::Postgres(_) = conn else {
         return Ok(());
     };
-    let last = if all { i64::from(i32::MAX) } else { LAST_SLOTS };
-    query(FOLD).bind(last).execute(conn).await?;
+    let intervals = if all { ALL_INTERVALS } else { LAST_INTERVALS };
+    query(FOLD).bind(intervals).execute(conn).await?;
     Ok(())
 }
 
