@@ -191,7 +191,13 @@ impl RefusedLine {
 }
 
 fn refusal(action: &str, path: &Path, error: &std::io::Error) -> Refusal {
-    Refusal::Usage(format!("cannot {action} {}: {error}", path.display()))
+    let shown = path.display();
+    Refusal::Usage(match error.kind() {
+        ErrorKind::NotFound if action == "list" => format!("there is no directory {shown}"),
+        ErrorKind::NotFound => format!("there is no file {shown}"),
+        ErrorKind::NotADirectory if action == "list" => format!("{shown} is not a directory"),
+        _ => format!("cannot {action} {shown}: {error}"),
+    })
 }
 
 /// Returns the limits of input files in the settings.

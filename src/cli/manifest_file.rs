@@ -7,7 +7,9 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::find_on_disk;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
-use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
+use crate::manifest::{
+    ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
+};
 use crate::store::Project;
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
@@ -68,8 +70,14 @@ impl Listing {
             read_csv
         };
         let mut similar = SimilarIds::default();
-        let ids = parse(&bytes, &mut |row| similar.add(&row.name))
-            .map_err(|problems| refuse(file, &problems))?;
+        let mut misspelt = MisspeltColumns::default();
+        let mut each = |row: ManifestRow| {
+            similar.add(&row.name);
+            misspelt.add(&row);
+        };
+        let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let mut warnings = misspelt.warnings();
+        warnings.extend(similar.warning());
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -78,7 +86,7 @@ impl Listing {
                 folder,
             },
             ids,
-            warnings: similar.warning().into_iter().collect(),
+            warnings,
             row_label: format!("{shown}: line"),
         })
     }
@@ -202,11 +210,21 @@ pub(super) fn locate_file(
     };
     let problem = match exists {
         Ok(true) => return None,
+        Ok(false) if is_windows_path(path) => {
+            "does not exist; it is a path of a Windows computer: use a path relative to the list"
+                .to_owned()
+        }
         Ok(false) => "does not exist".to_owned(),
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
     Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
+}
+
+/// Returns whether a path has a Windows drive letter, such as `C:\scans\1.stl`, on another system.
+fn is_windows_path(path: &Path) -> bool {
+    let start = path.as_os_str().as_encoded_bytes();
+    cfg!(not(windows)) && matches!(start, [b'A'..=b'Z' | b'a'..=b'z', b':', b'\\' | b'/', ..])
 }
 
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.

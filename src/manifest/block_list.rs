@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::column_names::{missing_column, similar_column};
 use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
-use super::text::{LineCounter, as_utf8, delimiter};
+use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
 use crate::domain::{BlockName, BlockSide, LengthUnit};
 
 /// The columns of a list of blocks. The first three are required.
@@ -62,7 +62,7 @@ fn reader(bytes: &[u8]) -> ::csv::Reader<&[u8]> {
 /// Returns an error if the list cannot be decoded, contains no blocks, or has an invalid header or row. The error names
 /// the lines of invalid rows.
 pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
+    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
     let mut reader = reader(bytes);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
@@ -91,7 +91,7 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
             continue;
         }
         let mut reasons = Vec::new();
-        if let Some(row) = row(line, columns, &record, &mut reasons) {
+        if let Some(row) = row((bytes, line), columns, &record, &mut reasons) {
             if let Some(first) = seen.insert(row.name.clone(), line) {
                 reasons.push(format!("block \"{}\" is already on line {first}", row.name));
             }
@@ -148,9 +148,9 @@ fn columns_of(line: usize, record: &::csv::ByteRecord) -> Result<Vec<&'static st
     Ok(columns)
 }
 
-/// Returns a row, or records why it is not valid.
+/// Returns the row at a line of a list, or records why it is not valid.
 fn row(
-    line: usize,
+    (list, line): (&[u8], usize),
     columns: &[&'static str],
     record: &::csv::ByteRecord,
     reasons: &mut Vec<String>,
@@ -163,7 +163,8 @@ fn row(
     let mut cells = BTreeMap::new();
     for (column, cell) in columns.iter().zip(record) {
         let Ok(cell) = std::str::from_utf8(cell) else {
-            reasons.push(format!("the cell of column {column:?} is not UTF-8"));
+            let hint = encoding_hint(list);
+            reasons.push(format!("the cell of column {column:?} is not UTF-8{hint}"));
             return None;
         };
         if cell.len() > MAX_PATH_BYTES {

@@ -27,7 +27,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
 /// the lines of invalid rows.
 pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
+    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter(bytes))
         .trim(::csv::Trim::All)
@@ -48,7 +48,7 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
             (Ok(false), Some(_)) => break,
             (Ok(false), None) => return Err(of_list("the list is empty").into()),
             (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
-            (Ok(true), None) => header = Some(CsvHeader::parse(line, &record)?),
+            (Ok(true), None) => header = Some(CsvHeader::parse(line, &record, bytes)?),
             (Err(error), _) => {
                 rows.push(line, Err(error.to_string()));
                 break;
@@ -91,18 +91,26 @@ impl std::io::Read for BoundedRows<'_> {
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
 const MAX_NAME_BYTES: usize = 1000;
 
-/// The columns in order. Each has its standard name, if the column is known, and its name as written.
-struct CsvHeader(Vec<(Option<&'static str>, String)>);
+/// The header of a list.
+struct CsvHeader {
+    /// The columns in order. Each has its standard name, if the column is known, and its name as written.
+    columns: Vec<(Option<&'static str>, String)>,
+    /// What to do about cells that are not UTF-8.
+    encoding_hint: String,
+}
 
 impl CsvHeader {
-    fn parse(line: usize, record: &::csv::ByteRecord) -> Result<Self, ManifestError> {
+    fn parse(line: usize, record: &::csv::ByteRecord, list: &[u8]) -> Result<Self, ManifestError> {
+        let encoding_hint = match std::str::from_utf8(list) {
+            Ok(_) => String::new(),
+            Err(_) => encoding_hint(list),
+        };
         let mut problems = ManifestError::default();
         let mut seen = BTreeMap::new();
         let mut columns = Vec::new();
         for (number, field) in (1..).zip(record) {
             let Ok(name) = std::str::from_utf8(field) else {
-                let hint = encoding_hint(field);
-                let reason = format!("the name of column {number} is not UTF-8{hint}");
+                let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
                 problems.add(at_line(line, &reason));
                 continue;
             };
@@ -128,7 +136,10 @@ impl CsvHeader {
             at_line(line, &missing_column(name, record, is_known))
         }));
         problems.check(false)?;
-        Ok(Self(columns))
+        Ok(Self {
+            columns,
+            encoding_hint,
+        })
     }
 
     /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheet programs append such rows.
@@ -136,7 +147,7 @@ impl CsvHeader {
     /// # Errors
     /// Returns an error if the number of cells is wrong or a cell is not UTF-8.
     fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
-        let Self(columns) = self;
+        let columns = &self.columns;
         if record.iter().all(<[u8]>::is_empty) {
             return Ok(None);
         }
@@ -148,7 +159,7 @@ impl CsvHeader {
         for ((known, name), cell) in columns.iter().zip(record) {
             let Ok(cell) = std::str::from_utf8(cell) else {
                 let name = known.unwrap_or(name);
-                let hint = encoding_hint(cell);
+                let hint = &self.encoding_hint;
                 return Err(format!("the cell of column {name:?} is not UTF-8{hint}"));
             };
             if let Some(known) = known {
@@ -284,7 +295,8 @@ mod tests {
 
     #[test]
     fn bytes_that_are_not_utf8_are_reported_with_line_and_column() {
-        let error = super::parse_csv(b"id,mesh,print\na,b,c\nd,\xff\xfe,f\n").expect_err("bytes");
+        let error =
+            super::parse_csv(b"id,mesh,print\na,b,c\nd,\x01\xff\xfe,f\n").expect_err("bytes");
         assert_eq!(
             error.to_string(),
             "line 3: the cell of column \"mesh\" is not UTF-8"
@@ -296,6 +308,41 @@ mod tests {
             "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
              list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
         );
+    }
+
+    #[test]
+    fn the_encoding_is_that_of_all_lines_and_given_once() {
+        // Without the second row, the first could be Windows-1252.
+        let error = super::parse_csv(b"id,mesh,print\na,\xe0.stl,c\nb,ch\xfd\xde.stl,c\n")
+            .expect_err("bytes");
+        assert_eq!(
+            error.to_string(),
+            "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
+             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\") (1 more like this)"
+        );
+        // The list is UTF-8 but for one cell, and its other lines say nothing about that cell.
+        let list = "id,mesh,print\nđá,a,b\ny,\u{1}?.stl,c\n".replace('?', "_");
+        let damaged = list
+            .into_bytes()
+            .iter()
+            .map(|byte| if *byte == b'_' { 0xff } else { *byte })
+            .collect::<Vec<_>>();
+        let error = super::parse_csv(&damaged).expect_err("bytes");
+        assert_eq!(
+            error.to_string(),
+            "line 3: the cell of column \"mesh\" is not UTF-8"
+        );
+    }
+
+    #[test]
+    fn swapped_columns_are_named_once() {
+        let swapped = "id,mesh,print\n1,p/1.JPG,m/1.ply\n2,p/2.jpg,m/2.ply\n";
+        assert_eq!(
+            refusal(swapped),
+            "line 2: mesh names an image and print names a mesh; swap the two (1 more like this)"
+        );
+        // The content decides, so an unusual extension is no reason to refuse a row.
+        assert!(parse("id,mesh,print\n1,scan.tif,print.dat\n").is_ok());
     }
 
     #[test]

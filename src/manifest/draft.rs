@@ -1,9 +1,10 @@
 //! Rows of CSV and JSON Lines lists before they are checked, and the checks that both formats share.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::error::{ManifestError, at_line};
+use super::folders::{is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, RowIds};
 use crate::domain::PairName;
 
@@ -96,6 +97,9 @@ fn complete(
         }
     }
     check_lengths(&draft, reasons);
+    if is_swapped(&draft.cells) {
+        reasons.push("mesh names an image and print names a mesh; swap the two".to_owned());
+    }
     let unit = draft
         .cells
         .remove("unit")
@@ -117,6 +121,12 @@ fn complete(
         scanned_face_down: face_down,
         meta: draft.meta,
     })
+}
+
+/// Returns whether the mesh has the extension of an image, and the print that of a mesh.
+fn is_swapped(cells: &BTreeMap<&'static str, String>) -> bool {
+    let path = |column: &str| cells.get(column).map(Path::new);
+    path("mesh").is_some_and(is_named_like_print) && path("print").is_some_and(is_named_like_mesh)
 }
 
 /// Records cells that are too long. Lengths are limited because the catalog stores every cell and reports show them.

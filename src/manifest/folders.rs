@@ -13,9 +13,19 @@ use crate::domain::PairName;
 const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
 const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
+/// Returns whether the extension of a path is that of a mesh.
+pub(super) fn is_named_like_mesh(path: &Path) -> bool {
+    has_extension(path, &MESH_EXTENSIONS)
+}
+
+/// Returns whether the extension of a path is that of a print.
+pub(super) fn is_named_like_print(path: &Path) -> bool {
+    has_extension(path, &PRINT_EXTENSIONS)
+}
+
 /// Returns whether the extension of a path is that of a mesh or of a print.
 pub fn is_named_like_input(path: &Path) -> bool {
-    has_extension(path, &MESH_EXTENSIONS) || has_extension(path, &PRINT_EXTENSIONS)
+    is_named_like_mesh(path) || is_named_like_print(path)
 }
 
 /// The content of two directories.

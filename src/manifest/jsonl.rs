@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::Value;
 
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
-use super::error::ManifestError;
+use super::error::{ManifestError, of_list};
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
 use crate::domain::{KEY_TWICE, UniqueKeys};
@@ -33,7 +33,7 @@ pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
 ) -> Result<RowIds, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
+    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
     let mut rows = RowCollector::new(each);
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let content = content.trim_ascii();

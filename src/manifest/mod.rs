@@ -13,6 +13,7 @@ mod text;
 
 pub use self::csv::{parse_csv, read_csv};
 pub use block_list::{BlockRow, is_block_list, parse_blocks};
+pub use column_names::MisspeltColumns;
 pub use error::ManifestError;
 pub use folders::{FolderPairs, is_named_like_input, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};

@@ -29,23 +29,15 @@ pub struct ManifestRow {
     pub meta: BTreeMap<String, serde_json::Value>,
 }
 
-/// Names of the columns with a meaning.
-const COLUMNS: [&str; 7] = [
-    "id",
-    "mesh",
-    "print",
-    "character",
-    "block",
-    "unit",
-    "scanned_face_down",
-];
-
 /// Columns that every list needs.
 pub(super) const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
 
+/// The other columns with a meaning.
+pub(super) const OPTIONAL: [&str; 4] = ["character", "block", "unit", "scanned_face_down"];
+
 /// Returns the column with a meaning of this name, ignoring case.
 pub(super) fn known_column(name: &str) -> Option<&'static str> {
-    let mut columns = COLUMNS.into_iter();
+    let mut columns = REQUIRED.into_iter().chain(OPTIONAL);
     columns.find(|known| known.eq_ignore_ascii_case(name))
 }
 

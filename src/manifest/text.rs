@@ -30,21 +30,28 @@ const VIETNAMESE_TONES: [u8; 5] = [0xcc, 0xd2, 0xde, 0xec, 0xf2];
 /// Bytes of Đ, Ơ and Ư and their small letters in Windows-1258. In Windows-1252 they are Ð, Õ and Ý.
 const VIETNAMESE_LETTERS: [u8; 6] = [0xd0, 0xf0, 0xd5, 0xf5, 0xdd, 0xfd];
 
-/// Returns what to do about a text that is not UTF-8, with the encoding that it seems to have: Windows-1258 or
-/// Windows-1252, in which spreadsheet programs save CSV files in Vietnam and in western countries. Returns nothing for
-/// bytes that are not text.
-pub(super) fn encoding_hint(text: &[u8]) -> String {
+/// Returns what to do about a list that is not UTF-8, with the encoding that its other lines seem to have: Windows-1258
+/// or Windows-1252, in which spreadsheet programs save CSV files in Vietnam and in western countries. Returns nothing if
+/// these lines are not text.
+pub(super) fn encoding_hint(list: &[u8]) -> String {
+    let lines = list.split(|byte| *byte == b'\n');
+    let lines: Vec<&[u8]> = lines
+        .filter(|line| std::str::from_utf8(line).is_err())
+        .collect();
     let is_text = |byte: &u8| *byte >= 0x20 || byte.is_ascii_whitespace();
     // In both encodings, words mix ASCII letters with bytes above 0xc0.
-    if !text.iter().all(is_text) || !text.iter().any(u8::is_ascii_alphabetic) {
+    let is_words =
+        |line: &&[u8]| line.iter().all(is_text) && line.iter().any(u8::is_ascii_alphabetic);
+    if !lines.iter().all(is_words) {
         return String::new();
     }
     let is_vowel = |byte: u8| b"aeiouyAEIOUY".contains(&byte) || byte >= 0xc0;
-    let has_tone = text
-        .windows(2)
-        .any(|pair| is_vowel(pair[0]) && VIETNAMESE_TONES.contains(&pair[1]));
-    let has_letter = text.iter().any(|byte| VIETNAMESE_LETTERS.contains(byte));
-    let name = if has_tone || has_letter {
+    let has_tone = |line: &[u8]| {
+        let mut pairs = line.windows(2);
+        pairs.any(|pair| is_vowel(pair[0]) && VIETNAMESE_TONES.contains(&pair[1]))
+    };
+    let has_letter = |line: &[u8]| line.iter().any(|byte| VIETNAMESE_LETTERS.contains(byte));
+    let name = if lines.iter().any(|line| has_tone(line) || has_letter(line)) {
         "Windows-1258 (Vietnamese)"
     } else {
         "Windows-1252 (Western European)"

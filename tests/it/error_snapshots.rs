@@ -25,6 +25,10 @@ fn usage_errors() {
         ("no_project", &["status"]),
         ("no_project_json", &["status", "--json"]),
         ("missing_manifest", &["import", "pairs.csv"]),
+        (
+            "missing_folder",
+            &["import", "--meshes", "quét", "--prints", "in"],
+        ),
         ("manifest_is_a_directory", &["import", "."]),
     ] {
         assert_call(&format!("error_{name}"), dir.path(), args);
@@ -62,6 +66,14 @@ fn refused_manifests() {
         ),
         ("manifest_columns", "id,model,print\na,b,c\n"),
         ("manifest_empty", ""),
+        (
+            "manifest_swapped",
+            "id,mesh,print\na,a.png,a.stl\nb,b.png,b.stl\n",
+        ),
+        (
+            "manifest_of_windows",
+            "id,mesh,print\na,C:\\scans\\a.stl,C:/prints/a.png\n",
+        ),
     ] {
         write(dir.path(), "pairs.csv", text);
         let args = ["-C", "p", "import", "pairs.csv"];

@@ -50,10 +50,11 @@ fn read_list(name: &str, bytes: &[u8]) -> Result<(), String> {
         parse_csv(bytes)
     };
     read.map(drop).map_err(|refused| {
-        for problem in &refused.problems {
+        let text = refused.to_string();
+        for problem in text.lines() {
             assert_one_sentence(problem);
         }
-        refused.problems.first().cloned().expect("a problem")
+        text.lines().next().expect("a problem").to_owned()
     })
 }
 
