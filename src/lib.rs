@@ -240,6 +240,7 @@
 //! | `view` | the pages that show one scan on its print in 3D, or a whole block | `domain`, `local_server`, `export` |
 //! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `store`, `runner`, `platform` |
+//! | `documentation` | the files of `docs/` as web pages | |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
 //!
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;
@@ -253,6 +254,7 @@ pub mod check;
 pub mod cli;
 pub mod config;
 pub mod demo;
+pub mod documentation;
 pub mod domain;
 pub mod export;
 mod failpoint;

@@ -27,21 +27,24 @@ export function labelKeys() {
 /** An element of a closed dialog may keep the focus for a moment; keys are no longer meant for it. */
 const isGone = (target) => Boolean(target.closest?.("dialog:not([open])"));
 const isTyping = (target) => target.closest?.("input, textarea, select, dialog") && !isGone(target);
+/** Keys of the numeric keypad that do the same as another key, unless they have an action of their own. */
+const KEYPAD = { NumpadEnter: "Enter", NumpadAdd: "Equal", NumpadSubtract: "Minus" };
+const actionOf = (code) => keys()[code] ?? keys()[KEYPAD[code] ?? code.replace("Numpad", "Digit")];
 /** Returns whether the focused control handles the key itself. */
 const isHandledByControl = ({ code, target }) =>
-  ["Enter", "Space"].includes(code) && target.closest?.("button, a, summary") && !isGone(target);
+  ["Enter", "NumpadEnter", "Space"].includes(code) && target.closest?.("button, a, summary") && !isGone(target);
 
 /** Calls `press(action, event)` on key down and `release(action)` on key up. */
 export function listen(press, release) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing || isTyping(event.target)) return;
-    const action = keys()[event.code] ?? (event.code.startsWith("Arrow") ? event.code : undefined);
+    const action = actionOf(event.code) ?? (event.code.startsWith("Arrow") ? event.code : undefined);
     if (!action || isHandledByControl(event)) return;
     event.preventDefault();
     press(action, event);
   });
   addEventListener("keyup", (event) => {
-    const action = keys()[event.code];
+    const action = actionOf(event.code);
     if (action) release(action);
   });
   addEventListener("blur", () => release("flicker"));

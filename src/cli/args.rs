@@ -9,15 +9,15 @@ use super::examples::{with_examples, without_global_options};
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
-    backup, check, completions, config, contact_sheet, copy, db, demo, export, import, man, report,
-    restore, retry, review, run, show, status, verdict, view, worker,
+    backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import, man,
+    report, restore, retry, review, run, show, status, verdict, view, worker,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///
 /// A project is a directory with a catalog and artifacts. `import` creates one from your files, `run` aligns the
 /// pairs that are not aligned yet, and `report` prints the table of results. A run that was interrupted continues
-/// where it stopped.
+/// where it stopped. `mocban docs` writes the documentation, which begins with the first hour.
 #[derive(Debug, Parser)]
 #[command(name = "mocban", version, after_help = ExitCode::table(), subcommand_required = true, arg_required_else_help = true)]
 pub(super) struct Cli {
@@ -80,6 +80,8 @@ pub(super) enum Command {
     Config(config::ConfigCommand),
     /// Print a completion script for a shell
     Completions(completions::CompletionsArgs),
+    /// Write the documentation as web pages: the first hour, guides and reference, in English and Vietnamese
+    Docs(docs::DocsArgs),
     /// Write the manual pages
     Man(man::ManArgs),
 }

@@ -24,7 +24,8 @@ use crate::store::{
 #[derive(Debug, Args)]
 pub(super) struct BackupArgs {
     /// The file to write, such as blocks.sqlite; an existing backup is replaced only when the new one is complete. The
-    /// file holds pairs, results, verdicts and the project's settings; `restore` makes a project of it
+    /// file holds pairs, results, verdicts and the project's settings, but neither scans and prints nor depth maps and
+    /// masks; `restore` makes a project of it
     pub(super) file: PathBuf,
 }
 
@@ -54,7 +55,7 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         "verdicts_file": Value::Null,
     }))?;
     context.info(&format!(
-        "{} and {} saved to {shown}, {:.1} MB; images are not included, `run` computes them again",
+        "{} and {} saved to {shown}, {:.1} MB; your scans and prints are not in it, and neither are depth maps and masks, which `run` computes again from them",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         bytes as f64 / 1e6

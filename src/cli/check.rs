@@ -167,6 +167,13 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         lines.push(palette.paint(tone, head));
         lines.push(listed(&found.first, found.found));
     }
+    if lacks_all_files(summary) {
+        lines.push(
+            "no result file is there, as after `restore`: a backup holds the numbers and verdicts, and `check --repair` \
+             and `run` compute the files again"
+                .to_owned(),
+        );
+    }
     if summary.damage.contains_key(&Kind::Database) && summary.left() > 0 {
         lines.push(
             "the catalog's file itself is damaged, so nothing was written to it; replace it with a backup, \
@@ -184,6 +191,12 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
     lines.collect::<Vec<_>>().join("\n") + "\n"
+}
+
+/// Returns whether all result files are missing, and nothing was repaired.
+fn lacks_all_files(summary: &CheckSummary) -> bool {
+    let missing = summary.damage.get(&Kind::FileMissing);
+    missing.is_some_and(|missing| missing.left == missing.found && missing.found == summary.files)
 }
 
 fn headline(summary: &CheckSummary, palette: Palette) -> String {

@@ -42,10 +42,10 @@ pub(super) struct DemoArgs {
     /// Seed of the dataset; the same seed gives the same bytes
     #[arg(long, value_name = "S", default_value = "1")]
     pub(super) seed: u64,
-    /// Kind of pairs: upright, pose, hard, real, all, or another of docs/guides/demo.md
+    /// Kind of pairs: upright, pose, hard, real, all, or another of the page "Generate pairs" of `mocban docs`
     #[arg(long, default_value = "upright")]
     pub(super) tier: Tier,
-    /// Create a whole block with its page instead of pairs; a kind of docs/guides/demo.md, or mixed
+    /// Create a whole block with its page instead of pairs; a kind of the page "Generate pairs", or mixed
     #[arg(long, value_name = "KIND", num_args = 0..=1, require_equals = true, default_missing_value = "mixed", conflicts_with_all = ["pairs", "tier"])]
     pub(super) block: Option<BlockKind>,
     /// Let the characters of the block be found without their boxes
@@ -70,8 +70,9 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         };
         return block_demo(&dir, options, &args, context).await;
     }
+    let max_pairs = args.tier.max_pairs().unwrap_or(u64::MAX);
     let options = DemoOptions {
-        pairs: args.pairs,
+        pairs: args.pairs.min(max_pairs),
         seed: args.seed,
         tier: args.tier,
     };
@@ -144,12 +145,13 @@ async fn align(
         let stored = count(stored?, "true alignment");
         context.info(&format!("{stored} of the cut pairs stored"));
     }
-    report::print(context).await?;
+    report::print_summary(context).await?;
     let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
-    context.info(&format!("contact sheet of all pairs: {picture}"));
-    context.next("status");
+    context.info(&format!("all results in one image, worst first: {picture}"));
+    context.next("review --reviewer me");
+    context.next("report");
     context.next("export -o export");
     Ok(run::code(&summary))
 }
@@ -176,21 +178,21 @@ async fn create_dataset(
 ) -> anyhow::Result<Option<DatasetFiles>> {
     let data = dir.join("data");
     check_directory(dir, &data, &DemoContent::Pairs(options))?;
-    let files = match find_dataset(&data, &options) {
-        Some(files) => files,
-        None => match replace_dataset(&data, options, context).await? {
-            Some(files) => files,
-            None => return Ok(None),
-        },
-    };
-    let pairs = count(files.pairs, "pair");
+    let found = find_dataset(&data, &options);
+    let action = ["creating", "found"][usize::from(found.is_some())];
     let DemoOptions { tier, seed, .. } = options;
-    let action = ["created", "found"][usize::from(files.already_existed)];
-    let data = data.display();
+    let pairs = count(
+        found.as_ref().map_or(options.pairs, |files| files.pairs),
+        "pair",
+    );
+    let shown = data.display();
     context.info(&format!(
-        "{action} {pairs} of tier {tier}, seed {seed}, in {data}"
+        "{action} {pairs} of tier {tier}, seed {seed}, in {shown}"
     ));
-    Ok(Some(files))
+    match found {
+        Some(files) => Ok(Some(files)),
+        None => replace_dataset(&data, options, context).await,
+    }
 }
 
 /// Writes the dataset next to `data` and then replaces `data`. Returns `None` if a signal stopped the command.

@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 28] = [
+const EXAMPLES: [(&str, &str); 29] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
@@ -82,6 +82,7 @@ const EXAMPLES: [(&str, &str); 28] = [
     ),
     ("config", "mocban -C blocks config show"),
     ("completions", "mocban completions bash"),
+    ("docs", "mocban docs"),
     ("man", "mocban man pages"),
 ];
 

@@ -242,6 +242,29 @@ fn lost_files(summary: &ExportSummary) -> String {
     lost.join(" and ")
 }
 
+/// Returns where the files are explained, and what is unusual about tables.
+fn explanation(args: &ExportArgs) -> String {
+    let formats = args.formats();
+    let readme = match formats.len() {
+        1 => format!("{} explains the files", args.output.join("README.md").display()),
+        _ => "README.md in each directory explains its files".to_owned(),
+    };
+    let is_table = |format: &ExportFormat| {
+        matches!(format, ExportFormat::Jsonl | ExportFormat::Csv | ExportFormat::Parquet)
+    };
+    let tables = if formats.iter().any(is_table) {
+        "; a row of a table is one pair and metric"
+    } else {
+        ""
+    };
+    let excel = if formats.contains(&ExportFormat::Csv) && !args.csv_bom {
+        "; for Excel, add --csv-bom"
+    } else {
+        ""
+    };
+    readme + tables + excel
+}
+
 fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
     let unreadable = match summary.unreadable.len() {
         0 => String::new(),
@@ -257,6 +280,7 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         args.output.display(),
         summary.pairs.without_result
     ));
+    context.info(&explanation(args));
     if let Some(counts) = &summary.split {
         let [train, validation, test] = counts.pairs;
         context.info(&format!(

@@ -19,6 +19,7 @@ mod db;
 mod demo;
 mod demo_block;
 mod demo_folder;
+mod docs;
 mod error_text;
 mod examples;
 mod exit;
@@ -146,6 +147,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
         Command::Completions(args) => completions::completions(&args, args::command()),
+        Command::Docs(args) => docs::docs(&args, context),
         Command::Man(args) => man::man(&args, args::command(), context),
     }
 }

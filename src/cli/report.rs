@@ -16,6 +16,7 @@ use crate::config::{self, Sources};
 use crate::export::{GallerySelection, draw_gallery};
 use crate::report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
+    summary,
 };
 use crate::store::Project;
 
@@ -25,9 +26,10 @@ const IMAGE_SEED: u64 = 1;
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// Format of the report: text, json, csv, markdown, latex, or html (one page with images of failures)
-    #[arg(long, short, default_value = "text")]
-    pub(super) format: ReportFormat,
+    /// Format of the report: text, json, csv, markdown, latex, or html (one page with images of failures) [default: that
+    /// of the output file's extension, or text]
+    #[arg(long, short)]
+    pub(super) format: Option<ReportFormat>,
     /// Write the report to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
@@ -66,7 +68,14 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         files::refuse_used_file(path, &project, &catalog).await?;
     }
     context.warn_about_stale(&catalog).await?;
-    let format = chosen_format(args.format, context);
+    let format = match args.format {
+        Some(format) => format,
+        None => args
+            .output
+            .as_deref()
+            .map_or(Ok(ReportFormat::Text), format_of_file)?,
+    };
+    let format = chosen_format(format, context);
     let busy = Busy::start(context, "reading the results");
     let mut pictures = GallerySelection::new(IMAGE_SEED);
     let report = if format == ReportFormat::Html {
@@ -104,6 +113,29 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     Ok(match check_requirements(&report, &args, context) {
         ExitCode::Done if !is_complete => ExitCode::SomeFailed,
         code => code,
+    })
+}
+
+/// Returns the format that belongs to the extension of a file, or text for an unknown extension.
+///
+/// # Errors
+/// Returns an error if the extension is that of a format which is not written.
+fn format_of_file(path: &Path) -> Result<ReportFormat, Refusal> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    Ok(match &*extension.to_ascii_lowercase() {
+        "json" => ReportFormat::Json,
+        "csv" => ReportFormat::Csv,
+        "md" | "markdown" => ReportFormat::Markdown,
+        "tex" => ReportFormat::Latex,
+        "html" | "htm" => ReportFormat::Html,
+        "pdf" | "doc" | "docx" | "odt" | "xls" | "xlsx" | "ods" => {
+            let text = format!(
+                "a report cannot be written as {extension}; html can be printed to PDF by a browser, and spreadsheet \
+                 programs open csv"
+            );
+            return Err(Refusal::Usage(text));
+        }
+        _ => ReportFormat::Text,
     })
 }
 
@@ -158,14 +190,13 @@ async fn compared(
     }
 }
 
-/// Prints the report to stdout, as text or JSON.
-pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
-    let format = chosen_format(ReportFormat::Text, context);
-    let text = render(&read(context).await?, format);
-    if format == ReportFormat::Json {
-        output::print_json_text(&text)?;
+/// Prints the beginning of the report to stdout, or with `--json` the whole report.
+pub(super) async fn print_summary(context: &Context) -> anyhow::Result<()> {
+    let report = read(context).await?;
+    if context.global.json {
+        output::print_json_text(&render(&report, ReportFormat::Json))?;
     } else {
-        output::print(&text)?;
+        output::print(&summary(&report))?;
     }
     Ok(())
 }

@@ -56,12 +56,13 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
         "settings": restored.has_settings, "inputs_missing": restored.missing.len(),
     }))?;
-    let advice = match inputs {
-        None => "put meshes and prints at their old places, ",
-        Some(_) => "",
+    let places = match &inputs {
+        None => "their old places".to_owned(),
+        Some(inputs) => format!("their old places or in {}", inputs.display()),
     };
     context.info(&format!(
-        "{} and {} restored to {}; {advice}`run` computes the images again",
+        "{} and {} restored to {}; a backup has no depth maps and masks: the next two commands compute them again from the \
+         scans and prints at {places}",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         dir.display(),

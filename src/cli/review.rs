@@ -37,10 +37,10 @@ pub(super) struct ReviewArgs {
     /// Seed of the random order
     #[arg(long, value_name = "N", default_value = "1")]
     seed: u64,
-    /// Review only the first N results
+    /// Review only the first N results; attention checks and duplicates are added to them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     sample: Option<u32>,
-    /// Planted errors per hundred results, to measure how many the reviewer catches
+    /// Planted errors per hundred results, at least 5 if there are any, to measure how many the reviewer catches
     #[arg(long, value_name = "PERCENT", default_value = "4", value_parser = percent)]
     attention_checks: f64,
     /// Results per hundred that are shown twice, to measure how consistent the reviewer is
@@ -198,9 +198,10 @@ fn announce(
         output::print(&url)?;
     }
     context.info(&format!(
-        "{}; the address works once, in one browser; press Ctrl-C to end",
+        "{}; press Ctrl-C to end",
         progress(&args.reviewer, page.counts())
     ));
+    context.info("the address works once; if you close the page, press Ctrl-C and start this command again: nothing is lost");
     if address.ip().is_loopback() {
         let port = address.port();
         context.info(&format!(

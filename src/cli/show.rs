@@ -20,19 +20,22 @@ use crate::store::Project;
 /// Arguments of `show`.
 #[derive(Debug, Args)]
 pub(super) struct ShowArgs {
-    /// The pair or block
-    pub(super) name: String,
+    /// The pair or block; without it, the names of all pairs and blocks are listed
+    pub(super) name: Option<String>,
 }
 
 pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
-    let typed = std::slice::from_ref(&args.name);
+    let Some(typed) = args.name else {
+        return list_names(&catalog, context).await;
+    };
+    let typed = std::slice::from_ref(&typed);
     let NamedWork { pairs, blocks } = select::pairs_and_blocks(&catalog, typed).await?;
     let (pair, block) = (pairs.into_iter().next(), blocks.into_iter().next());
     let name = match (pair, block) {
         (_, Some(block)) => return show_block(&block, &project, catalog, context).await,
         (Some(pair), None) => pair,
-        (None, None) => anyhow::bail!("{} was not looked up", args.name),
+        (None, None) => anyhow::bail!("{} was not looked up", typed[0]),
     };
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     let why = catalog.why(&name, &fingerprints).await?;
@@ -60,6 +63,20 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     for command in next_steps(detail, why.is_some()) {
         context.next(&command);
     }
+    Ok(ExitCode::Done)
+}
+
+/// Prints the names of all blocks and pairs, one per line.
+async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<ExitCode> {
+    let (blocks, pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
+    context.print(
+        &json!({"schema": 1, "blocks": blocks, "pairs": pairs}),
+        || {
+            let blocks = blocks.iter().map(|block| format!("{block} (block)\n"));
+            let pairs = pairs.iter().map(|pair| format!("{pair}\n"));
+            blocks.chain(pairs).collect()
+        },
+    )?;
     Ok(ExitCode::Done)
 }
 

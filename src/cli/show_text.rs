@@ -116,9 +116,12 @@ impl PairPage<'_> {
     }
 
     fn stages(&self) -> String {
+        let unit = self.detail.results.attributes.unit;
+        let unit = unit.map_or("mesh units", LengthUnit::name);
         let rows = self.detail.results.stages.iter().map(|record| {
             let (stage, took) = (format!("  {}", record.stage), duration(record.ms));
-            vec![stage, took, record.result_hash.short(), numbers(record)]
+            let numbers = numbers(record, unit);
+            vec![stage, took, record.result_hash.short(), numbers]
         });
         section("stages", rows, "<><<", self.palette)
     }
@@ -168,32 +171,32 @@ impl PairPage<'_> {
     }
 }
 
-/// Returns the few numbers of a stage that show whether it succeeded.
-fn numbers(record: &StageRecord) -> String {
+/// Returns the few numbers of a stage that show whether it succeeded. Lengths are in `unit`.
+fn numbers(record: &StageRecord, unit: &str) -> String {
     let text = match record.stage {
-        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit)),
-        Stage::Depth => record.parse().map(|depth| depth_numbers(&depth)),
+        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit, unit)),
+        Stage::Depth => record.parse().map(|depth| depth_numbers(&depth, unit)),
         Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => Ok(String::new()),
     };
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
-fn fit_numbers(fit: &FitOutcome) -> String {
+fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
     let bow = match fit.bow {
-        Some(_) => format!(", curvature {:.3}", fit.bow_height),
+        Some(_) => format!(", curvature {:.3} {unit}", fit.bow_height),
         None => String::new(),
     };
     format!(
-        "relief {:.3}, rms {:.4}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
+        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }
 
-fn depth_numbers(depth: &DepthOutcome) -> String {
+fn depth_numbers(depth: &DepthOutcome, unit: &str) -> String {
     let DepthOutcome { width, height, .. } = depth;
     let (side, covered) = (depth.scale.mesh_unit_per_px, depth.coverage * 100.0);
-    format!("{width} x {height} px, {side:.4} a pixel, {covered:.0} % covered")
+    format!("{width} x {height} px, {side:.4} {unit} a pixel, {covered:.0} % covered")
 }
 
 fn ink_numbers(found: &NormalizeOutcome) -> String {

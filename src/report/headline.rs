@@ -86,7 +86,7 @@ fn accuracy(report: &Report) -> String {
             report.interval.title(),
             format_count(row.passed),
             counted(row.passed + row.failed, "decided result"),
-        ),
+        ) + &undecided(row),
         None if report.has_verdicts() => {
             "There is no Acc, because reviewers were unsure about every judged result".to_owned()
         }
@@ -95,6 +95,24 @@ fn accuracy(report: &Report) -> String {
     };
     sentence.extend(judged.or(by_default).and_then(truth));
     sentence + "."
+}
+
+/// Returns the clause on results that were judged and count neither as passed nor as failed, or an empty text.
+fn undecided(row: &MetricRow) -> String {
+    let unsure = row.unsure - row.conflicts;
+    let rest = [
+        (row.conflicts, "on which reviewers disagree"),
+        (unsure, "about which they were unsure"),
+    ];
+    let rest = rest.into_iter().filter(|(n, _)| *n > 0);
+    let rest: Vec<String> = rest
+        .map(|(n, what)| format!("{} {what}", format_count(n)))
+        .collect();
+    let verb = if row.unsure == 1 { "is" } else { "are" };
+    match rest.as_slice() {
+        [] => String::new(),
+        rest => format!("; {} {verb} not counted", joined(rest)),
+    }
 }
 
 /// Returns the clause on a metric's errors against ground truth, or `None` without ground truth.

@@ -48,7 +48,7 @@ pub use fail_reasons::FailReasonCount;
 pub use manual_alignment::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
 pub use model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
 pub use provenance::{ChangedSetting, Provenance, UsedSettings};
-pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render};
+pub use render::{Cover, MAX_PAGE_BYTES, ReportFormat, agreement_text, page, render, summary};
 pub use report_error::ReportError;
 pub use reviewer_agreement::{
     MIN_RESULTS, ReviewerAgreement, ReviewerPair, ReviewerRecord, VerdictAgreement, agreement,

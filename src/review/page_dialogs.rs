@@ -18,7 +18,7 @@ pub(super) fn guide(language: Language) -> Markup {
             }
             p { (language.translate("guide_question")) }
             form.actions method="dialog" {
-                button.verdict type="button" data-action="practice" { (language.translate("practice")) }
+                button.verdict type="button" data-action="practice" autofocus { (language.translate("practice")) }
                 button { (language.translate("start_judging")) }
             }
             ul.colours {

@@ -10,6 +10,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("clap", &["cli"]),
     ("clap_complete", &["cli"]),
     ("clap_mangen", &["cli"]),
+    ("pulldown_cmark", &["documentation"]),
     ("indicatif", &["cli"]),
     ("anyhow", &["cli"]),
     ("toml", &["cli", "config"]),

@@ -56,10 +56,12 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
         })",
     );
         assert_eq!(drawn, json!(true), "each example has an outline");
-        tab.eval("document.querySelector('[data-action=practice]').click()");
+        // Enter on the first page starts the practice, instead of closing the guide.
+        assert_eq!(tab.eval("document.activeElement.dataset.action"), json!("practice"));
+        tab.eval("document.activeElement.click()");
         tab.wait("!document.querySelector('#guide[open]')");
         // The fourth answer is wrong.
-        let keys = ["KeyP", "Digit1", "KeyF", "KeyF", "Digit3", "KeyP"];
+        let keys = ["KeyP", "Numpad1", "KeyF", "KeyF", "Digit3", "KeyP"];
         for (i, key) in keys.into_iter().enumerate() {
             let text = practise(tab, key);
             let starts = if i == 3 {
@@ -72,7 +74,7 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
                 assert!(text.contains("Wrong angle. Rotated by 9°"), "{text}");
                 tab.screenshot("practice");
             }
-            tab.key("Enter");
+            tab.key(["Enter", "NumpadEnter"][i % 2]);
         }
         tab.wait("document.getElementById('live').textContent.includes('5 of 6')");
         tab.wait("document.getElementById('practice').hidden");

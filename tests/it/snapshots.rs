@@ -171,6 +171,12 @@ fn import() {
     );
     write(
         dir.path(),
+        "pairs.csv",
+        "id,mesh,print,charactr,unitt\na,a.stl,a.png,x,mm\n",
+    );
+    assert_call("import_misspelt_columns", dir.path(), &args);
+    write(
+        dir.path(),
         "case.csv",
         "id,mesh,print\nA1,pairs.csv,pairs.csv\na1,pairs.csv,pairs.csv\n",
     );
@@ -221,6 +227,7 @@ fn pairs_that_wait_and_pairs_that_failed() {
         assert_call(name, dir.path(), &[&["-C", "p"], args].concat());
     };
     at("status_new", &["status"]);
+    at("show_names", &["show"]);
     at("show_new", &["show", "a"]);
     at("run_dry_new", &["run", "--dry-run"]);
     at("retry_nothing", &["retry"]);
@@ -282,6 +289,10 @@ fn finished_project() {
             "--require-complete",
         ],
     );
+    at("report_as_html", &["report", "-o", "p/report.html"]);
+    let page = std::fs::read_to_string(dir.path().join("p/report.html")).expect("a report");
+    assert!(page.starts_with("<!DOCTYPE html>"), "{page:.100}");
+    at("error_report_as_pdf", &["report", "-o", "p/report.PDF"]);
     at("contact_sheet", &["contact-sheet", "--limit", "1"]);
     assert_call(
         "contact_sheet_json",
@@ -289,6 +300,7 @@ fn finished_project() {
         &["-C", "p", "sheet", "--json"],
     );
     at("export", &["export", "-o", "out"]);
+    at("export_csv", &["export", "--to", "csv", "-o", "csv"]);
     at("agreement_without_pairs_in_common", &["agreement"]);
     at(
         "adjudicate_nothing",
@@ -376,6 +388,24 @@ fn backup() {
     write(dir.path(), "thesis.docx", "ten years");
     at("error_backup_target", &["backup", "thesis.docx"]);
     at("error_backup_directory", &["backup", "p"]);
+    assert_call("restore", dir.path(), &["restore", "b.sqlite", "q"]);
+    assert_call("check_restored", dir.path(), &["-C", "q", "check"]);
+}
+
+#[test]
+fn documentation() {
+    let dir = empty();
+    assert_call("docs", dir.path(), &["docs"]);
+    let index = dir.path().join("mocban-docs/index.html");
+    let first = std::fs::read_to_string(&index).expect("a page");
+    assert!(first.contains("tutorial/first-hour.html"), "{first}");
+    assert!(dir.path().join("mocban-docs/pictures/viewer.jpg").exists());
+    // An earlier version of the pages is replaced; anything else is kept.
+    write(dir.path(), "mocban-docs/index.html", "old");
+    assert_call("docs", dir.path(), &["docs"]);
+    assert_eq!(std::fs::read_to_string(&index).expect("a page"), first);
+    write(dir.path(), "mocban-docs/notes.txt", "mine");
+    assert_call("error_docs_directory", dir.path(), &["docs"]);
 }
 
 #[test]

@@ -23,6 +23,7 @@ use crate::domain::{enum_names, visible, visible_json};
 
 pub use agreement_text::agreement_text;
 pub use html::{Cover, MAX_PAGE_BYTES, page};
+pub use text::summary;
 
 /// A format of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,10 +2,10 @@
 
 use super::comparison_tables::{comparison_sentences, comparisons, score_comparisons};
 use super::provenance_lines::provenance_lines;
-use super::report_tables::tables;
+use super::report_tables::{scores, tables, truth};
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
-use crate::domain::one_line;
+use crate::domain::{one_line, visible};
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
@@ -15,10 +15,24 @@ const WIDTH: usize = 80;
 /// Most failed pairs that are listed per class.
 const MAX_LISTED: usize = 5;
 
+/// Returns the beginning of the report as aligned text: the headline, the scores and, if there is ground truth, the
+/// errors against it.
+pub fn summary(report: &Report) -> String {
+    let mut blocks = vec![headline(report), with_caption(&scores(report))];
+    if report.has_truth() {
+        blocks.push(with_caption(&truth(report)));
+    }
+    visible(&blocks.join("\n")).into_owned()
+}
+
+fn headline(report: &Report) -> String {
+    let sentences = report.headline.iter();
+    sentences.map(|text| wrapped("", text)).collect()
+}
+
 /// Returns the report as aligned text.
 pub(super) fn render(report: &Report) -> String {
-    let headline = report.headline.iter();
-    let mut blocks = vec![headline.map(|text| wrapped("", text)).collect()];
+    let mut blocks = vec![headline(report)];
     let tables = tables(report).into_iter().chain(short_tables(report));
     blocks.extend(tables.map(|table| with_caption(&table)));
     blocks.extend(sentences(&comparison_sentences(report)));

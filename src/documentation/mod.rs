@@ -1,0 +1,6 @@
+//! The documentation as web pages, for an installed program without the files of `docs/`.
+
+mod files;
+mod html;
+
+pub use files::web_files;
