@@ -49,6 +49,7 @@ const PICTURES: &[(&str, &[u8])] = of_docs! {
     "pictures/report.png",
     "pictures/review.jpg",
     "pictures/stages.png",
+    "pictures/viewer-vi.jpg",
     "pictures/viewer.jpg",
 };
 
