@@ -246,11 +246,17 @@ fn lost_files(summary: &ExportSummary) -> String {
 fn explanation(args: &ExportArgs) -> String {
     let formats = args.formats();
     let readme = match formats.len() {
-        1 => format!("{} explains the files", args.output.join("README.md").display()),
+        1 => format!(
+            "{} explains the files",
+            args.output.join("README.md").display()
+        ),
         _ => "README.md in each directory explains its files".to_owned(),
     };
     let is_table = |format: &ExportFormat| {
-        matches!(format, ExportFormat::Jsonl | ExportFormat::Csv | ExportFormat::Parquet)
+        matches!(
+            format,
+            ExportFormat::Jsonl | ExportFormat::Csv | ExportFormat::Parquet
+        )
     };
     let tables = if formats.iter().any(is_table) {
         "; a row of a table is one pair and metric"

@@ -107,7 +107,7 @@ impl From<InputError> for ArtifactError {
             | InputError::Changed(path)
             | InputError::TooLarge { path, .. } => Self::Changed(path),
             InputError::Denied(path) => Self::io(&path)(ErrorKind::PermissionDenied.into()),
-            InputError::Store(error) => Self::Bucket(error),
+            InputError::Object(error) | InputError::Store(error) => Self::Bucket(error),
             InputError::Io { path, source } => Self::Io { path, source },
         }
     }

@@ -39,6 +39,9 @@ pub enum InputError {
     /// The file is being written.
     #[error("{0} changed while it was read")]
     Changed(PathBuf),
+    /// The object store does not give the file, and will not the next time.
+    #[error("{0}")]
+    Object(BucketError),
     /// The object store failed; another attempt may succeed.
     #[error("{0}")]
     Store(BucketError),
@@ -56,6 +59,7 @@ impl From<BucketError> for InputError {
     fn from(error: BucketError) -> Self {
         match error {
             BucketError::NotThere(address) => Self::NotThere(address.into()),
+            error @ BucketError::Object { .. } => Self::Object(error),
             error => Self::Store(error),
         }
     }
@@ -85,6 +89,7 @@ impl InputError {
             | Self::NotAFile { .. }
             | Self::Denied(_)
             | Self::Changed(_)
+            | Self::Object(_)
             | Self::Store(_)
             | Self::Io { .. } => FailureClass::Io,
             Self::TooLarge { .. } => FailureClass::BadInput,
@@ -118,7 +123,7 @@ mod tests {
 
     use rustix::io::Errno;
 
-    use super::with_advice;
+    use super::{BucketError, FailureClass, InputError, with_advice};
 
     #[test]
     fn too_many_open_files_name_the_way_out() {
@@ -133,5 +138,16 @@ mod tests {
             with_advice(error).raw_os_error(),
             Some(Errno::IO.raw_os_error())
         );
+    }
+
+    #[test]
+    fn an_object_that_is_never_given_is_not_tried_again() {
+        let object = |code: &str| BucketError::Object {
+            address: "s3://b/x".to_owned(),
+            code: code.to_owned(),
+        };
+        let error = InputError::from(object("KeyTooLongError"));
+        assert!(matches!(error, InputError::Object(_)) && !error.is_transient());
+        assert_eq!(error.class(), FailureClass::Io);
     }
 }

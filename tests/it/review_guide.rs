@@ -57,7 +57,10 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
     );
         assert_eq!(drawn, json!(true), "each example has an outline");
         // Enter on the first page starts the practice, instead of closing the guide.
-        assert_eq!(tab.eval("document.activeElement.dataset.action"), json!("practice"));
+        assert_eq!(
+            tab.eval("document.activeElement.dataset.action"),
+            json!("practice")
+        );
         tab.eval("document.activeElement.click()");
         tab.wait("!document.querySelector('#guide[open]')");
         // The fourth answer is wrong.

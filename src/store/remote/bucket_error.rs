@@ -40,6 +40,17 @@ pub enum BucketError {
         /// The store's error code, such as `EntityTooLarge`, or the HTTP status.
         reason: String,
     },
+    /// The store does not give this object, and will not the next time. Other objects are not concerned.
+    #[error(
+        "{address}: the object store does not give this object ({code}{})",
+        object_advice(code)
+    )]
+    Object {
+        /// Which object.
+        address: String,
+        /// The store's error code.
+        code: String,
+    },
     /// The address is not that of a folder in a bucket, or the environment lacks something.
     #[error("{address}: {reason}")]
     Address {
@@ -68,6 +79,17 @@ pub enum BucketError {
     },
 }
 
+/// Code of the reply for an object in an archive, such as Glacier.
+const ARCHIVED: &str = "InvalidObjectState";
+
+/// Returns what to do about an object that is not given, or an empty text.
+fn object_advice(code: &str) -> &'static str {
+    match code {
+        ARCHIVED => "; it is archived: restore it first",
+        _ => "",
+    }
+}
+
 impl BucketError {
     /// Converts an error of the client.
     pub(super) fn of(address: &str, error: &object_store::Error) -> Self {
@@ -75,9 +97,11 @@ impl BucketError {
         let code = code_of(error);
         match (error, code.as_deref()) {
             (_, Some("NoSuchBucket")) => Self::NoBucket(address),
-            (_, Some("InvalidObjectState" | "QuotaExceeded")) => {
-                Self::of_reply(address, error, code.as_deref())
-            }
+            (_, Some(code @ (ARCHIVED | "KeyTooLongError"))) => Self::Object {
+                address,
+                code: code.to_owned(),
+            },
+            (_, Some(code @ "QuotaExceeded")) => Self::of_reply(address, error, Some(code)),
             (object_store::Error::NotFound { .. }, _) => Self::NotThere(address),
             (_, Some(code)) if is_refusal(code) => Self::Refused {
                 address,
@@ -239,6 +263,17 @@ mod tests {
         ] {
             assert!(!is_waited_for(lasting), "{lasting}");
         }
+        // An archived object concerns no other object.
+        let source = "status code: 403 Forbidden: <Code>InvalidObjectState</Code>";
+        let archived = object_store::Error::PermissionDenied {
+            path: "x".to_owned(),
+            source: source.into(),
+        };
+        let error = BucketError::of("s3://b/x", &archived);
+        assert_eq!(
+            error.to_string(),
+            "s3://b/x: the object store does not give this object (InvalidObjectState; it is archived: restore it first)"
+        );
         // A full quota is not a matter of keys.
         let source = "status code: 403 Forbidden: <Code>QuotaExceeded</Code>";
         let full = object_store::Error::PermissionDenied {
