@@ -8,6 +8,7 @@ use super::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
 use super::compute_thread::run_blocking;
 use super::error::RunError;
 use super::events::RunEvent;
+use super::folder_check::check_folders;
 use super::policy;
 use super::run_context::RunContext;
 use super::stage_output::result_hash;
@@ -162,7 +163,9 @@ pub(super) async fn store_failure(
     error: BlockStageError,
     ms: Option<u64>,
 ) -> Result<AfterStage, RunError> {
-    check_in_place(context).await?;
+    let attributes = &block.work.attributes;
+    let paths = [&attributes.mesh_path, &attributes.page_path];
+    check_folders(context, paths.map(String::clone)).await?;
     let (failure, is_transient) = as_failure(error);
     let (id, attempt) = (block.lease.block(), block.lease.attempt());
     let now = context.clock.now();
@@ -202,13 +205,6 @@ pub(super) async fn store_failure(
         }
     };
     Ok(AfterStage::End(end))
-}
-
-/// Checks that the project's directory was not renamed. Otherwise, the run ends instead of failing the block.
-async fn check_in_place(context: &RunContext) -> Result<(), RunError> {
-    let project = context.project.clone();
-    run_blocking(move || project.check_in_place()).await?;
-    Ok(())
 }
 
 /// Converts the characters of a cut to their stored form.

@@ -2,7 +2,7 @@
 
 use crate::catalog::{CatalogError, FieldChange};
 use crate::domain::{BlockName, PairName};
-use crate::store::{ArtifactError, LockError, StoreError};
+use crate::store::{ArtifactError, LockError, StorageError, StoreError};
 
 /// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
 #[derive(Debug, thiserror::Error)]
@@ -31,6 +31,9 @@ pub enum RunError {
     /// The project's directory cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The folder of the inputs is not there.
+    #[error("{0}")]
+    Storage(#[from] StorageError),
     /// An artifact could not be written.
     #[error(transparent)]
     Artifact(#[from] ArtifactError),

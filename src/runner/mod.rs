@@ -22,6 +22,7 @@ mod claim_size;
 mod compute_thread;
 mod error;
 mod events;
+mod folder_check;
 mod free_memory;
 mod input_changes;
 mod input_reads;

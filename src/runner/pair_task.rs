@@ -6,9 +6,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::checkpointer::Checkpointer;
-use super::compute_thread::{ComputeEvent, ComputeThread, run_blocking};
+use super::compute_thread::{ComputeEvent, ComputeThread};
 use super::error::RunError;
 use super::events::RunEvent;
+use super::folder_check::check_folders;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
@@ -168,9 +169,8 @@ async fn store_failure(
     pair: PairSummary,
     failed: FailedStage,
 ) -> Result<PairEnd, RunError> {
-    // If the project directory was renamed, end the run instead of failing the pair for missing inputs.
-    let project = context.project.clone();
-    run_blocking(move || project.check_in_place()).await?;
+    let paths = [&pair.attributes.mesh_path, &pair.attributes.print_path];
+    check_folders(context, paths.map(String::clone)).await?;
     let inputs = match failed.inputs {
         Some(inputs) => inputs,
         None => pair.inputs_now(context).await,

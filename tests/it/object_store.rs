@@ -344,6 +344,19 @@ fn inputs_below_a_folder_with_a_name_move_with_it() {
     let plan = mocban(dir.path(), &plan).expect(0).json();
     assert_eq!(plan["pairs"], 0, "{plan}");
     assert!(Project::open(&dir.path().join("named")).is_ok());
+
+    // A disk that is not mounted is an empty folder. No pair fails for it.
+    std::fs::create_dir(&data).expect("an empty folder");
+    for folder in [&data, &dir.path().join("away")] {
+        let settings = ["-C", "named", "--set", &root(folder)];
+        let run = [&settings[..], &["run", "--rerun", "all"]].concat();
+        let refused = mocban(dir.path(), &run).expect(2);
+        let reason = format!("{} is missing or empty on this computer", folder.display());
+        assert!(refused.err.contains(&reason), "{}", refused.err);
+    }
+    let status = ["-C", "named", "--set", &root(&moved), "status", "--json"];
+    let status = mocban(dir.path(), &status).expect(0).json();
+    assert_eq!(status["jobs"]["done"], 2, "{status}");
 }
 
 /// Settings alternate, so that results become unreferenced and are then computed again with the same bytes. Before each

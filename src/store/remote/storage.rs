@@ -1,7 +1,8 @@
 //! Where a project's artifacts and inputs are, apart from its own folder.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::bucket::Bucket;
@@ -64,6 +65,16 @@ pub enum StorageError {
         /// Its value.
         folder: String,
     },
+    /// The folder of a root is missing or empty, as if its disk were not mounted.
+    #[error(
+        "storage.roots.{name}: {} is missing or empty on this computer; mount its disk, or correct the setting", folder.display()
+    )]
+    EmptyRoot {
+        /// Its name.
+        name: String,
+        /// The folder.
+        folder: PathBuf,
+    },
     /// No cache folder is known.
     #[error("no folder for local copies is known; set storage.cache")]
     NoCacheFolder,
@@ -109,7 +120,7 @@ impl ProjectStorage {
             }
             let root = if place.contains("://") {
                 Root::Bucket(open(&format!("storage.roots.{name}"), place)?)
-            } else if std::path::Path::new(place).is_absolute() {
+            } else if Path::new(place).is_absolute() {
                 Root::Folder(PathBuf::from(place))
             } else {
                 return Err(StorageError::RootFolder {
@@ -158,10 +169,10 @@ impl ProjectStorage {
         (storage, bucket)
     }
 
-    /// Asks each bucket whether it exists and may be read. May block.
+    /// Asks each bucket whether it exists and may be read, and checks that the other roots are not empty. May block.
     ///
     /// # Errors
-    /// Returns the error of the first bucket that does not answer.
+    /// Returns an error for the first bucket that does not answer, or the first folder that is missing or empty.
     pub fn check(&self) -> Result<(), StorageError> {
         let failed = |setting: String| move |source| StorageError::Bucket { setting, source };
         if let Some(bucket) = &self.artifacts {
@@ -170,13 +181,26 @@ impl ProjectStorage {
                 .map_err(failed("storage.artifacts".to_owned()))?;
         }
         for (name, root) in &self.roots {
-            if let Root::Bucket(bucket) = root {
-                bucket
+            match root {
+                Root::Bucket(bucket) => bucket
                     .check()
-                    .map_err(failed(format!("storage.roots.{name}")))?;
+                    .map_err(failed(format!("storage.roots.{name}")))?,
+                Root::Folder(folder) => check_folder(name, folder)?,
             }
         }
         Ok(())
+    }
+
+    /// Checks that the folder of the root that a stored path begins with is not empty. A disk that is not mounted must
+    /// not be the failure of a pair.
+    ///
+    /// # Errors
+    /// Returns an error if the folder is missing or empty.
+    pub fn check_root_of(&self, stored: &str) -> Result<(), StorageError> {
+        match (self.root(stored), stored.split_once(':')) {
+            (Some((Root::Folder(folder), _)), Some((name, _))) => check_folder(name, folder),
+            _ => Ok(()),
+        }
     }
 
     /// Returns the bucket of the artifacts.
@@ -222,7 +246,7 @@ impl ProjectStorage {
     }
 
     /// Returns the stored form of a path below a root that is a folder, such as `nas:1/mesh.obj`.
-    pub(in crate::store) fn path_below_root(&self, path: &std::path::Path) -> Option<String> {
+    pub(in crate::store) fn path_below_root(&self, path: &Path) -> Option<String> {
         let below = |(name, root): (&String, &Root)| match root {
             Root::Folder(folder) => {
                 let rest = path.strip_prefix(folder).ok()?.to_str()?;
@@ -293,9 +317,26 @@ fn cache_folder() -> Option<PathBuf> {
     Some(base.join("mocban"))
 }
 
+/// Refuses a folder of a root that is missing or empty. A folder that cannot be listed is not refused here, because
+/// reading its files gives the reason.
+fn check_folder(name: &str, folder: &Path) -> Result<(), StorageError> {
+    let is_there = match std::fs::read_dir(folder) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(error) => error.kind() != ErrorKind::NotFound,
+    };
+    if is_there {
+        return Ok(());
+    }
+    Err(StorageError::EmptyRoot {
+        name: name.to_owned(),
+        folder: folder.to_owned(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
+    use std::path::Path;
 
     use super::{ProjectStorage, Root, StorageOptions};
 
@@ -342,5 +383,32 @@ mod tests {
             let error = ProjectStorage::open(&options(&[(name, place)])).expect_err("refused");
             assert!(error.to_string().contains("storage.roots."), "{error}");
         }
+    }
+
+    #[test]
+    fn a_root_that_is_not_mounted_is_noticed() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let [full, empty, missing] = ["full", "empty", "missing"].map(|name| dir.path().join(name));
+        for folder in [&full, &empty] {
+            std::fs::create_dir(folder).expect("a folder");
+        }
+        std::fs::write(full.join("1.stl"), "x").expect("a file");
+        let text = |folder: &Path| folder.to_str().expect("UTF-8").to_owned();
+        let folders = [text(&full), text(&empty), text(&missing)];
+        let roots = ["full", "empty", "missing"].into_iter().zip(&folders);
+        let roots: Vec<(&str, &str)> = roots.map(|(name, folder)| (name, &**folder)).collect();
+        let storage = ProjectStorage::open(&options(&roots));
+        let storage = storage.expect("valid").expect("a storage");
+        assert!(storage.check_root_of("full:2.stl").is_ok());
+        assert!(storage.check_root_of("data/2.stl").is_ok());
+        for name in ["empty", "missing"] {
+            let refused = storage.check_root_of(&format!("{name}:2.stl"));
+            let refused = refused.expect_err("no files").to_string();
+            assert!(
+                refused.starts_with(&format!("storage.roots.{name}: ")),
+                "{refused}"
+            );
+        }
+        assert!(storage.check().is_err());
     }
 }
