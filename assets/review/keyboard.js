@@ -29,7 +29,9 @@ const isGone = (target) => Boolean(target.closest?.("dialog:not([open])"));
 const isTyping = (target) => target.closest?.("input, textarea, select, dialog") && !isGone(target);
 /** Keys of the numeric keypad that do the same as another key, unless they have an action of their own. */
 const KEYPAD = { NumpadEnter: "Enter", NumpadAdd: "Equal", NumpadSubtract: "Minus" };
-const actionOf = (code) => keys()[code] ?? keys()[KEYPAD[code] ?? code.replace("Numpad", "Digit")];
+/** Without NumLock, the digits of the keypad are arrow keys and the like. */
+const keypadDigit = ({ code, key }) => (/^[0-9]$/.test(key) ? code.replace("Numpad", "Digit") : code);
+const actionOf = (event) => keys()[event.code] ?? keys()[KEYPAD[event.code] ?? keypadDigit(event)];
 /** Returns whether the focused control handles the key itself. */
 const isHandledByControl = ({ code, target }) =>
   ["Enter", "NumpadEnter", "Space"].includes(code) && target.closest?.("button, a, summary") && !isGone(target);
@@ -38,13 +40,13 @@ const isHandledByControl = ({ code, target }) =>
 export function listen(press, release) {
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing || isTyping(event.target)) return;
-    const action = actionOf(event.code) ?? (event.code.startsWith("Arrow") ? event.code : undefined);
+    const action = actionOf(event) ?? (event.code.startsWith("Arrow") ? event.code : undefined);
     if (!action || isHandledByControl(event)) return;
     event.preventDefault();
     press(action, event);
   });
   addEventListener("keyup", (event) => {
-    const action = actionOf(event.code);
+    const action = actionOf(event);
     if (action) release(action);
   });
   addEventListener("blur", () => release("flicker"));

@@ -168,11 +168,14 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         lines.push(listed(&found.first, found.found));
     }
     if lacks_all_files(summary) {
-        lines.push(
-            "no result file is there, as after `restore`: a backup holds the numbers and verdicts, and `check --repair` \
-             and `run` compute the files again"
-                .to_owned(),
-        );
+        let inputs = match summary.inputs_missing.count {
+            0 => "",
+            _ => "once scans and prints are at their places, ",
+        };
+        lines.push(format!(
+            "no result file is there, as after `restore`, or if a disk is not mounted; {inputs}`check --repair` and `run` \
+             compute them again"
+        ));
     }
     if summary.damage.contains_key(&Kind::Database) && summary.left() > 0 {
         lines.push(

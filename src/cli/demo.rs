@@ -70,12 +70,12 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         };
         return block_demo(&dir, options, &args, context).await;
     }
-    let max_pairs = args.tier.max_pairs().unwrap_or(u64::MAX);
     let options = DemoOptions {
-        pairs: args.pairs.min(max_pairs),
+        pairs: args.pairs,
         seed: args.seed,
         tier: args.tier,
     };
+    let options = options.limited();
     let Some(files) = create_dataset(&dir, options, context).await? else {
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);

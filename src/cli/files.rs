@@ -20,7 +20,8 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
-    read_file_or_pipe(path, MAX_LIST_BYTES).map_err(|error| refusal("read", path, &error))
+    read_file_or_pipe(path, MAX_LIST_BYTES)
+        .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
@@ -138,7 +139,10 @@ pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyh
 
 /// Lists the files of a directory, without its subdirectories and links to directories.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let refuse = |error: std::io::Error| refusal("list", dir, &error);
+    let refuse = |error: std::io::Error| match error.kind() {
+        ErrorKind::NotADirectory => Refusal::Usage(format!("{} is not a directory", dir.display())),
+        _ => refusal(dir, &error, "there is no directory", "cannot list"),
+    };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(refuse)? {
         let entry = entry.map_err(refuse)?;
@@ -190,13 +194,12 @@ impl RefusedLine {
     }
 }
 
-fn refusal(action: &str, path: &Path, error: &std::io::Error) -> Refusal {
+/// Refuses a path that does not exist (`missing`) or cannot be used (`failed`).
+fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> Refusal {
     let shown = path.display();
     Refusal::Usage(match error.kind() {
-        ErrorKind::NotFound if action == "list" => format!("there is no directory {shown}"),
-        ErrorKind::NotFound => format!("there is no file {shown}"),
-        ErrorKind::NotADirectory if action == "list" => format!("{shown} is not a directory"),
-        _ => format!("cannot {action} {shown}: {error}"),
+        ErrorKind::NotFound => format!("{missing} {shown}"),
+        _ => format!("{failed} {shown}: {error}"),
     })
 }
 

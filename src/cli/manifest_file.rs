@@ -211,7 +211,7 @@ pub(super) fn locate_file(
     let problem = match exists {
         Ok(true) => return None,
         Ok(false) if is_windows_path(path) => {
-            "does not exist; it is a path of a Windows computer: use a path relative to the list"
+            "does not exist; it is a path of a Windows computer: write paths relative to the list"
                 .to_owned()
         }
         Ok(false) => "does not exist".to_owned(),
@@ -221,10 +221,17 @@ pub(super) fn locate_file(
     Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
 }
 
-/// Returns whether a path has a Windows drive letter, such as `C:\scans\1.stl`, on another system.
+/// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
+/// The path of a list's folder may stand before it.
 fn is_windows_path(path: &Path) -> bool {
-    let start = path.as_os_str().as_encoded_bytes();
-    cfg!(not(windows)) && matches!(start, [b'A'..=b'Z' | b'a'..=b'z', b':', b'\\' | b'/', ..])
+    let mut parts = path
+        .components()
+        .map(|part| part.as_os_str().as_encoded_bytes());
+    let is_absolute = |part: &[u8]| {
+        matches!(part, [letter, b':'] | [letter, b':', b'\\', ..] if letter.is_ascii_alphabetic())
+            || part.starts_with(br"\\")
+    };
+    cfg!(not(windows)) && parts.any(is_absolute)
 }
 
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.

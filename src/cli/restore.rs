@@ -61,8 +61,8 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         Some(inputs) => format!("their old places or in {}", inputs.display()),
     };
     context.info(&format!(
-        "{} and {} restored to {}; a backup has no depth maps and masks: the next two commands compute them again from the \
-         scans and prints at {places}",
+        "{} and {} restored to {}; a backup has no scans, prints, depth maps and masks: put scans and prints at {places}, \
+         and the next two commands compute the rest again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         dir.display(),

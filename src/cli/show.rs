@@ -1,10 +1,13 @@
 //! `show PAIR`: prints numbers, files, history, and why the pair will run again.
 
+use std::collections::BTreeSet;
+
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::context::{Context, shell_quoted};
 use super::exit::{ExitCode, Refusal};
+use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::show_block::show_block;
@@ -12,7 +15,7 @@ use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::local;
 use super::verdict;
 use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
-use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, Stage, ThresholdMetric};
+use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric};
 use crate::report::ManualCorrection;
 use crate::runner::{self, NamedWork};
 use crate::store::Project;
@@ -66,17 +69,25 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-/// Prints the names of all blocks and pairs, one per line.
+/// Names that are written to stdout at once.
+const NAMES_AT_ONCE: usize = 1000;
+
+/// Prints the names of all blocks and pairs, one per line. Retired pairs are left out.
 async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<ExitCode> {
-    let (blocks, pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
-    context.print(
-        &json!({"schema": 1, "blocks": blocks, "pairs": pairs}),
-        || {
-            let blocks = blocks.iter().map(|block| format!("{block} (block)\n"));
-            let pairs = pairs.iter().map(|pair| format!("{pair}\n"));
-            blocks.chain(pairs).collect()
-        },
-    )?;
+    let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
+    let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
+    pairs.retain(|pair| !retired.contains(pair));
+    if context.global.json {
+        output::print_json(&json!({"schema": 1, "blocks": blocks, "pairs": pairs}))?;
+        return Ok(ExitCode::Done);
+    }
+    for block in blocks {
+        output::print(&format!("{block} (block)"))?;
+    }
+    for chunk in pairs.chunks(NAMES_AT_ONCE) {
+        let names: Vec<&str> = chunk.iter().map(PairName::as_str).collect();
+        output::print(&names.join("\n"))?;
+    }
     Ok(ExitCode::Done)
 }
 

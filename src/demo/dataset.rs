@@ -30,6 +30,18 @@ pub struct DemoOptions {
     pub tier: Tier,
 }
 
+impl DemoOptions {
+    /// Returns the options with at most as many pairs as the tier has.
+    #[must_use]
+    pub fn limited(self) -> Self {
+        let max_pairs = self.tier.max_pairs().unwrap_or(u64::MAX);
+        Self {
+            pairs: self.pairs.min(max_pairs),
+            ..self
+        }
+    }
+}
+
 /// Paths of a dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatasetFiles {
@@ -122,14 +134,10 @@ pub fn find_dataset(dir: &Path, options: &DemoOptions) -> Option<DatasetFiles> {
 
 impl DatasetStamp {
     fn of(options: &DemoOptions) -> Self {
-        let max_pairs = options.tier.max_pairs().unwrap_or(u64::MAX);
         Self {
             schema: 1,
             revision: REVISION,
-            options: DemoOptions {
-                pairs: options.pairs.min(max_pairs),
-                ..*options
-            },
+            options: options.limited(),
         }
     }
 }

@@ -135,7 +135,7 @@ fn heading_text(events: &[Event<'_>]) -> String {
 }
 
 /// Returns the id of a heading, as mdBook forms it: lower case, hyphens for spaces, no punctuation.
-fn anchor(heading: &str) -> String {
+pub fn anchor(heading: &str) -> String {
     let lower = heading.to_lowercase();
     let kept = lower
         .chars()

@@ -4,3 +4,4 @@ mod files;
 mod html;
 
 pub use files::web_files;
+pub use html::anchor;

@@ -91,13 +91,17 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
             continue;
         }
         let mut reasons = Vec::new();
-        if let Some(row) = row((bytes, line), columns, &record, &mut reasons) {
+        if let Some(row) = row(line, columns, &record, &mut reasons) {
             if let Some(first) = seen.insert(row.name.clone(), line) {
                 reasons.push(format!("block \"{}\" is already on line {first}", row.name));
             }
             rows.push(row);
         }
         problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
+    }
+    if std::str::from_utf8(bytes).is_err() {
+        let hint = encoding_hint(bytes);
+        problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
     if problems == ManifestError::default() && rows.is_empty() {
         return Err(of_list("the list contains no blocks").into());
@@ -148,9 +152,9 @@ fn columns_of(line: usize, record: &::csv::ByteRecord) -> Result<Vec<&'static st
     Ok(columns)
 }
 
-/// Returns the row at a line of a list, or records why it is not valid.
+/// Returns a row, or records why it is not valid.
 fn row(
-    (list, line): (&[u8], usize),
+    line: usize,
     columns: &[&'static str],
     record: &::csv::ByteRecord,
     reasons: &mut Vec<String>,
@@ -163,8 +167,7 @@ fn row(
     let mut cells = BTreeMap::new();
     for (column, cell) in columns.iter().zip(record) {
         let Ok(cell) = std::str::from_utf8(cell) else {
-            let hint = encoding_hint(list);
-            reasons.push(format!("the cell of column {column:?} is not UTF-8{hint}"));
+            reasons.push(format!("the cell of column {column:?} is not UTF-8"));
             return None;
         };
         if cell.len() > MAX_PATH_BYTES {

@@ -1,16 +1,11 @@
-//! Missing and misspelt names of columns.
+//! Missing columns, and which names are similar.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
-
-use super::row::{ManifestRow, OPTIONAL};
-use crate::domain::sanitize;
-
-/// Largest number of wrong, missing or swapped letters in a misspelt name of a column.
-const SIMILAR: usize = 2;
-
-/// Returns whether a name may be a misspelt name of a column.
+/// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
+/// missing or swapped with the next, in longer names two.
 pub(super) fn similar_column(found: &str, name: &str) -> bool {
-    strsim::osa_distance(found, name) <= SIMILAR
+    let max_wrong = if name.len() <= 5 { 1 } else { 2 };
+    matches!((found, name), ("char", "character") | ("blk", "block"))
+        || strsim::osa_distance(found, name) <= max_wrong
 }
 
 /// Describes a missing column. Suggests an unknown column with a similar name.
@@ -37,94 +32,4 @@ pub(super) fn missing_column(
         "column {name:?} is missing{}; the header has: {shown}",
         hint.unwrap_or_default()
     )
-}
-
-/// Maximum number of different names of columns that are compared. JSON Lines may have other names in each row.
-const MAX_NAMES: usize = 1000;
-
-/// Finds columns that are kept as metadata although their names are similar to that of an optional column. A column is
-/// not reported if a row has the optional column itself.
-#[derive(Debug, Default)]
-pub struct MisspeltColumns {
-    names: HashSet<String>,
-    /// Found names by the optional column that they resemble.
-    similar: BTreeMap<&'static str, String>,
-    used: BTreeSet<&'static str>,
-}
-
-impl MisspeltColumns {
-    /// Adds the columns of a row.
-    pub fn add(&mut self, row: &ManifestRow) {
-        let used = [
-            row.character.is_some(),
-            row.block.is_some(),
-            row.unit.is_some(),
-            row.scanned_face_down.is_some(),
-        ];
-        let used = OPTIONAL.iter().zip(used).filter(|(_, is_used)| *is_used);
-        self.used.extend(used.map(|(name, _)| name));
-        for name in row.meta.keys() {
-            if self.names.len() == MAX_NAMES || self.names.contains(name) {
-                continue;
-            }
-            self.names.insert(name.clone());
-            let found = name.trim().to_lowercase();
-            let mut optional = OPTIONAL.into_iter();
-            if let Some(known) = optional.find(|known| is_misspelt(&found, known)) {
-                self.similar.entry(known).or_insert_with(|| name.clone());
-            }
-        }
-    }
-
-    /// Returns a warning for each column.
-    pub fn warnings(&self) -> Vec<String> {
-        let similar = self.similar.iter();
-        let unused = similar.filter(|(known, _)| !self.used.contains(*known));
-        let warning = |(known, name): (&&str, &String)| {
-            let name = sanitize(name, 100);
-            format!(
-                "column {name:?} is kept as metadata; rename it to {known:?} if it is meant, and import again"
-            )
-        };
-        unused.map(warning).collect()
-    }
-}
-
-/// Returns whether a name is similar to that of an optional column, or an abbreviation of it such as `char`.
-fn is_misspelt(found: &str, known: &str) -> bool {
-    let is_short = known.len() <= 4;
-    let is_similar = strsim::osa_distance(found, known) <= SIMILAR - usize::from(is_short);
-    is_similar || found.len() >= 3 && known.starts_with(found)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::MisspeltColumns;
-
-    fn warnings(list: &str) -> Vec<String> {
-        let mut columns = MisspeltColumns::default();
-        for row in super::super::parse_csv(list.as_bytes()).expect("a list") {
-            columns.add(&row);
-        }
-        columns.warnings()
-    }
-
-    #[test]
-    fn misspelt_and_abbreviated_columns_are_reported() {
-        let found =
-            warnings("id,mesh,print,charactr,Units,blk,folio\na,m,p,x,mm,b,2\nb,m,p,y,mm,b,3\n");
-        assert_eq!(found.len(), 3, "{found:?}");
-        assert_eq!(
-            found[2],
-            "column \"Units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again"
-        );
-        assert_eq!(warnings("id,mesh,print,char\na,m,p,x\n").len(), 1);
-    }
-
-    #[test]
-    fn a_column_beside_the_known_one_and_other_names_are_not_reported() {
-        let list =
-            "id,mesh,print,unit,units,note,script,kind,page,side,row\na,m,p,mm,x,x,x,x,x,x,x\n";
-        assert_eq!(warnings(list), Vec::<String>::new());
-    }
 }

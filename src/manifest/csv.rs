@@ -317,10 +317,10 @@ mod tests {
             .expect_err("bytes");
         assert_eq!(
             error.to_string(),
-            "line 2: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
-             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\") (1 more like this)"
+            "lines 2, 3: the cell of column \"mesh\" is not UTF-8; it seems to be Windows-1258 (Vietnamese): save the \
+             list as UTF-8 (in Excel: Save As, \"CSV UTF-8\")"
         );
-        // The list is UTF-8 but for one cell, and its other lines say nothing about that cell.
+        // Only lines that are not UTF-8 decide, and this one is not text.
         let list = "id,mesh,print\nđá,a,b\ny,\u{1}?.stl,c\n".replace('?', "_");
         let damaged = list
             .into_bytes()
@@ -339,7 +339,7 @@ mod tests {
         let swapped = "id,mesh,print\n1,p/1.JPG,m/1.ply\n2,p/2.jpg,m/2.ply\n";
         assert_eq!(
             refusal(swapped),
-            "line 2: mesh names an image and print names a mesh; swap the two (1 more like this)"
+            "lines 2, 3: mesh names an image and print names a mesh; swap the two"
         );
         // The content decides, so an unusual extension is no reason to refuse a row.
         assert!(parse("id,mesh,print\n1,scan.tif,print.dat\n").is_ok());

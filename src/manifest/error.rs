@@ -8,55 +8,88 @@ use crate::domain::sanitize;
 /// Longest text of a problem, in characters.
 const MAX_CHARS: usize = 300;
 
-/// Maximum number of problems that are kept and shown; the others are counted.
+/// Maximum number of problems, and of the places of each, that are kept and shown; the others are counted.
 const MAX_SHOWN: usize = 20;
+
+/// Where a problem is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Place {
+    /// A line, counted from 1.
+    Line(usize),
+    File(String),
+    List,
+}
 
 /// A problem of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Problem {
-    /// The line or file, unless the problem concerns the whole list.
-    place: Option<String>,
+    /// The first places with this reason. Never empty.
+    places: Vec<Place>,
+    /// Number of further places.
+    more: usize,
     reason: String,
-    /// Number of further places with the same reason.
-    repeats: usize,
 }
 
 impl Problem {
-    fn new(place: Option<String>, reason: &str) -> Self {
+    fn new(place: Place, reason: &str) -> Self {
         Self {
-            place,
+            places: vec![place],
+            more: 0,
             reason: sanitize(reason, MAX_CHARS),
-            repeats: 0,
+        }
+    }
+
+    /// Adds the places of a problem with the same reason.
+    fn merge(&mut self, other: Self) {
+        self.more += other.more;
+        for place in other.places {
+            if self.places.len() < MAX_SHOWN {
+                self.places.push(place);
+            } else {
+                self.more += 1;
+            }
         }
     }
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(place) = &self.place {
-            write!(f, "{place}: ")?;
+        let name = |place: &Place| match place {
+            Place::Line(line) => Some(line.to_string()),
+            Place::File(path) => Some(path.clone()),
+            Place::List => None,
+        };
+        let names: Vec<String> = self.places.iter().filter_map(name).collect();
+        match (self.places.as_slice(), self.more) {
+            ([Place::Line(_)], 0) => f.write_str("line ")?,
+            ([Place::Line(_), ..], _) => f.write_str("lines ")?,
+            _ => {}
         }
-        f.write_str(&self.reason)?;
-        match self.repeats {
-            0 => Ok(()),
-            repeats => write!(f, " ({repeats} more like this)"),
+        f.write_str(&names.join(", "))?;
+        if self.more > 0 {
+            write!(f, " and {} more", self.more)?;
         }
+        if !names.is_empty() {
+            f.write_str(": ")?;
+        }
+        f.write_str(&self.reason)
     }
 }
 
 /// Returns a problem of a line, counted from 1.
 pub(super) fn at_line(line: usize, reason: &str) -> Problem {
-    Problem::new(Some(format!("line {line}")), reason)
+    Problem::new(Place::Line(line), reason)
 }
 
 /// Returns a problem of a file of a directory.
 pub(super) fn at_file(path: &Path, reason: &str) -> Problem {
-    Problem::new(Some(sanitize(&path.to_string_lossy(), 4096)), reason)
+    let path = sanitize(&path.to_string_lossy(), 4096);
+    Problem::new(Place::File(path), reason)
 }
 
 /// Returns a problem of the whole list.
 pub(super) fn of_list(reason: &str) -> Problem {
-    Problem::new(None, reason)
+    Problem::new(Place::List, reason)
 }
 
 /// The problems of a refused list. They are displayed one per line.
@@ -69,11 +102,11 @@ pub struct ManifestError {
 }
 
 impl ManifestError {
-    /// Adds a problem. Only counts it if the same reason was given before, or if there are many problems already.
+    /// Adds a problem, or its place if the same reason was given before. Only counts it if there are many already.
     pub(super) fn add(&mut self, problem: Problem) {
         let mut problems = self.problems.iter_mut();
         if let Some(first) = problems.find(|first| first.reason == problem.reason) {
-            first.repeats += 1;
+            first.merge(problem);
         } else if self.problems.len() < MAX_SHOWN {
             self.problems.push(problem);
         } else {
@@ -149,16 +182,23 @@ mod tests {
     }
 
     #[test]
-    fn a_reason_is_given_once_with_the_number_of_lines() {
+    fn a_reason_is_given_once_with_its_lines() {
         let mut error = ManifestError::default();
         for line in 2..=30 {
             error.add(at_line(line, "no unit"));
             error.add(at_line(line, if line < 5 { "no id" } else { "no mesh" }));
         }
+        let text = error.to_string();
+        let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
-            error.to_string(),
-            "line 2: no unit (28 more like this)\nline 2: no id (2 more like this)\n\
-             line 5: no mesh (25 more like this)"
+            lines[0],
+            "lines 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 and 9 more: no unit"
         );
+        assert_eq!(lines[1], "lines 2, 3, 4: no id");
+        assert!(lines[2].starts_with("lines 5, 6, ") && lines[2].ends_with(" and 6 more: no mesh"));
+        let mut error = ManifestError::from(at_file("a".as_ref(), "too long"));
+        error.add(at_file("b".as_ref(), "too long"));
+        assert_eq!(error.to_string(), "a, b: too long");
+        assert_eq!(ManifestError::from(of_list("empty")).to_string(), "empty");
     }
 }

@@ -8,14 +8,15 @@ mod draft;
 mod error;
 mod folders;
 mod jsonl;
+mod misspelt_columns;
 mod row;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv};
 pub use block_list::{BlockRow, is_block_list, parse_blocks};
-pub use column_names::MisspeltColumns;
 pub use error::ManifestError;
 pub use folders::{FolderPairs, is_named_like_input, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};
+pub use misspelt_columns::MisspeltColumns;
 pub use row::{ManifestRow, RowIds};
 pub use text::{LineCounter, NotText, as_utf8, delimiter};

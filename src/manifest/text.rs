@@ -30,9 +30,9 @@ const VIETNAMESE_TONES: [u8; 5] = [0xcc, 0xd2, 0xde, 0xec, 0xf2];
 /// Bytes of Đ, Ơ and Ư and their small letters in Windows-1258. In Windows-1252 they are Ð, Õ and Ý.
 const VIETNAMESE_LETTERS: [u8; 6] = [0xd0, 0xf0, 0xd5, 0xf5, 0xdd, 0xfd];
 
-/// Returns what to do about a list that is not UTF-8, with the encoding that its other lines seem to have: Windows-1258
-/// or Windows-1252, in which spreadsheet programs save CSV files in Vietnam and in western countries. Returns nothing if
-/// these lines are not text.
+/// Returns what to do about a list that is not UTF-8, with its likely encoding: Windows-1258 or Windows-1252, in which
+/// spreadsheet programs save CSV files in Vietnam and in western countries. Only lines that are not UTF-8 are considered.
+/// Returns nothing if one of them is not text.
 pub(super) fn encoding_hint(list: &[u8]) -> String {
     let lines = list.split(|byte| *byte == b'\n');
     let lines: Vec<&[u8]> = lines

@@ -165,7 +165,10 @@ pub(super) async fn store_failure(
 ) -> Result<AfterStage, RunError> {
     let attributes = &block.work.attributes;
     let paths = [&attributes.mesh_path, &attributes.page_path];
-    check_folders(context, paths.map(String::clone)).await?;
+    if let Err(error) = check_folders(context, paths.map(String::clone)).await {
+        context.catalog.release_block(block.lease).await?;
+        return Err(error);
+    }
     let (failure, is_transient) = as_failure(error);
     let (id, attempt) = (block.lease.block(), block.lease.attempt());
     let now = context.clock.now();

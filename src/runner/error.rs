@@ -31,7 +31,7 @@ pub enum RunError {
     /// The project's directory cannot be used.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// The folder of the inputs is not there.
+    /// The folder of inputs cannot be used.
     #[error("{0}")]
     Storage(#[from] StorageError),
     /// An artifact could not be written.

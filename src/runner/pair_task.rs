@@ -170,7 +170,10 @@ async fn store_failure(
     failed: FailedStage,
 ) -> Result<PairEnd, RunError> {
     let paths = [&pair.attributes.mesh_path, &pair.attributes.print_path];
-    check_folders(context, paths.map(String::clone)).await?;
+    if let Err(error) = check_folders(context, paths.map(String::clone)).await {
+        context.catalog.release(lease).await?;
+        return Err(error);
+    }
     let inputs = match failed.inputs {
         Some(inputs) => inputs,
         None => pair.inputs_now(context).await,

@@ -39,7 +39,7 @@ pub enum InputError {
     /// The file is being written.
     #[error("{0} changed while it was read")]
     Changed(PathBuf),
-    /// The object store does not give the file, and will not the next time.
+    /// The object store refuses the object, and will refuse it the next time.
     #[error("{0}")]
     Object(BucketError),
     /// The object store failed; another attempt may succeed.
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn an_object_that_is_never_given_is_not_tried_again() {
+    fn an_object_that_is_refused_is_not_tried_again() {
         let object = |code: &str| BucketError::Object {
             address: "s3://b/x".to_owned(),
             code: code.to_owned(),

@@ -267,9 +267,13 @@ impl Tab<'_> {
     }
 
     fn dispatch(&self, kind: &str, code: &str) {
-        let letter = code.strip_prefix("Key").or(code.strip_prefix("Digit"));
+        let prefixes = ["Key", "Digit", "Numpad"];
+        let letter = prefixes.iter().find_map(|prefix| code.strip_prefix(prefix));
         let key = letter.unwrap_or(code).to_lowercase();
-        let named = matches!(code, "Enter" | "Escape" | "Backspace" | "Tab");
+        let named = matches!(
+            code,
+            "Enter" | "NumpadEnter" | "Escape" | "Backspace" | "Tab"
+        );
         let key = if named { code } else { &key };
         let mut event = json!({ "type": kind, "code": code, "key": key });
         if code == "Escape" {

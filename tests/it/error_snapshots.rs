@@ -72,7 +72,7 @@ fn refused_manifests() {
         ),
         (
             "manifest_of_windows",
-            "id,mesh,print\na,C:\\scans\\a.stl,C:/prints/a.png\n",
+            "id,mesh,print\na,C:\\scans\\a.stl,C:/prints/a.png\nb,\\\\nas\\b.stl,pairs.csv\n",
         ),
     ] {
         write(dir.path(), "pairs.csv", text);

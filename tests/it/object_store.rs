@@ -345,18 +345,22 @@ fn inputs_below_a_folder_with_a_name_move_with_it() {
     assert_eq!(plan["pairs"], 0, "{plan}");
     assert!(Project::open(&dir.path().join("named")).is_ok());
 
-    // A disk that is not mounted is an empty folder. No pair fails for it.
+    // A disk that is not mounted is an empty folder. The first failure ends the run, and no pair fails.
     std::fs::create_dir(&data).expect("an empty folder");
-    for folder in [&data, &dir.path().join("away")] {
+    for (folder, reason) in [
+        (&data, "is empty"),
+        (&dir.path().join("away"), "does not exist"),
+    ] {
         let settings = ["-C", "named", "--set", &root(folder)];
-        let run = [&settings[..], &["run", "--rerun", "all"]].concat();
+        let run = [&settings[..], &["run", "--rerun", "all", "-j", "1"]].concat();
         let refused = mocban(dir.path(), &run).expect(2);
-        let reason = format!("{} is missing or empty on this computer", folder.display());
+        let reason = format!("{} {reason} on this computer", folder.display());
         assert!(refused.err.contains(&reason), "{}", refused.err);
+        let status = [&settings[..], &["status", "--json"]].concat();
+        let status = mocban(dir.path(), &status).expect(0).json();
+        assert_eq!(status["jobs"]["ready"], 2, "{status}");
     }
-    let status = ["-C", "named", "--set", &root(&moved), "status", "--json"];
-    let status = mocban(dir.path(), &status).expect(0).json();
-    assert_eq!(status["jobs"]["done"], 2, "{status}");
+    mocban(dir.path(), &["-C", "named", "--set", &root(&moved), "run"]).expect(0);
 }
 
 /// Settings alternate, so that results become unreferenced and are then computed again with the same bytes. Before each

@@ -56,7 +56,7 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
         })",
     );
         assert_eq!(drawn, json!(true), "each example has an outline");
-        // Enter on the first page starts the practice, instead of closing the guide.
+        // The focus is on the practice, so Enter starts it instead of closing the guide.
         assert_eq!(
             tab.eval("document.activeElement.dataset.action"),
             json!("practice")

@@ -404,8 +404,12 @@ fn documentation() {
     write(dir.path(), "mocban-docs/index.html", "old");
     assert_call("docs", dir.path(), &["docs"]);
     assert_eq!(std::fs::read_to_string(&index).expect("a page"), first);
-    write(dir.path(), "mocban-docs/notes.txt", "mine");
+    write(dir.path(), "mocban-docs/guides/notes.txt", "mine");
     assert_call("error_docs_directory", dir.path(), &["docs"]);
+    std::fs::create_dir_all(dir.path().join("material/pictures")).expect("a folder");
+    write(dir.path(), "material/pictures/scan.jpg", "mine");
+    crate::cli::mocban(dir.path(), &["docs", "material"]).expect(2);
+    assert!(dir.path().join("material/pictures/scan.jpg").exists());
 }
 
 #[test]

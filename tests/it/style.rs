@@ -181,3 +181,26 @@ fn docs_use_plain_terms() {
         found.join("\n")
     );
 }
+
+#[test]
+fn the_container_image_is_built_with_every_included_folder() {
+    let ignored = package_dir().join("deploy/Dockerfile.dockerignore");
+    let ignored = std::fs::read_to_string(ignored).expect("a list");
+    let mut folders = BTreeSet::new();
+    for file in source_files() {
+        let included = file.text.split("\"../").skip(1);
+        let path = included.map(|text| text.trim_start_matches("../"));
+        folders.extend(path.filter_map(|path| Some(path.split_once('/')?.0.to_owned())));
+    }
+    let known = ["assets", "config", "docs", "migrations"];
+    assert!(
+        known.iter().all(|folder| folders.contains(*folder)),
+        "{folders:?}"
+    );
+    // Only unit tests include files of `tests`.
+    let is_needed = |folder: &&String| package_dir().join(folder).is_dir() && *folder != "tests";
+    for folder in folders.iter().filter(is_needed) {
+        let is_copied = ignored.lines().any(|line| line == format!("!{folder}"));
+        assert!(is_copied, "{folder} is not copied into the image");
+    }
+}

@@ -40,9 +40,9 @@ pub enum BucketError {
         /// The store's error code, such as `EntityTooLarge`, or the HTTP status.
         reason: String,
     },
-    /// The store does not give this object, and will not the next time. Other objects are not concerned.
+    /// The store refuses the request for a reason that lies in this object, such as its long name.
     #[error(
-        "{address}: the object store does not give this object ({code}{})",
+        "{address}: the object store refuses this object ({code}{})",
         object_advice(code)
     )]
     Object {
@@ -82,7 +82,7 @@ pub enum BucketError {
 /// Code of the reply for an object in an archive, such as Glacier.
 const ARCHIVED: &str = "InvalidObjectState";
 
-/// Returns what to do about an object that is not given, or an empty text.
+/// Returns what to do about an object that is refused, or an empty text.
 fn object_advice(code: &str) -> &'static str {
     match code {
         ARCHIVED => "; it is archived: restore it first",
@@ -272,7 +272,7 @@ mod tests {
         let error = BucketError::of("s3://b/x", &archived);
         assert_eq!(
             error.to_string(),
-            "s3://b/x: the object store does not give this object (InvalidObjectState; it is archived: restore it first)"
+            "s3://b/x: the object store refuses this object (InvalidObjectState; it is archived: restore it first)"
         );
         // A full quota is not a matter of keys.
         let source = "status code: 403 Forbidden: <Code>QuotaExceeded</Code>";

@@ -65,15 +65,17 @@ pub enum StorageError {
         /// Its value.
         folder: String,
     },
-    /// The folder of a root is missing or empty, as if its disk were not mounted.
+    /// The folder of a root is missing or empty, or cannot be read, as if its disk were not mounted.
     #[error(
-        "storage.roots.{name}: {} is missing or empty on this computer; mount its disk, or correct the setting", folder.display()
+        "storage.roots.{name}: {} {reason} on this computer; mount its disk, or correct the setting", folder.display()
     )]
-    EmptyRoot {
+    UnusableRoot {
         /// Its name.
         name: String,
         /// The folder.
         folder: PathBuf,
+        /// Why it cannot be used.
+        reason: String,
     },
     /// No cache folder is known.
     #[error("no folder for local copies is known; set storage.cache")]
@@ -169,10 +171,10 @@ impl ProjectStorage {
         (storage, bucket)
     }
 
-    /// Asks each bucket whether it exists and may be read, and checks that the other roots are not empty. May block.
+    /// Asks each bucket whether it exists and may be read. May block.
     ///
     /// # Errors
-    /// Returns an error for the first bucket that does not answer, or the first folder that is missing or empty.
+    /// Returns the error of the first bucket that does not answer.
     pub fn check(&self) -> Result<(), StorageError> {
         let failed = |setting: String| move |source| StorageError::Bucket { setting, source };
         if let Some(bucket) = &self.artifacts {
@@ -181,21 +183,19 @@ impl ProjectStorage {
                 .map_err(failed("storage.artifacts".to_owned()))?;
         }
         for (name, root) in &self.roots {
-            match root {
-                Root::Bucket(bucket) => bucket
+            if let Root::Bucket(bucket) = root {
+                bucket
                     .check()
-                    .map_err(failed(format!("storage.roots.{name}")))?,
-                Root::Folder(folder) => check_folder(name, folder)?,
+                    .map_err(failed(format!("storage.roots.{name}")))?;
             }
         }
         Ok(())
     }
 
-    /// Checks that the folder of the root that a stored path begins with is not empty. A disk that is not mounted must
-    /// not be the failure of a pair.
+    /// Checks that the folder of the root that a stored path begins with can be read and is not empty. May block.
     ///
     /// # Errors
-    /// Returns an error if the folder is missing or empty.
+    /// Returns an error if the folder is missing or empty, or cannot be listed although that is permitted.
     pub fn check_root_of(&self, stored: &str) -> Result<(), StorageError> {
         match (self.root(stored), stored.split_once(':')) {
             (Some((Root::Folder(folder), _)), Some((name, _))) => check_folder(name, folder),
@@ -317,19 +317,21 @@ fn cache_folder() -> Option<PathBuf> {
     Some(base.join("mocban"))
 }
 
-/// Refuses a folder of a root that is missing or empty. A folder that cannot be listed is not refused here, because
-/// reading its files gives the reason.
+/// Refuses a folder of a root that is missing or empty, or that cannot be listed. A folder that may not be listed is not
+/// refused, because its files may be readable.
 fn check_folder(name: &str, folder: &Path) -> Result<(), StorageError> {
-    let is_there = match std::fs::read_dir(folder) {
-        Ok(mut entries) => entries.next().is_some(),
-        Err(error) => error.kind() != ErrorKind::NotFound,
+    let first = std::fs::read_dir(folder).map(|mut entries| entries.next().transpose());
+    let reason = match first.and_then(|first| first) {
+        Ok(Some(_)) => return Ok(()),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => return Ok(()),
+        Ok(None) => "is empty".to_owned(),
+        Err(error) if error.kind() == ErrorKind::NotFound => "does not exist".to_owned(),
+        Err(error) => format!("cannot be read ({error})"),
     };
-    if is_there {
-        return Ok(());
-    }
-    Err(StorageError::EmptyRoot {
+    Err(StorageError::UnusableRoot {
         name: name.to_owned(),
         folder: folder.to_owned(),
+        reason,
     })
 }
 
@@ -409,6 +411,6 @@ mod tests {
                 "{refused}"
             );
         }
-        assert!(storage.check().is_err());
+        assert!(storage.check().is_ok(), "a root may be unused");
     }
 }
