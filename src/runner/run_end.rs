@@ -86,11 +86,17 @@ impl RunEnd {
         let pairs = selection.map(|selection| &selection.pairs);
         let blocks = selection.map(|selection| &selection.blocks);
         let (counts, compute_time) = counted;
+        let status = catalog.retry_while_unavailable(async || catalog.status(fingerprints).await);
+        let status = status.await?;
+        let left = catalog.retry_while_unavailable(async || catalog.work_left(until, pairs).await);
+        let left = left.await?;
+        let blocks =
+            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(blocks).await);
         Ok(Self {
             counts,
-            status: catalog.status(fingerprints).await?,
-            left: catalog.work_left(until, pairs).await?,
-            blocks: catalog.outstanding_blocks(blocks).await?,
+            status,
+            left,
+            blocks: blocks.await?,
             compute_time,
         })
     }

@@ -37,10 +37,7 @@ impl WorkerSession {
         Self {
             worker,
             last_heartbeat: now,
-            liveness: Liveness {
-                lease_ms,
-                seen: BTreeMap::new(),
-            },
+            liveness: Liveness::new(lease_ms),
         }
     }
 
@@ -101,9 +98,11 @@ impl WorkerSession {
     /// Recovers the leases of dead workers, and leases of other workers that are long past their deadline. Returns how
     /// many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
-        let (catalog, now) = (&context.catalog, context.clock.now());
+        let catalog = &context.catalog;
         let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
         let holders = holders.await?;
+        // The time after the reply, which may have been waited for.
+        let now = context.clock.now();
         let dead = self.liveness.observe(&holders, self.worker, now);
         let (mut ready, mut poisoned) = (0, Vec::new());
         if !dead.is_empty() {
@@ -135,17 +134,32 @@ impl WorkerSession {
 }
 
 /// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this
-/// process. The clocks of two machines are never compared.
+/// process, while this process could read the catalog. The clocks of two machines are never compared.
 #[derive(Debug)]
 struct Liveness {
     lease_ms: i64,
     /// The last heartbeat of each worker, and when it was first seen.
     seen: BTreeMap<WorkerId, (UnixMillis, UnixMillis)>,
+    /// Time of the last call of [`Self::observe`].
+    observed: UnixMillis,
 }
 
 impl Liveness {
+    const fn new(lease_ms: i64) -> Self {
+        Self {
+            lease_ms,
+            seen: BTreeMap::new(),
+            observed: 0,
+        }
+    }
+
     /// Records the current heartbeats of all workers with leases. Returns the workers that are dead.
     fn observe(&mut self, holders: &[LeaseHolder], me: WorkerId, now: UnixMillis) -> Vec<WorkerId> {
+        if now - self.observed > self.lease_ms / 2 {
+            // This process was away from the catalog, or suspended, and perhaps the others were too: watch them anew.
+            self.seen.clear();
+        }
+        self.observed = now;
         self.seen
             .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));
         let mut dead = Vec::new();
@@ -176,8 +190,6 @@ pub(super) fn this_process() -> WorkerInfo {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::Liveness;
     use crate::catalog::LeaseHolder;
     use crate::domain::WorkerId;
@@ -191,13 +203,29 @@ mod tests {
                 heartbeat: if worker == me { 0 } else { heartbeat },
             })
         };
-        let mut liveness = Liveness {
-            lease_ms: 60_000,
-            seen: BTreeMap::new(),
+        let mut liveness = Liveness::new(60_000);
+        // Observes every five seconds.
+        let mut observe_until = |from: i64, until: i64, heartbeat| -> Vec<WorkerId> {
+            let times = (from..until).step_by(5_000).chain([until]);
+            let dead = times.map(|now| liveness.observe(&holders(heartbeat), me, now));
+            dead.collect::<Vec<_>>().concat()
         };
-        assert!(liveness.observe(&holders(5), me, 0).is_empty());
-        assert!(liveness.observe(&holders(6), me, 59_999).is_empty());
-        assert!(liveness.observe(&holders(6), me, 119_998).is_empty());
-        assert_eq!(liveness.observe(&holders(6), me, 119_999), [other]);
+        assert!(observe_until(0, 59_999, 5).is_empty());
+        assert!(observe_until(59_999, 119_998, 6).is_empty());
+        assert_eq!(observe_until(119_999, 119_999, 6), [other]);
+    }
+
+    #[test]
+    fn after_a_gap_the_others_are_watched_anew() {
+        let (me, other) = (WorkerId(1), WorkerId(2));
+        let holder = [LeaseHolder {
+            worker: other,
+            heartbeat: 5,
+        }];
+        let mut liveness = Liveness::new(60_000);
+        for now in [0, 5_000, 205_000, 235_000, 264_999] {
+            assert!(liveness.observe(&holder, me, now).is_empty(), "{now}");
+        }
+        assert_eq!(liveness.observe(&holder, me, 265_000), [other]);
     }
 }
