@@ -106,8 +106,10 @@
 //!
 //! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`). If an earlier
 //! attempt was stored but its reply was lost, the fencing token and the position of the job show it; leases whose claim had
-//! no reply are searched for too (`db/known_leases.rs`). `Catalog::retry_while_unavailable` repeats the reads and other
-//! writes of a run. `runner/run_guard.rs` refuses runs with other settings.
+//! no reply are searched for too (`db/known_leases.rs`). The write connection of each worker holds a lock
+//! (`queue/worker_lock.rs`): if it is free for some seconds, the worker is dead (`runner/liveness.rs`).
+//! `Catalog::retry_while_unavailable` repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with
+//! other settings.
 //!
 //! ## Files in an object store
 //!

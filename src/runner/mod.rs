@@ -26,6 +26,7 @@ mod folder_check;
 mod free_memory;
 mod input_changes;
 mod input_reads;
+mod liveness;
 mod memory_budget;
 mod options;
 mod pair_context;

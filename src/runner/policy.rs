@@ -94,7 +94,7 @@ impl Timing {
     const DEFAULT: Self = Self {
         heartbeat_every: Duration::from_secs(10),
         lease: Duration::from_secs(50),
-        recover_every: Duration::from_secs(5),
+        recover_every: Duration::from_millis(2500),
         deadline_margin: Duration::from_mins(1),
     };
 

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use std::process::{Child, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -49,10 +49,14 @@ impl Fleet {
     }
 
     fn worker(&self) -> Child {
+        self.worker_with(&[TIME_SCALE])
+    }
+
+    fn worker_with(&self, variables: &[(&str, &str)]) -> Child {
         let mut command = binary();
         command
             .current_dir(self.path())
-            .env(TIME_SCALE.0, TIME_SCALE.1);
+            .envs(variables.iter().copied());
         command.args(["-C", "shared", "--catalog", self.server.url()]);
         let command = command.args(["worker", "-j", "1"]);
         let worker = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
@@ -156,6 +160,36 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
     for mut worker in workers {
         assert!(worker.wait().expect("an exit code").success());
     }
+    fleet.assert_same();
+    fleet.assert_no_pair_is_left_or_quarantined();
+}
+
+/// The connection of a killed process is gone at once, so others need not wait for the end of its leases.
+#[test]
+fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
+    /// Leases last 50 seconds after the last heartbeat, which is at most 10 seconds old.
+    const END_OF_LEASES: Duration = Duration::from_secs(40);
+    let Some(fleet) = Fleet::new("8") else { return };
+    fleet.shared(&["plan"]).expect(0);
+    let held = fleet.path().join("held");
+    let file = held.to_str().expect("UTF-8");
+    let hold = [
+        ("MOCBAN_HOLD_AT", "fit:computed"),
+        ("MOCBAN_HOLD_FILE", file),
+    ];
+    let mut victim = fleet.worker_with(&hold);
+    while !held.exists() {
+        assert!(victim.try_wait().expect("a state").is_none(), "it ended");
+    }
+    let mut other = fleet.worker_with(&[]);
+    while fleet.shared(&["status", "--json"]).expect(0).json()["jobs"]["done"] == 0 {
+        assert!(other.try_wait().expect("a state").is_none(), "it ended");
+    }
+    victim.kill().expect("killed");
+    victim.wait().expect("an exit code");
+    let killed = Instant::now();
+    assert!(other.wait().expect("an exit code").success());
+    assert!(killed.elapsed() < END_OF_LEASES, "{:?}", killed.elapsed());
     fleet.assert_same();
     fleet.assert_no_pair_is_left_or_quarantined();
 }

@@ -10,8 +10,9 @@ use crate::catalog::db::error::CatalogError;
 
 /// First wait before another attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
-/// Longest wait. A random factor spreads the attempts of many processes.
-const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// Longest wait. A random factor of at most 1.5 spreads the attempts of many processes. A worker that waits must not be
+/// taken for dead: see `runner/liveness.rs`.
+const LONGEST_WAIT: Duration = Duration::from_secs(3);
 
 /// Whether this process retries while its database server is unavailable.
 #[derive(Debug, Default)]

@@ -18,6 +18,8 @@ use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::db::query::query;
 use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::queue::claim_start::ClaimStart;
+use crate::catalog::queue::worker_lock::WorkerLock;
+use crate::domain::WorkerId;
 
 /// Begins a transaction.
 pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
@@ -51,6 +53,7 @@ pub(crate) struct CatalogServerState {
     pub(crate) claim_start: ClaimStart,
     /// Whether the counters of all earlier slots were added up over this connection.
     pub(crate) has_folded_all: bool,
+    pub(crate) worker_lock: WorkerLock,
 }
 
 impl WriteConnection {
@@ -116,6 +119,11 @@ impl WriteConnection {
                     self.is_broken = false;
                     server.state.leases.replies_may_be_lost();
                     server.state.has_folded_all = false;
+                    server.state.worker_lock.session_ended();
+                    if let Err(error) = server.state.worker_lock.take(&mut self.conn).await {
+                        // A broken connection shows at the next statement.
+                        tracing::debug!(%error, "the worker's lock is taken later");
+                    }
                     tracing::info!("connected to the database server again");
                     return true;
                 }
@@ -128,6 +136,29 @@ impl WriteConnection {
                     tracing::warn!(%error, "cannot connect to the database server again");
                     return false;
                 }
+            }
+        }
+    }
+
+    /// Keeps the lock of a worker, over a new connection if the server was unavailable.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub(crate) async fn keep_worker_lock(&mut self, worker: WorkerId) -> Result<()> {
+        self.reconnect_if_broken().await;
+        loop {
+            let Some(server) = &mut self.server else {
+                return Ok(());
+            };
+            server.state.worker_lock.set_worker(worker);
+            match server.state.worker_lock.take(&mut self.conn).await {
+                Err(error) if error.is_unavailable() => {
+                    self.is_broken = true;
+                    if !self.reconnect().await {
+                        return Err(error);
+                    }
+                }
+                outcome => return outcome,
             }
         }
     }

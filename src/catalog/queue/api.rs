@@ -28,6 +28,25 @@ impl Catalog {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
+    /// Keeps the lock of this process's worker on a server, also over a new connection if the old one is broken. Must be
+    /// called every few seconds. Does nothing if the catalog is a file.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn keep_worker_lock(&self, worker: WorkerId) -> Result<()> {
+        if !self.is_shared() {
+            return Ok(());
+        }
+        self.reply_to(|reply| {
+            Message::Transaction(Box::new(move |writer| {
+                Box::pin(async move {
+                    let _ = reply.send(writer.keep_worker_lock(worker).await);
+                })
+            }))
+        })
+        .await
+    }
+
     /// Stores a worker's heartbeat, and its metrics if given. Returns `false`, and stores nothing, if the worker has ended
     /// or its previous heartbeat is older than `alive_since`. In that case the worker's leases are void, and it must
     /// register again.

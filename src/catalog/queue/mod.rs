@@ -20,4 +20,5 @@ pub(crate) mod server_claim;
 pub(crate) mod shared_runs;
 pub(crate) mod staleness;
 pub(crate) mod worker_list;
+pub(crate) mod worker_lock;
 pub(crate) mod workers;

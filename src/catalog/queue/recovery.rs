@@ -13,6 +13,7 @@ use crate::catalog::db::script::Script;
 use crate::catalog::queue::checkpoint::{UPDATE_INPUTS, input_item};
 use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::queue::lease::InputVersions;
+use crate::catalog::queue::worker_lock;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
@@ -24,9 +25,11 @@ pub struct LeaseHolder {
     /// Last heartbeat of the worker, by its own clock. Compare it only with other heartbeats of the same worker,
     /// because clocks may differ.
     pub heartbeat: UnixMillis,
+    /// Whether the worker is connected to the server. Always true if the catalog is a file.
+    pub is_connected: bool,
 }
 
-from_row! { LeaseHolder { worker: "id", heartbeat } }
+from_row! { LeaseHolder { worker: "id", heartbeat, is_connected } }
 
 /// The result of a recovery.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -49,7 +52,7 @@ pub enum DeadWorker {
 }
 
 pub(crate) const HOLDERS: &str = "
-SELECT w.id, w.heartbeat FROM worker AS w
+SELECT w.id, w.heartbeat, 1 AS is_connected FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1 UNION ALL SELECT worker FROM block_job WHERE status = 1)
 ORDER BY w.id";
 
@@ -132,7 +135,15 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
-        query_as(HOLDERS).fetch_all(&mut conn).await
+        let mut holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(&mut conn).await?;
+        if self.is_shared() && !holders.is_empty() {
+            let workers = holders.iter().map(|holder| holder.worker);
+            let connected = worker_lock::connected(&mut conn, workers).await?;
+            for holder in &mut holders {
+                holder.is_connected = connected.contains(&holder.worker);
+            }
+        }
+        Ok(holders)
     }
 
     /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused

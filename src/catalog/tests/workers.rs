@@ -2,6 +2,7 @@
 
 use super::{World, register};
 use crate::catalog::db::conn::Conn;
+use crate::catalog::db::query::query_scalar;
 use crate::catalog::{WorkerRecord, WorkerState};
 use crate::domain::{ComputeTimes, Stage, WorkerId, WorkerMetrics};
 
@@ -132,4 +133,45 @@ async fn heartbeats_add_up_the_counters_of_earlier_slots() {
     assert_eq!(rows(LEFT).await, 0);
     let recount = world.catalog.recount().await.expect("a recount");
     assert_eq!(world.catalog.counters().await.expect("counters"), recount);
+}
+
+/// A server releases the lock when the connection is gone, and a new connection takes it again.
+#[tokio::test]
+async fn others_see_whether_a_worker_is_connected() {
+    let world = World::new(1).await;
+    let me = world.worker;
+    world.claim(1).await;
+    let other = world.place.open().await.expect("another process");
+    let is_connected = async || {
+        let holders = other.lease_holders().await.expect("a read");
+        assert_eq!(holders.len(), 1);
+        holders[0].is_connected
+    };
+    assert_eq!(is_connected().await, !other.is_shared());
+    // The second call finds the lock held.
+    for _ in 0..2 {
+        world.catalog.keep_worker_lock(me).await.expect("the lock");
+        assert!(is_connected().await);
+    }
+    // Nobody takes the lock of another connection.
+    other.keep_worker_lock(me).await.expect("an answer");
+    if other.is_shared() {
+        let mut conn = other.read_conn().await.expect("a connection");
+        let end = "SELECT count(pg_terminate_backend(pid)) FROM pg_locks
+            WHERE locktype = 'advisory' AND objsubid = 2 AND database = (SELECT oid FROM pg_database WHERE datname = current_database())
+                AND classid = CAST(hashtext(current_setting('search_path')) AS oid)";
+        let ended: i64 = query_scalar(end).fetch_one(&mut conn).await.expect("ended");
+        assert_eq!(ended, 1);
+        drop(conn);
+        while is_connected().await {
+            tokio::task::yield_now().await;
+        }
+        world
+            .catalog
+            .keep_worker_lock(me)
+            .await
+            .expect("a new connection");
+        assert!(is_connected().await);
+    }
+    other.close().await;
 }

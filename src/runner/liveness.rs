@@ -1,0 +1,162 @@
+//! Finds dead workers by their heartbeats and connections.
+
+use std::collections::BTreeMap;
+
+use crate::catalog::LeaseHolder;
+use crate::domain::{UnixMillis, WorkerId};
+
+/// Time without a connection and without a new heartbeat after which a worker that was connected is dead, in
+/// milliseconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then tries to connect at least every 4.5 s.
+const UNCONNECTED_MS: i64 = 7_000;
+
+/// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this
+/// process, or for a shorter time if it has no connection to the server either. Only times during which this process
+/// could read the catalog count. The clocks of two machines are never compared.
+#[derive(Debug)]
+pub(super) struct Liveness {
+    lease_ms: i64,
+    seen: BTreeMap<WorkerId, SeenWorker>,
+    /// Time of the last call of [`Self::observe`].
+    observed: UnixMillis,
+}
+
+/// What was seen of a worker.
+#[derive(Debug)]
+struct SeenWorker {
+    heartbeat: UnixMillis,
+    /// When the heartbeat was first seen.
+    since: UnixMillis,
+    /// Whether it was seen with a connection.
+    was_connected: bool,
+    /// Since when it has no connection.
+    unconnected_since: Option<UnixMillis>,
+}
+
+impl Liveness {
+    /// Starts without knowledge of other workers.
+    pub(super) const fn new(lease_ms: i64) -> Self {
+        Self {
+            lease_ms,
+            seen: BTreeMap::new(),
+            observed: 0,
+        }
+    }
+
+    /// Records the current heartbeats and connections of all workers with leases. Returns the workers that are dead. Must
+    /// be called every few seconds.
+    pub(super) fn observe(
+        &mut self,
+        holders: &[LeaseHolder],
+        me: WorkerId,
+        now: UnixMillis,
+    ) -> Vec<WorkerId> {
+        let gap = now - self.observed;
+        self.observed = now;
+        if gap > self.lease_ms / 2 {
+            // This process was away from the catalog, or suspended, and perhaps the others were too.
+            self.seen.clear();
+        }
+        self.seen
+            .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));
+        let others = holders.iter().filter(|holder| holder.worker != me);
+        let dead = others.filter(|holder| {
+            let seen = self.seen.entry(holder.worker).or_insert(SeenWorker {
+                heartbeat: holder.heartbeat,
+                since: now,
+                was_connected: false,
+                unconnected_since: None,
+            });
+            seen.was_connected |= holder.is_connected;
+            if gap > UNCONNECTED_MS || holder.is_connected {
+                seen.unconnected_since = None;
+            }
+            if seen.heartbeat != holder.heartbeat {
+                (seen.heartbeat, seen.since) = (holder.heartbeat, now);
+                seen.unconnected_since = None;
+            }
+            if seen.was_connected && !holder.is_connected {
+                seen.unconnected_since.get_or_insert(now);
+            }
+            let unconnected = seen.unconnected_since.map_or(0, |since| now - since);
+            now - seen.since >= self.lease_ms || unconnected >= UNCONNECTED_MS
+        });
+        dead.map(|holder| holder.worker).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Liveness;
+    use crate::catalog::LeaseHolder;
+    use crate::domain::WorkerId;
+
+    const ME: WorkerId = WorkerId(1);
+    const OTHER: WorkerId = WorkerId(2);
+
+    fn holders(heartbeat: i64, is_connected: bool) -> [LeaseHolder; 2] {
+        [ME, OTHER].map(|worker| LeaseHolder {
+            worker,
+            heartbeat: if worker == ME { 0 } else { heartbeat },
+            is_connected,
+        })
+    }
+
+    /// Observes at the given times. Returns the time at which the other worker is dead.
+    fn dead_at(
+        liveness: &mut Liveness,
+        times: impl IntoIterator<Item = i64>,
+        heartbeat: i64,
+        is_connected: bool,
+    ) -> Option<i64> {
+        let holders = holders(heartbeat, is_connected);
+        times.into_iter().find(|now| {
+            let dead = liveness.observe(&holders, ME, *now);
+            assert!(dead.is_empty() || dead == [OTHER], "{dead:?}");
+            !dead.is_empty()
+        })
+    }
+
+    #[test]
+    fn a_worker_is_dead_after_a_lease_without_a_new_heartbeat() {
+        let mut liveness = Liveness::new(60_000);
+        let every = |from: i64, until: i64| (from..=until).step_by(2_500);
+        assert_eq!(dead_at(&mut liveness, every(0, 50_000), 5, true), None);
+        let found = dead_at(&mut liveness, every(52_500, 200_000), 6, true);
+        assert_eq!(found, Some(112_500));
+    }
+
+    #[test]
+    fn after_a_gap_the_others_are_watched_anew() {
+        let mut liveness = Liveness::new(60_000);
+        let times = [0, 5_000, 205_000, 235_000, 264_999];
+        assert_eq!(dead_at(&mut liveness, times, 5, true), None);
+        assert_eq!(dead_at(&mut liveness, [265_000], 5, true), Some(265_000));
+    }
+
+    #[test]
+    fn a_worker_without_a_connection_is_dead_after_seconds() {
+        let mut liveness = Liveness::new(60_000);
+        assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
+        let times = [2_500, 5_000, 9_499, 9_500];
+        assert_eq!(dead_at(&mut liveness, times, 5, false), Some(9_500));
+        // A worker that was never seen with a connection may be of an earlier version.
+        let mut liveness = Liveness::new(60_000);
+        let times = (0..60_000).step_by(2_500);
+        assert_eq!(dead_at(&mut liveness, times, 5, false), None);
+    }
+
+    #[test]
+    fn a_worker_that_connects_again_or_sends_a_heartbeat_lives() {
+        let mut liveness = Liveness::new(60_000);
+        assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
+        assert_eq!(
+            dead_at(&mut liveness, [1_000, 5_000, 7_000], 5, false),
+            None
+        );
+        assert_eq!(dead_at(&mut liveness, [7_500], 5, true), None);
+        assert_eq!(dead_at(&mut liveness, [10_000, 15_000], 5, false), None);
+        assert_eq!(dead_at(&mut liveness, [17_500, 22_500], 6, false), None);
+        // This process was away: the server may have been away for the others too.
+        assert_eq!(dead_at(&mut liveness, [35_000, 40_000], 6, false), None);
+    }
+}
