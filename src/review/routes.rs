@@ -23,7 +23,7 @@ use super::review_queue::QueueError;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
-use crate::catalog::{CatalogError, ManualAlignment};
+use crate::catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
 use crate::domain::{PairName, ReviewOrder, one_line};
 use crate::local_server::{START, guard};
 use crate::report::pair_artifacts::PairArtifactsError;
@@ -91,13 +91,25 @@ impl ApiError {
     }
 }
 
+impl ApiError {
+    /// Returns the message for the page, which shows it and sends the request again.
+    fn text(&self) -> String {
+        match self {
+            Self::Catalog(error) if error.kind() == Some(CatalogErrorKind::Full) => {
+                "the disk with the catalog is full; free some space there".to_owned()
+            }
+            error => error.to_string(),
+        }
+    }
+}
+
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let status = self.status();
         if status.is_server_error() {
             tracing::warn!(error = %self, "a request of the review page failed");
         }
-        (status, Json(json!({ "error": self.to_string() }))).into_response()
+        (status, Json(json!({ "error": self.text() }))).into_response()
     }
 }
 
