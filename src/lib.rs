@@ -107,7 +107,7 @@
 //! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`). If an earlier
 //! attempt was stored but its reply was lost, the fencing token and the position of the job show it; leases whose claim had
 //! no reply are searched for too (`db/known_leases.rs`). The write connection of each worker holds a lock
-//! (`queue/worker_lock.rs`): if it is free for some seconds, the worker is dead (`runner/liveness.rs`).
+//! (`queue/worker_lock.rs`): if it was held and is free for some seconds, the worker is dead (`runner/liveness.rs`).
 //! `Catalog::retry_while_unavailable` repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with
 //! other settings.
 //!
@@ -124,9 +124,10 @@
 //!
 //! ## A lost lease
 //!
-//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or if another process of the
-//! same run recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline (both
-//! in `src/runner/worker_session.rs`; the times are in `Timing` in `src/runner/policy.rs`). The start of a run
+//! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or, in PostgreSQL, if it is without
+//! a connection and a heartbeat for seven seconds (`src/runner/liveness.rs`); or if another process of the same run
+//! recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline
+//! (`src/runner/worker_session.rs`; the times are in `Timing` in `src/runner/policy.rs`). The start of a run
 //! (`src/runner/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
 //! workers are then dead. A repair (`src/cli/check.rs`, `src/check/mod.rs`) must hold the same lock. It resets only the
 //! jobs of damaged pairs, which ends their leases. After a refused heartbeat, a process recovers the jobs of its own

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::Serialize;
 use serde_json::json;
@@ -22,6 +22,9 @@ use crate::store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, Storage
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
+
+/// Longest time for looking at the roots of inputs before a run.
+const ROOT_CHECK: Duration = Duration::from_secs(5);
 
 /// The global flags and the state derived from them.
 #[derive(Debug, Clone)]
@@ -166,7 +169,8 @@ impl Context {
         Ok((project.with_storage(storage), url))
     }
 
-    /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer.
+    /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer. Warns
+    /// about roots of inputs that are not there.
     pub(super) async fn open_for_run(&self) -> anyhow::Result<(Project, Catalog)> {
         let (project, catalog) = self.open().await?;
         if project.storage().is_none() {
@@ -177,6 +181,17 @@ impl Context {
         if let Err(error) = tokio::task::spawn_blocking(check).await? {
             catalog.close().await;
             return Err(error.into());
+        }
+        let checked = project.clone();
+        let find = move || {
+            checked
+                .storage()
+                .map_or_else(Vec::new, ProjectStorage::unusable_roots)
+        };
+        // The run needs a root only if one of its pairs does. A disk may hang.
+        let found = tokio::time::timeout(ROOT_CHECK, tokio::task::spawn_blocking(find)).await;
+        for root in found.into_iter().flatten().flatten() {
+            self.warn(&root.to_string());
         }
         Ok((project, catalog))
     }

@@ -67,6 +67,10 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();
     let mut problems = ManifestError::default();
+    if std::str::from_utf8(bytes).is_err() {
+        let hint = encoding_hint(bytes);
+        problems.add(of_list(&format!("the list is not UTF-8{hint}")));
+    }
     let mut header: Option<Vec<&'static str>> = None;
     let (mut rows, mut seen) = (Vec::new(), BTreeMap::new());
     loop {
@@ -98,10 +102,6 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
             rows.push(row);
         }
         problems.extend(reasons.iter().map(|reason| at_line(line, reason)));
-    }
-    if std::str::from_utf8(bytes).is_err() {
-        let hint = encoding_hint(bytes);
-        problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
     if problems == ManifestError::default() && rows.is_empty() {
         return Err(of_list("the list contains no blocks").into());

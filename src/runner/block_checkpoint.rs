@@ -166,7 +166,9 @@ pub(super) async fn store_failure(
     let attributes = &block.work.attributes;
     let paths = [&attributes.mesh_path, &attributes.page_path];
     if let Err(error) = check_folders(context, paths.map(String::clone)).await {
-        context.catalog.release_block(block.lease).await?;
+        if let Err(error) = context.catalog.release_block(block.lease).await {
+            tracing::warn!(%error, "the block could not be given back");
+        }
         return Err(error);
     }
     let (failure, is_transient) = as_failure(error);

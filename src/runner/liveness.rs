@@ -6,8 +6,11 @@ use crate::catalog::LeaseHolder;
 use crate::domain::{UnixMillis, WorkerId};
 
 /// Time without a connection and without a new heartbeat after which a worker that was connected is dead, in
-/// milliseconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then tries to connect at least every 4.5 s.
+/// milliseconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then usually
+/// connects again at once.
 const UNCONNECTED_MS: i64 = 7_000;
+/// Longest time between two observations, in milliseconds, that is no sign of an outage of the server.
+const USUAL_GAP_MS: i64 = 5_000;
 
 /// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this
 /// process, or for a shorter time if it has no connection to the server either. Only times during which this process
@@ -52,7 +55,13 @@ impl Liveness {
     ) -> Vec<WorkerId> {
         let gap = now - self.observed;
         self.observed = now;
-        if gap > self.lease_ms / 2 {
+        if gap > USUAL_GAP_MS {
+            // The others may need longer to connect again, so only their heartbeats count until they have.
+            for seen in self.seen.values_mut() {
+                (seen.was_connected, seen.unconnected_since) = (false, None);
+            }
+        }
+        if gap > USUAL_GAP_MS.max(self.lease_ms / 2) {
             // This process was away from the catalog, or suspended, and perhaps the others were too.
             self.seen.clear();
         }
@@ -67,7 +76,7 @@ impl Liveness {
                 unconnected_since: None,
             });
             seen.was_connected |= holder.is_connected;
-            if gap > UNCONNECTED_MS || holder.is_connected {
+            if holder.is_connected {
                 seen.unconnected_since = None;
             }
             if seen.heartbeat != holder.heartbeat {
@@ -156,7 +165,16 @@ mod tests {
         assert_eq!(dead_at(&mut liveness, [7_500], 5, true), None);
         assert_eq!(dead_at(&mut liveness, [10_000, 15_000], 5, false), None);
         assert_eq!(dead_at(&mut liveness, [17_500, 22_500], 6, false), None);
-        // This process was away: the server may have been away for the others too.
-        assert_eq!(dead_at(&mut liveness, [35_000, 40_000], 6, false), None);
+    }
+
+    #[test]
+    fn after_an_outage_only_workers_that_connected_again_are_dead_without_a_connection() {
+        let mut liveness = Liveness::new(60_000);
+        assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
+        let times = [12_000, 17_000, 22_000, 27_000];
+        assert_eq!(dead_at(&mut liveness, times, 5, false), None);
+        assert_eq!(dead_at(&mut liveness, [29_500], 5, true), None);
+        let times = [32_000, 37_000, 39_000];
+        assert_eq!(dead_at(&mut liveness, times, 5, false), Some(39_000));
     }
 }

@@ -171,7 +171,9 @@ async fn store_failure(
 ) -> Result<PairEnd, RunError> {
     let paths = [&pair.attributes.mesh_path, &pair.attributes.print_path];
     if let Err(error) = check_folders(context, paths.map(String::clone)).await {
-        context.catalog.release(lease).await?;
+        if let Err(error) = context.catalog.release(lease).await {
+            tracing::warn!(%error, "the pair could not be given back");
+        }
         return Err(error);
     }
     let inputs = match failed.inputs {

@@ -16,6 +16,8 @@ pub(super) struct WorkerSession {
     worker: WorkerId,
     /// When the last heartbeat was stored, by the run's clock.
     last_heartbeat: UnixMillis,
+    /// When overdue leases were last searched for.
+    overdue_checked: UnixMillis,
     liveness: Liveness,
 }
 
@@ -36,6 +38,7 @@ impl WorkerSession {
         Self {
             worker,
             last_heartbeat: now,
+            overdue_checked: 0,
             liveness: Liveness::new(lease_ms),
         }
     }
@@ -98,9 +101,10 @@ impl WorkerSession {
     /// many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, me) = (&context.catalog, self.worker);
-        catalog
-            .retry_while_unavailable(async || catalog.keep_worker_lock(me).await)
-            .await?;
+        if let Err(error) = catalog.keep_worker_lock(me).await {
+            // The lock is only a hint for others. Whether the run can go on is decided by the heartbeat.
+            tracing::debug!(%error, "the worker's lock is not held");
+        }
         let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
         let holders = holders.await?;
         // The time after the reply, which may have been waited for.
@@ -115,7 +119,10 @@ impl WorkerSession {
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
         }
-        if holders.iter().any(|holder| holder.worker != me) {
+        let is_due =
+            now - self.overdue_checked >= context.timing.heartbeat_every.as_millis() as i64;
+        if is_due && holders.iter().any(|holder| holder.worker != me) {
+            self.overdue_checked = now;
             let margin = context.timing.deadline_margin.as_millis() as i64;
             let overdue = catalog
                 .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await);

@@ -169,7 +169,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
 fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
     /// Leases last 50 seconds after the last heartbeat, which is at most 10 seconds old.
     const END_OF_LEASES: Duration = Duration::from_secs(40);
-    let Some(fleet) = Fleet::new("8") else { return };
+    let Some(fleet) = Fleet::new("4") else { return };
     fleet.shared(&["plan"]).expect(0);
     let held = fleet.path().join("held");
     let file = held.to_str().expect("UTF-8");

@@ -107,9 +107,10 @@ WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.worker = CAST(item.val
 RETURNING job.pair, job.token",
 );
 
-/// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead.
+/// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead. A
+/// worker that others took for dead is then known to live.
 pub(crate) const HEARTBEAT: &str = "
-UPDATE worker SET heartbeat = ?, metrics = coalesce(?, metrics)
+UPDATE worker SET heartbeat = ?, died = 0, metrics = coalesce(?, metrics)
 WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
 /// Adds a heartbeat to a script. The statement returns the worker's id, or nothing if the heartbeat is refused.

@@ -192,6 +192,15 @@ impl ProjectStorage {
         Ok(())
     }
 
+    /// Returns an error for each local folder of a root that is missing, empty or unreadable. May block.
+    pub fn unusable_roots(&self) -> Vec<StorageError> {
+        let folders = self.roots.iter().filter_map(|(name, root)| match root {
+            Root::Folder(folder) => check_folder(name, folder).err(),
+            Root::Bucket(_) => None,
+        });
+        folders.collect()
+    }
+
     /// Checks that the folder of the root that a stored path begins with can be read and is not empty. May block.
     ///
     /// # Errors
