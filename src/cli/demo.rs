@@ -149,7 +149,7 @@ async fn align(
     let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
-    context.info(&format!("all results in one image, worst first: {picture}"));
+    context.info(&format!("results in one image, worst first: {picture}"));
     context.next("review --reviewer me");
     context.next("report");
     context.next("export -o export");

@@ -111,10 +111,15 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         queue: queue_options(&args),
     };
     let page = review::bind(catalog.clone(), project, options).await?;
-    if args.adjudicate && page.counts().items == 0 {
+    if page.counts().items == 0 {
         drop(page);
         catalog.close().await;
-        return no_conflict(&args, context);
+        if args.adjudicate {
+            return no_conflict(&args, context);
+        }
+        let command = context.command("run");
+        let text = format!("there is no result to judge yet; first: {command}");
+        return Err(Refusal::NothingSelected(text).into());
     }
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;

@@ -3,7 +3,12 @@
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
 /// missing or swapped with the next, in longer names two.
 pub(super) fn similar_column(found: &str, name: &str) -> bool {
-    let max_wrong = if name.len() <= 5 { 1 } else { 2 };
+    let max_wrong = match name.len() {
+        // Any word of two letters, such as the Vietnamese `in` (print), is similar to `id`.
+        ..=2 if found.len() <= 2 => 0,
+        ..=5 => 1,
+        _ => 2,
+    };
     matches!((found, name), ("char", "character") | ("blk", "block"))
         || strsim::osa_distance(found, name) <= max_wrong
 }

@@ -352,5 +352,10 @@ mod tests {
             "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
              mech, print"
         );
+        // Two letters are similar to too many words: `in` is Vietnamese for print.
+        assert_eq!(
+            refusal("tên,mesh,in\na,b,c\n").lines().next(),
+            Some("line 1: column \"id\" is missing; the header has: tên, mesh, in")
+        );
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use unicode_normalization::UnicodeNormalization as _;
 
-use super::error::{ManifestError, at_file};
+use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
 use crate::domain::PairName;
 
@@ -66,7 +66,16 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
             Err(error) => problems.add(at_file(&mesh, &error.to_string())),
         }
     }
-    problems.check(rows.is_empty())?;
+    if rows.is_empty() {
+        let is_swapped = ignored.iter().any(|path| is_named_like_print(path))
+            && ignored.iter().any(|path| is_named_like_mesh(path));
+        problems.add(of_list(if is_swapped {
+            "--meshes holds images and --prints holds meshes; swap the two"
+        } else {
+            "no mesh has the same file name as a print"
+        }));
+    }
+    problems.check(false)?;
     Ok(FolderPairs {
         rows,
         meshes_alone,
@@ -210,7 +219,7 @@ mod tests {
         let none = pair_folders(&files(&["a.stl"]), &files(&["b.png"]));
         assert_eq!(
             none.expect_err("no pair").to_string(),
-            "the list contains no pairs"
+            "no mesh has the same file name as a print"
         );
     }
 }

@@ -203,6 +203,9 @@ fn import_of_directories() {
     let import = ["-C", "dự án", "import"];
     let args = [&import[..], &folders].concat();
     assert_call("import_directories", dir.path(), &args);
+    let swapped = ["--meshes", "bản in", "--prints", "bản khắc"];
+    let args_swapped = [&import[..], &swapped].concat();
+    assert_call("error_swapped_directories", dir.path(), &args_swapped);
     write(dir.path(), "bản khắc/1.ply", "x");
     assert_call("error_same_stem", dir.path(), &args);
 }
@@ -239,6 +242,10 @@ fn pairs_that_wait_and_pairs_that_failed() {
     at("verdict_log_empty", &["verdict", "log"]);
     at("error_nothing_to_undo", &["verdict", "undo"]);
     at("error_nothing_to_draw", &["contact-sheet"]);
+    at(
+        "error_nothing_to_review",
+        &["review", "--reviewer", "lan", "--no-open"],
+    );
     at("run_failed", &["--progress", "none", "run", "-j", "1"]);
     at("status_failed", &["status"]);
     at("status_failed_json", &["status", "--failed", "--json"]);
