@@ -51,8 +51,6 @@ pub struct DatasetFiles {
     pub truth: PathBuf,
     /// Number of pairs.
     pub pairs: u64,
-    /// Whether nothing was written because a complete dataset with the same options existed.
-    pub already_existed: bool,
 }
 
 /// A failure to write the dataset.
@@ -121,7 +119,7 @@ pub fn write_dataset(
     write_all(dir, &stamp.options, is_stopped)?;
     let file = dir.join(STAMP_FILE);
     write(&file, &json_line(&file, &stamp)?)?;
-    Ok(DatasetFiles::of(dir, &stamp, false))
+    Ok(DatasetFiles::of(dir, &stamp))
 }
 
 /// Returns the dataset below `dir` if it is complete and has these options.
@@ -129,7 +127,7 @@ pub fn find_dataset(dir: &Path, options: &DemoOptions) -> Option<DatasetFiles> {
     let stamp = DatasetStamp::of(options);
     let bytes = fs::read(dir.join(STAMP_FILE)).ok()?;
     let found: DatasetStamp = serde_json::from_slice(&bytes).ok()?;
-    (found == stamp).then(|| DatasetFiles::of(dir, &stamp, true))
+    (found == stamp).then(|| DatasetFiles::of(dir, &stamp))
 }
 
 impl DatasetStamp {
@@ -143,12 +141,11 @@ impl DatasetStamp {
 }
 
 impl DatasetFiles {
-    fn of(dir: &Path, stamp: &DatasetStamp, already_existed: bool) -> Self {
+    fn of(dir: &Path, stamp: &DatasetStamp) -> Self {
         Self {
             manifest: dir.join("manifest.csv"),
             truth: dir.join("truth.jsonl"),
             pairs: stamp.options.pairs,
-            already_existed,
         }
     }
 }

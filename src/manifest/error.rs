@@ -13,7 +13,7 @@ const MAX_SHOWN: usize = 20;
 
 /// Where a problem is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Place {
+enum ProblemPlace {
     /// A line, counted from 1.
     Line(usize),
     File(String),
@@ -24,14 +24,14 @@ enum Place {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Problem {
     /// The first places with this reason. Never empty.
-    places: Vec<Place>,
+    places: Vec<ProblemPlace>,
     /// Number of further places.
     more: usize,
     reason: String,
 }
 
 impl Problem {
-    fn new(place: Place, reason: &str) -> Self {
+    fn new(place: ProblemPlace, reason: &str) -> Self {
         Self {
             places: vec![place],
             more: 0,
@@ -54,15 +54,15 @@ impl Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = |place: &Place| match place {
-            Place::Line(line) => Some(line.to_string()),
-            Place::File(path) => Some(path.clone()),
-            Place::List => None,
+        let name = |place: &ProblemPlace| match place {
+            ProblemPlace::Line(line) => Some(line.to_string()),
+            ProblemPlace::File(path) => Some(path.clone()),
+            ProblemPlace::List => None,
         };
         let names: Vec<String> = self.places.iter().filter_map(name).collect();
         match (self.places.as_slice(), self.more) {
-            ([Place::Line(_)], 0) => f.write_str("line ")?,
-            ([Place::Line(_), ..], _) => f.write_str("lines ")?,
+            ([ProblemPlace::Line(_)], 0) => f.write_str("line ")?,
+            ([ProblemPlace::Line(_), ..], _) => f.write_str("lines ")?,
             _ => {}
         }
         f.write_str(&names.join(", "))?;
@@ -78,18 +78,18 @@ impl fmt::Display for Problem {
 
 /// Returns a problem of a line, counted from 1.
 pub(super) fn at_line(line: usize, reason: &str) -> Problem {
-    Problem::new(Place::Line(line), reason)
+    Problem::new(ProblemPlace::Line(line), reason)
 }
 
 /// Returns a problem of a file of a directory.
 pub(super) fn at_file(path: &Path, reason: &str) -> Problem {
     let path = sanitize(&path.to_string_lossy(), 4096);
-    Problem::new(Place::File(path), reason)
+    Problem::new(ProblemPlace::File(path), reason)
 }
 
 /// Returns a problem of the whole list.
 pub(super) fn of_list(reason: &str) -> Problem {
-    Problem::new(Place::List, reason)
+    Problem::new(ProblemPlace::List, reason)
 }
 
 /// The problems of a refused list. They are displayed one per line.

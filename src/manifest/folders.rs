@@ -66,16 +66,17 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
             Err(error) => problems.add(at_file(&mesh, &error.to_string())),
         }
     }
+    problems.check(false)?;
     if rows.is_empty() {
         let is_swapped = ignored.iter().any(|path| is_named_like_print(path))
             && ignored.iter().any(|path| is_named_like_mesh(path));
-        problems.add(of_list(if is_swapped {
+        let reason = if is_swapped {
             "--meshes holds images and --prints holds meshes; swap the two"
         } else {
             "no mesh has the same file name as a print"
-        }));
+        };
+        return Err(of_list(reason).into());
     }
-    problems.check(false)?;
     Ok(FolderPairs {
         rows,
         meshes_alone,
@@ -215,6 +216,13 @@ mod tests {
         assert_eq!(
             error.expect_err("a tab").to_string(),
             "x y.stl: id \"x y\" holds '\\t'; an id has no slashes, control or invisible characters"
+        );
+        // There is no pair either, but the reason is the id.
+        let only = pair_folders(&files(&["x\ty.stl"]), &files(&["x\ty.png"]));
+        let only = only.expect_err("a tab").to_string();
+        assert!(
+            only.starts_with("x y.stl: id ") && only.lines().count() == 1,
+            "{only}"
         );
         let none = pair_folders(&files(&["a.stl"]), &files(&["b.png"]));
         assert_eq!(

@@ -89,9 +89,7 @@ impl ApiError {
             }
         }
     }
-}
 
-impl ApiError {
     /// Returns the message for the page, which shows it and sends the request again.
     fn text(&self) -> String {
         match self {

@@ -97,8 +97,8 @@ impl WorkerSession {
         Ok(())
     }
 
-    /// Keeps the lock that shows that this process is connected. Recovers the leases of dead workers, and leases of other workers that are long past their deadline. Returns how
-    /// many pairs are ready again.
+    /// Keeps the lock that shows that this process is connected. Recovers the leases of dead workers, and leases of other
+    /// workers that are long past their deadline. Returns how many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, me) = (&context.catalog, self.worker);
         if let Err(error) = catalog.keep_worker_lock(me).await {

@@ -104,19 +104,13 @@ fn complete_dataset_is_kept_and_a_damaged_one_is_rewritten() {
         tier: Tier::Upright,
     };
     let (dir, found) = made(options.tier, options.pairs, options.seed);
-    assert!(
-        write_dataset(dir.path(), &options, &|| false)
-            .expect("found")
-            .already_existed
-    );
+    let stray = dir.path().join("meshes/stray.stl");
+    fs::write(&stray, "of a killed run").expect("a stray file");
+    write_dataset(dir.path(), &options, &|| false).expect("found");
+    assert!(stray.exists(), "a complete dataset was written again");
     fs::remove_file(dir.path().join("dataset.json")).expect("dataset.json exists");
     fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth file is writable");
-    fs::write(dir.path().join("meshes/stray.stl"), "of a killed run").expect("a stray file");
-    assert!(
-        !write_dataset(dir.path(), &options, &|| false)
-            .expect("made")
-            .already_existed
-    );
+    write_dataset(dir.path(), &options, &|| false).expect("made");
     assert!(files(dir.path()) == found, "the rewritten dataset differs");
 }
 
