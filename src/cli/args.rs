@@ -1,10 +1,13 @@
 //! The command line, parsed with clap: global flags and the list of commands.
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::builder::{Resettable, StyledStr};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
+use super::context::shell_quoted;
 use super::examples::{with_examples, without_global_options};
 use super::exit::ExitCode;
 use super::global::Global;
@@ -116,11 +119,39 @@ const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 /// Parses a command line.
 pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     let command = without_global_options(command().color(help_color(args)));
-    let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
+    let matches = command.try_get_matches_from(args).map_err(with_tip)?;
+    let mut cli = Cli::from_arg_matches(&matches)?;
     // If a flag is given before and after the command's name, clap keeps only the values after it.
     cli.global.set = values_of("--set", args);
     cli.global.verbose = count_verbose(args);
     Ok(cli)
+}
+
+/// Adds a tip to the error of a command line in which a project folder or a name with spaces is written wrongly.
+fn with_tip(mut error: clap::Error) -> clap::Error {
+    let word = |kind| match error.get(kind) {
+        Some(ContextValue::String(word)) => Some(word.clone()),
+        _ => None,
+    };
+    let tip = match error.kind() {
+        ErrorKind::InvalidSubcommand => word(ContextKind::InvalidSubcommand)
+            .filter(|word| Path::new(word).is_dir())
+            .map(|folder| {
+                let folder = shell_quoted(&folder);
+                format!("{folder} is a folder; name it with -C, as in: mocban -C {folder} status")
+            }),
+        ErrorKind::UnknownArgument => word(ContextKind::InvalidArg)
+            .filter(|word| !word.starts_with('-'))
+            .map(|_| "put a name or path with spaces in quotes, as in: \"block 4\"".to_owned()),
+        _ => None,
+    };
+    if let Some(tip) = tip {
+        error.insert(
+            ContextKind::Suggested,
+            ContextValue::StyledStrs(vec![tip.into()]),
+        );
+    }
+    error
 }
 
 /// Counts `-v`. Only for a command line that clap has accepted: in such a line, no value starts with a dash.
@@ -199,6 +230,18 @@ mod tests {
             help_color(&args("mocban -- --color never")),
             ColorChoice::Auto
         );
+    }
+
+    #[test]
+    fn wrong_command_lines_get_a_tip() {
+        let error = |text: &str| parse(&args(text)).expect_err(text).to_string();
+        let folder = error("mocban src status");
+        assert!(folder.contains("tip: src is a folder"), "{folder}");
+        assert!(folder.contains("mocban -C src status"), "{folder}");
+        let spaces = error("mocban verdict set block 4 pass --reviewer lan");
+        assert!(spaces.contains("spaces in quotes"), "{spaces}");
+        let plain = error("mocban report --fomat html");
+        assert!(plain.contains("'--format'"), "{plain}");
     }
 
     #[test]

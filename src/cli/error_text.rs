@@ -35,7 +35,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     if let Some(TargetLockError::InUse { .. }) = cause.downcast_ref() {
         return Some(ExitCode::InUse);
     }
-    if let Some(FolderError::NotAnExport(_)) = cause.downcast_ref() {
+    if let Some(FolderError::NotAnExport(_) | FolderError::IsFile(_)) = cause.downcast_ref() {
         return Some(ExitCode::Usage);
     }
     match cause.downcast_ref() {
@@ -48,7 +48,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     match cause.downcast_ref() {
         Some(StoreError::NoProject(_)) => return Some(ExitCode::NoProject),
-        Some(StoreError::NotUtf8(_)) => return Some(ExitCode::Usage),
+        Some(StoreError::NotAFolder(_) | StoreError::NotUtf8(_)) => return Some(ExitCode::Usage),
         Some(_) | None => {}
     }
     match cause.downcast_ref()? {
@@ -81,14 +81,30 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
         );
     }
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
-    explained.unwrap_or_else(|| {
+    let text = explained.unwrap_or_else(|| {
         let mut text = join_causes(error);
         if is_disk_full(error) {
             text += "; ";
             text += FREE_SPACE;
         }
         text
-    })
+    });
+    without_error_numbers(&text)
+}
+
+/// Removes the numbers that the standard library adds to the system's messages, such as `(os error 2)`.
+fn without_error_numbers(text: &str) -> String {
+    const START: &str = " (os error ";
+    let mut parts = text.split(START);
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let rest = part.trim_start_matches(|c: char| c.is_ascii_digit());
+        match rest.strip_prefix(')') {
+            Some(rest) if rest.len() + 1 < part.len() => plain += rest,
+            _ => plain.extend([START, part]),
+        }
+    }
+    plain
 }
 
 /// What to do when a disk is full.
@@ -271,6 +287,7 @@ fn root_cause(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
+    use super::without_error_numbers;
     use super::{ExitCode, Refusal};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
     use crate::catalog::{CatalogError, LockOwner};
@@ -282,6 +299,23 @@ mod tests {
             anyhow::Error::new(Refusal::NothingSelected("no pair".to_owned())).context("run");
         assert_eq!(exit_code(&error), ExitCode::NothingSelected);
         assert_eq!(join_causes(&error), "run: no pair");
+    }
+
+    #[test]
+    fn numbers_of_system_errors_are_not_shown() {
+        for (text, plain) in [
+            (
+                "a: No such file (os error 2); b (os error 13)",
+                "a: No such file; b",
+            ),
+            (
+                "a (os error ) and b (os error x",
+                "a (os error ) and b (os error x",
+            ),
+            ("a", "a"),
+        ] {
+            assert_eq!(without_error_numbers(text), plain);
+        }
     }
 
     #[test]

@@ -56,8 +56,24 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Refuses to write over a catalog, a backup, or another file by which a project works.
+/// Refuses to write into a folder that does not exist.
+pub(super) fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| matches!(metadata(folder), Ok(None))) {
+        None => Ok(()),
+        Some(folder) => Err(Refusal::Usage(format!(
+            "{} cannot be written, because there is no folder {}; create it first",
+            path.display(),
+            folder.display()
+        ))),
+    }
+}
+
+/// Refuses to write over a catalog, a backup, or another file by which a project works, or into a missing folder.
 pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
+    refuse_missing_folder(path)?;
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = real.file_name().unwrap_or_default().to_string_lossy();
     let is_known = name.starts_with(CATALOG_FILE)

@@ -33,8 +33,14 @@ const CHUNK_BYTES: usize = 2 << 20;
 /// End of the message when the file of true alignments is refused.
 const NOT_IMPORTED: &str = "nothing was imported";
 
+/// The three ways to name what is imported.
+const USAGE: &str = "mocban import [OPTIONS] FILE
+       mocban import [OPTIONS] --meshes DIR --prints DIR
+       mocban import [OPTIONS] --block MESH --page IMAGE";
+
 /// Arguments of `import`.
 #[derive(Debug, Default, Args)]
+#[command(override_usage = USAGE)]
 pub(super) struct ImportArgs {
     /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
     /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 use super::files;
 use super::input_paths::find_on_disk;
+use super::missing_files::WINDOWS_HINT;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
@@ -210,10 +211,7 @@ pub(super) fn locate_file(
     };
     let problem = match exists {
         Ok(true) => return None,
-        Ok(false) if is_windows_path(path) => {
-            "does not exist; it is a path of a Windows computer: write paths relative to the list"
-                .to_owned()
-        }
+        Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
         Ok(false) => "does not exist".to_owned(),
         Err(error) => format!("cannot be read: {error}"),
     };

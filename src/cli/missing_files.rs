@@ -5,6 +5,10 @@ use super::exit::Refusal;
 /// Maximum number of missing files that `--json` lists.
 const MAX_MISSING: usize = 1000;
 
+/// Ends the message of a missing file whose path is one of Windows.
+pub(super) const WINDOWS_HINT: &str =
+    "; it is a path of a Windows computer: write paths relative to the list";
+
 /// Files of a list that do not exist.
 #[derive(Debug, Default)]
 pub(super) struct MissingFiles {
@@ -15,9 +19,15 @@ pub(super) struct MissingFiles {
 }
 
 impl MissingFiles {
-    /// Adds the message of a file.
-    pub(super) fn add(&mut self, line: String) {
+    /// Adds the message of a file. Only the first hint on paths of Windows is kept.
+    pub(super) fn add(&mut self, mut line: String) {
         self.count += 1;
+        if let Some(end) = line.len().checked_sub(WINDOWS_HINT.len())
+            && line.ends_with(WINDOWS_HINT)
+            && self.lines.iter().any(|line| line.ends_with(WINDOWS_HINT))
+        {
+            line.truncate(end);
+        }
         if self.lines.len() < MAX_MISSING {
             self.lines.push(line);
         }
@@ -40,5 +50,25 @@ impl MissingFiles {
             },
             shown.join("\n  "),
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MissingFiles, WINDOWS_HINT};
+
+    #[test]
+    fn the_hint_on_windows_paths_is_given_once() {
+        let mut missing = MissingFiles::default();
+        for line in [
+            "line 2: C:\\1.stl does not exist",
+            "line 3: C:\\2.stl does not exist",
+        ] {
+            missing.add(format!("{line}{WINDOWS_HINT}"));
+        }
+        missing.add("line 4: 3.stl does not exist".to_owned());
+        let text = missing.refusal().to_string();
+        assert_eq!(text.matches(WINDOWS_HINT).count(), 1, "{text}");
+        assert!(text.contains("C:\\2.stl does not exist\n"), "{text}");
     }
 }

@@ -35,6 +35,8 @@ mod man;
 mod manifest_file;
 mod metrics;
 mod missing_files;
+mod missing_results;
+mod nearby_projects;
 mod new_project;
 mod output;
 mod panics;
@@ -161,6 +163,9 @@ fn report_error(error: &anyhow::Error, context: &Context) -> ExitCode {
     let text = error_text::describe(error, &context.dir());
     context.error(&text, code);
     if code == ExitCode::NoProject {
+        for project in nearby_projects::nearby_projects(&context.dir()) {
+            context.at(&project).next("status");
+        }
         context.next("import pairs.csv");
         context.next_command(&context.program_with("demo"));
     } else if error_text::is_run_in_use(error) {

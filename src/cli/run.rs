@@ -12,7 +12,7 @@ use super::failures::Failures;
 use super::metrics::{self, MetricsServer};
 use super::progress::ProgressReporter;
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use super::{select, signals};
+use super::{missing_results, select, signals};
 use crate::catalog::{Catalog, RerunPolicy};
 use crate::config::Config;
 use crate::domain::Stage;
@@ -90,6 +90,12 @@ pub(super) async fn execute(
     let (summary, failures) = driven?;
     context.print_json(&as_json(&summary))?;
     print_outcome(&summary, &failures, context);
+    if missing_results::are_missing(&project, &summary.status.jobs) {
+        context.warn(missing_results::TEXT);
+        context.next(missing_results::NEXT);
+        context.next("run");
+        return Ok(code(&summary));
+    }
     for command in next_steps(&summary, &failures) {
         context.next(&command);
     }

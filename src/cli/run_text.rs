@@ -4,6 +4,7 @@ use super::context::{Context, shell_quoted};
 use super::failures::Failures;
 use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
+use super::verdict::review_step;
 use crate::catalog::{BlockPlanEntry, Plan};
 use crate::domain::JobStatus;
 use crate::runner::{BlockSummary, RunSummary};
@@ -79,6 +80,7 @@ pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<Strin
         steps.push("retry".to_owned());
     }
     if jobs(JobStatus::Done) > 0 && !summary.stopped {
+        steps.extend(review_step(&summary.status));
         steps.push("report".to_owned());
     }
     steps

@@ -6,6 +6,11 @@ use crate::config::nearest;
 use crate::domain::{BlockName, PairName};
 use crate::runner::NamedWork;
 
+/// Largest number of similar ids in a message.
+const MAX_SIMILAR: usize = 3;
+/// Fewest characters by which ids that contain a text are similar to it, such as `b1_c01-r01` to `c01-r01`.
+const MIN_PART_CHARS: usize = 3;
+
 /// Looks up pairs by their ids.
 ///
 /// # Errors
@@ -110,8 +115,14 @@ pub(super) async fn existing_block(catalog: &Catalog, typed: &str) -> anyhow::Re
 }
 
 /// Returns the refusal of an id that does not exist, with similar ids.
-fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str>) -> Refusal {
-    let similar = nearest(typed, all, 3);
+fn no_such<'a>(what: &str, typed: &str, all: impl Iterator<Item = &'a str> + Clone) -> Refusal {
+    let mut similar = nearest(typed, all.clone(), MAX_SIMILAR);
+    if similar.is_empty() && typed.chars().count() >= MIN_PART_CHARS {
+        similar = all
+            .filter(|name| name.contains(typed))
+            .take(MAX_SIMILAR)
+            .collect();
+    }
     let hint = if similar.is_empty() {
         String::new()
     } else {
@@ -132,5 +143,6 @@ mod tests {
             "there is no pair b4-0117; similar ids: b04-0117"
         );
         assert_eq!(text("zzz").to_string(), "there is no pair zzz");
+        assert!(text("117").to_string().ends_with("; similar ids: b04-0117"));
     }
 }

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
+use super::show_text::state_name;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
@@ -72,7 +73,7 @@ fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) 
     let mut parts = vec![format!(
         "{}  {}\n",
         palette.paint(Tone::Strong, title),
-        palette.paint(tone, state.status)
+        palette.paint(tone, state_name(state.status))
     )];
     let optional = |value: Option<String>, otherwise: &str| value.unwrap_or(otherwise.to_owned());
     let rows = [

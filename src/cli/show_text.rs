@@ -92,7 +92,7 @@ impl PairPage<'_> {
             JobStatus::Quarantined => Tone::Bad,
             JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => Tone::Warn,
         };
-        let status = self.palette.paint(tone, results.status);
+        let status = self.palette.paint(tone, state_name(results.status));
         let stage = results.next_stage.map(|stage| format!(" before {stage}"));
         let crashes = match self.detail.crashes {
             0 => String::new(),
@@ -168,6 +168,16 @@ impl PairPage<'_> {
             attempt.ms.map_or_else(String::new, duration),
             outcome,
         ]
+    }
+}
+
+/// Returns the word for a status that `status` uses too.
+pub(super) const fn state_name(status: JobStatus) -> &'static str {
+    match status {
+        JobStatus::Done => "done",
+        JobStatus::Quarantined => "failed",
+        JobStatus::Leased => "running",
+        JobStatus::Ready | JobStatus::Backoff => "waiting",
     }
 }
 

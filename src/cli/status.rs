@@ -9,11 +9,12 @@ use serde_json::Value;
 use super::context::{Context, now, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
+use super::missing_results;
 use super::output;
 use super::screen::{Palette, Tone, clear_code};
 use super::status_hosts;
 use super::table::{columns, count};
-use super::verdict::reviewer_name;
+use super::verdict::review_step;
 use crate::catalog::{Catalog, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
@@ -72,11 +73,15 @@ async fn read(
     context: &Context,
 ) -> anyhow::Result<ProjectStatus> {
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
+    // Read before the counts: a run that ends in between leaves no leases.
+    let running = runner::is_running(project, catalog, now()).await?;
+    let failures = Failures::read(catalog, args.failed).await?;
+    let counts = catalog.status(&fingerprints).await?;
     Ok(ProjectStatus {
-        // Read before the counts: a run that ends in between leaves no leases.
-        running: runner::is_running(project, catalog, now()).await?,
-        failures: Failures::read(catalog, args.failed).await?,
-        counts: catalog.status(&fingerprints).await?,
+        are_results_missing: missing_results::are_missing(project, &counts.jobs),
+        counts,
+        running,
+        failures,
     })
 }
 
@@ -86,6 +91,8 @@ struct ProjectStatus {
     /// Whether a process works on the project. If not, leased pairs count as interrupted, not as running.
     running: bool,
     failures: Failures,
+    /// Whether there are results, but none of their files.
+    are_results_missing: bool,
 }
 
 impl ProjectStatus {
@@ -185,6 +192,9 @@ fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
         let text = format!("{pairs} computed with other settings or files than the current ones");
         parts.push(line("stale", &text));
     }
+    if status.are_results_missing {
+        parts.push(line("files", missing_results::TEXT));
+    }
     parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
     parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
     parts.concat()
@@ -263,11 +273,15 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
+    if status.are_results_missing {
+        steps.push(missing_results::NEXT.to_owned());
+    }
     let leased = status.failures.blocks.leased();
     let running = status.in_process() > 0 || (status.running && leased > 0);
     let waiting = status.waiting() + status.failures.blocks.waiting();
     let interrupted = status.interrupted() + if status.running { 0 } else { leased };
-    if !running && waiting + interrupted + status.counts.stale > 0 {
+    let has_work = waiting + interrupted + status.counts.stale > 0;
+    if !running && (has_work || status.are_results_missing) {
         steps.push("run".to_owned());
     }
     if let Some(first) = status.failures.blocks.first_failed() {
@@ -279,28 +293,18 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if status.counts.low_confidence > 0 {
         steps.push("contact-sheet --order confidence".to_owned());
     }
-    if status.jobs(JobStatus::Done) > 0 && !running {
-        if status.counts.verdicts.values().sum::<u64>() == 0 {
-            let user = std::env::var("USER").ok();
-            steps.push(review_step(user.as_deref()));
-        }
+    if status.jobs(JobStatus::Done) > 0 && !running && !status.are_results_missing {
+        steps.extend(review_step(&status.counts));
         steps.push("report".to_owned());
     }
     steps
-}
-
-/// Returns the `review` command with the user's name as the reviewer.
-fn review_step(user: Option<&str>) -> String {
-    let name = user.and_then(|user| reviewer_name(user).ok());
-    let name = name.unwrap_or_else(|| "me".to_owned());
-    format!("review --reviewer {}", shell_quoted(&name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::{
         JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
-        review_step, screen,
+        screen,
     };
 
     fn status(done: u64, ready: u64) -> ProjectStatus {
@@ -321,6 +325,7 @@ mod tests {
             },
             running: true,
             failures: super::Failures::default(),
+            are_results_missing: false,
         }
     }
 
@@ -360,6 +365,17 @@ mod tests {
     }
 
     #[test]
+    fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
+        let mut status = status(3, 0);
+        assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
+        status.counts.low_confidence = 1;
+        let text = screen(&status, "demo", Palette::PLAIN);
+        let line = "confidence   1 done pair below 0.5 (ensemble)\n";
+        assert!(text.ends_with(line), "{text}");
+        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
+    }
+
+    #[test]
     fn next_step_follows_from_the_counts() {
         assert_eq!(next_steps(&status(0, 0)), ["import pairs.csv"]);
         assert_eq!(next_steps(&status(0, 2)), ["run"]);
@@ -369,18 +385,13 @@ mod tests {
         assert_eq!(steps[1..], ["report"]);
         done.counts.verdicts.insert(Verdict::Pass, 1);
         assert_eq!(next_steps(&done), ["report"]);
-        assert_eq!(review_step(Some("lê văn")), "review --reviewer 'lê văn'");
-        assert_eq!(review_step(None), "review --reviewer me");
-    }
-
-    #[test]
-    fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
-        let mut status = status(3, 0);
-        assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
-        status.counts.low_confidence = 1;
-        let text = screen(&status, "demo", Palette::PLAIN);
-        let line = "confidence   1 done pair below 0.5 (ensemble)\n";
-        assert!(text.ends_with(line), "{text}");
-        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
+        done.are_results_missing = true;
+        done.running = false;
+        assert_eq!(next_steps(&done), ["check --repair", "run"]);
+        let text = screen(&done, "demo", Palette::PLAIN);
+        assert!(
+            text.contains("files        the depth maps and masks"),
+            "{text}"
+        );
     }
 }

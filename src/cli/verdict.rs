@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::context::{Context, now};
+use super::context::{Context, now, shell_quoted};
 use super::exit::ExitCode;
 use super::files::{self, RefusedLine};
 use super::output;
@@ -14,7 +14,7 @@ use super::select;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
-use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
+use crate::catalog::{Catalog, NewVerdict, ReviewContext, StatusCounts, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// Commands on verdicts.
@@ -94,6 +94,19 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Returns the `review` command as a next step, or `None` if there are verdicts.
+pub(super) fn review_step(counts: &StatusCounts) -> Option<String> {
+    let is_unjudged = counts.verdicts.values().all(|number| *number == 0);
+    is_unjudged.then(|| review_command(std::env::var("USER").ok().as_deref()))
+}
+
+/// Returns the `review` command with the user's name as the reviewer.
+fn review_command(user: Option<&str>) -> String {
+    let name = user.and_then(|user| reviewer_name(user).ok());
+    let name = name.unwrap_or_else(|| "me".to_owned());
+    format!("review --reviewer {}", shell_quoted(&name))
+}
+
 pub(super) async fn verdict(
     command: VerdictCommand,
     context: &Context,
@@ -123,12 +136,23 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         },
         at: None,
     };
-    let metric = new.metric.map_or("all metrics", ThresholdMetric::name);
-    let text = format!("{}, {metric}: {}", new.pair, new.verdict);
+    let text = set_text(&new);
     catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
     context.info(&text);
     Ok(ExitCode::Done)
+}
+
+/// Returns what `verdict set` recorded, and how to record less or to take it back.
+fn set_text(new: &NewVerdict) -> String {
+    let undo = format!("`verdict undo --reviewer {}`", shell_quoted(&new.reviewer));
+    let (pair, verdict) = (&new.pair, new.verdict);
+    match new.metric {
+        Some(metric) => format!("{pair}, {metric}: {verdict}; {undo} takes it back"),
+        None => format!(
+            "{pair}, all metrics: {verdict}; {undo} takes it back, and --metric judges the result of one metric only"
+        ),
+    }
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -270,4 +294,15 @@ fn view_text(look: &ReviewContext) -> String {
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();
     parts.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::review_command;
+
+    #[test]
+    fn the_reviewer_is_the_user() {
+        assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
+        assert_eq!(review_command(None), "review --reviewer me");
+    }
 }

@@ -19,6 +19,9 @@ pub enum FolderError {
         "{0} is not part of an export, so its folder is not replaced; choose an empty or new folder"
     )]
     NotAnExport(PathBuf),
+    /// A file is where the folder should be.
+    #[error("{0} is a file; name a folder for the export")]
+    IsFile(PathBuf),
     /// The folder cannot be replaced.
     #[error("{0}")]
     Replace(#[from] ReplaceError),
@@ -74,6 +77,9 @@ fn refuse_foreign(target: &Path) -> Result<(), FolderError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         found => found.map_err(at(target))?,
     };
+    if target.is_file() {
+        return Err(FolderError::IsFile(target.to_owned()));
+    }
     match manifest::foreign_entry(target).map_err(at(target))? {
         Some(entry) => Err(FolderError::NotAnExport(entry)),
         None => Ok(()),
@@ -186,6 +192,8 @@ mod tests {
         fs::write(dir.path().join("thesis.tex"), "").expect("written");
         let refused = Folder::begin(dir.path());
         assert!(matches!(refused, Err(FolderError::NotAnExport(_))));
+        let file = Folder::begin(&dir.path().join("thesis.tex"));
+        assert!(matches!(file, Err(FolderError::IsFile(_))));
         assert_eq!(fs::read_dir(dir.path()).expect("a folder").count(), 2);
         let file = Folder::begin(&dir.path().join("thesis.tex"));
         assert!(matches!(file, Err(FolderError::Io { .. })));

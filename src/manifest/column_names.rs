@@ -1,5 +1,7 @@
 //! Missing columns, and which names are similar.
 
+use unicode_normalization::UnicodeNormalization as _;
+
 /// Returns whether a name may be a misspelt or abbreviated name of a column: in short names one letter may be wrong,
 /// missing or swapped with the next, in longer names two.
 pub(super) fn similar_column(found: &str, name: &str) -> bool {
@@ -9,9 +11,35 @@ pub(super) fn similar_column(found: &str, name: &str) -> bool {
         ..=5 => 1,
         _ => 2,
     };
-    matches!((found, name), ("char", "character") | ("blk", "block"))
-        || strsim::osa_distance(found, name) <= max_wrong
+    let found: String = found.nfc().collect();
+    OTHER_NAMES.contains(&(found.as_str(), name)) || strsim::osa_distance(&found, name) <= max_wrong
 }
+
+/// Other words for the columns, in English and Vietnamese, in lower case.
+const OTHER_NAMES: [(&str, &str); 22] = [
+    ("name", "id"),
+    ("mã", "id"),
+    ("tên", "id"),
+    ("scan", "mesh"),
+    ("model", "mesh"),
+    ("stl", "mesh"),
+    ("lưới", "mesh"),
+    ("bản quét", "mesh"),
+    ("quét", "mesh"),
+    ("image", "print"),
+    ("rubbing", "print"),
+    ("bản in", "print"),
+    ("ảnh", "print"),
+    ("hình", "print"),
+    ("in", "print"),
+    ("char", "character"),
+    ("chữ", "character"),
+    ("ký tự", "character"),
+    ("blk", "block"),
+    ("ván", "block"),
+    ("mộc bản", "block"),
+    ("đơn vị", "unit"),
+];
 
 /// Describes a missing column. Suggests an unknown column with a similar name.
 pub(super) fn missing_column(

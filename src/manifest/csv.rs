@@ -255,7 +255,8 @@ mod tests {
     fn missing_and_repeated_columns_are_reported() {
         assert_eq!(
             refusal("id,model,print\na,b,c\n"),
-            "line 1: column \"mesh\" is missing; the header has: id, model, print"
+            "line 1: column \"mesh\" is missing; rename \"model\" to \"mesh\" if it is meant; the header has: id, \
+             model, print"
         );
         assert_eq!(
             refusal("id,mesh,print,Mesh\na,b,c,d\n"),
@@ -336,6 +337,10 @@ mod tests {
             refusal(swapped),
             "lines 2, 3: mesh names an image and print names a mesh; swap the two"
         );
+        assert_eq!(
+            refusal("id,mesh,print\nm/1.stl,1,p/1.png\nm/2.stl,2,p/2.png\n"),
+            "lines 2, 3: id names a file; give each pair an id, or swap the columns if they are mixed up"
+        );
         // The content decides, so an unusual extension is no reason to refuse a row.
         assert!(parse("id,mesh,print\n1,scan.tif,print.dat\n").is_ok());
     }
@@ -348,9 +353,17 @@ mod tests {
              mech, print"
         );
         // Two letters are similar to too many words: `in` is Vietnamese for print.
+        let vietnamese = refusal("in,mesh,tên\na,b,c\n");
+        let renamed: Vec<_> = vietnamese
+            .lines()
+            .map(|line| line.split("; ").nth(1))
+            .collect();
         assert_eq!(
-            refusal("tên,mesh,in\na,b,c\n").lines().next(),
-            Some("line 1: column \"id\" is missing; the header has: tên, mesh, in")
+            renamed,
+            [
+                Some("rename \"tên\" to \"id\" if it is meant"),
+                Some("rename \"in\" to \"print\" if it is meant")
+            ]
         );
     }
 }

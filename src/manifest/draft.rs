@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::error::{ManifestError, at_line};
-use super::folders::{is_named_like_mesh, is_named_like_print};
+use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, RowIds};
-use crate::domain::PairName;
+use crate::domain::{PairName, PairNameError};
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
@@ -25,6 +25,10 @@ impl DraftRow {
         }
     }
 }
+
+/// What is wrong with a path as an id.
+const ID_IS_FILE: &str =
+    "id names a file; give each pair an id, or swap the columns if they are mixed up";
 
 /// Passes valid rows on; collects problems and ids.
 pub(super) struct RowCollector<'e> {
@@ -73,10 +77,15 @@ impl<'e> RowCollector<'e> {
     /// Returns the row's id if it is valid and new.
     fn name(&mut self, draft: &DraftRow, reasons: &mut Vec<String>) -> Option<PairName> {
         let text = draft.cells.get("id").map_or("", String::as_str);
-        let name = record(
-            PairName::new(text).map_err(|error| error.to_string()),
-            reasons,
-        )?;
+        // Without the id, the reason is the same in all rows and is shown once.
+        let reason = |error: PairNameError| {
+            if is_named_like_input(Path::new(text)) {
+                ID_IS_FILE.to_owned()
+            } else {
+                error.to_string()
+            }
+        };
+        let name = record(PairName::new(text).map_err(reason), reasons)?;
         if let Some(first) = self.ids.insert(&name, draft.line) {
             reasons.push(format!("id {text:?} is already on line {first}"));
             return None;

@@ -1,4 +1,4 @@
-//! Misspelt names of optional columns, which are kept as metadata.
+//! Misspelt names of optional columns, which are kept as metadata, and swapped ones.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -17,6 +17,9 @@ pub struct MisspeltColumns {
     /// Found names by the optional column that they resemble.
     similar: BTreeMap<&'static str, String>,
     used: BTreeSet<&'static str>,
+    /// Rows whose block is one Han character, and rows whose character is.
+    han_blocks: usize,
+    han_characters: usize,
 }
 
 impl MisspeltColumns {
@@ -30,6 +33,8 @@ impl MisspeltColumns {
         ];
         let used = OPTIONAL.iter().zip(used).filter(|(_, is_used)| *is_used);
         self.used.extend(used.map(|(name, _)| name));
+        self.han_blocks += usize::from(is_han_character(row.block.as_deref()));
+        self.han_characters += usize::from(is_han_character(row.character.as_deref()));
         for name in row.meta.keys() {
             if self.names.len() == MAX_NAMES || self.names.contains(name) {
                 continue;
@@ -53,8 +58,22 @@ impl MisspeltColumns {
                 "column {name:?} is kept as metadata; rename it to {known:?} if it is meant, and import again"
             )
         };
-        unused.map(warning).collect()
+        let is_swapped =
+            self.han_blocks > 0 && self.han_characters == 0 && self.used.contains("character");
+        let swapped = is_swapped.then(|| {
+            "column \"block\" has single characters and column \"character\" has none; swap their names if they are mixed \
+             up, and import again"
+                .to_owned()
+        });
+        unused.map(warning).chain(swapped).collect()
     }
+}
+
+/// Returns whether a text is one Han character.
+fn is_han_character(text: Option<&str>) -> bool {
+    let mut chars = text.unwrap_or_default().chars();
+    let is_han = |c| matches!(c, '\u{3400}'..='\u{9fff}' | '\u{f900}'..='\u{faff}' | '\u{20000}'..='\u{3ffff}');
+    chars.next().is_some_and(is_han) && chars.next().is_none()
 }
 
 #[cfg(test)]
@@ -79,6 +98,19 @@ mod tests {
             "column \"Units\" is kept as metadata; rename it to \"unit\" if it is meant, and import again"
         );
         assert_eq!(warnings("id,mesh,print,char\na,m,p,x\n").len(), 1);
+        let found = warnings("id,mesh,print,Chữ,ván,đơn vị\na,m,p,天,b,mm\n");
+        assert_eq!(found.len(), 3, "{found:?}");
+    }
+
+    #[test]
+    fn swapped_characters_and_blocks_are_reported() {
+        let found = warnings("id,mesh,print,character,block\na,m,p,b1,天\nb,m,p,b1,地\n");
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].contains("swap their names"), "{found:?}");
+        for rows in ["a,m,p,天,b1", "a,m,p,天,地", "a,m,p,,地", "a,m,p,b,天地"] {
+            let list = format!("id,mesh,print,character,block\n{rows}\n");
+            assert_eq!(warnings(&list), Vec::<String>::new());
+        }
     }
 
     #[test]

@@ -170,6 +170,7 @@ impl ReportAccumulator {
                 &rows,
                 &self.truth_problems,
                 bootstrap.skipped,
+                self.attention_checks.as_ref(),
             ),
             rows,
             comparisons: comparisons

@@ -16,7 +16,13 @@ pub struct AttentionCheckRates {
     pub all: Rate,
     /// By kind of fault.
     pub by_kind: BTreeMap<&'static str, Rate>,
+    /// By reviewer. Empty for the rates of one reviewer.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub by_reviewer: BTreeMap<String, Rate>,
 }
+
+/// Fewest answered planted faults from which a reviewer's rate is judged.
+const MIN_FAULTS: u64 = 4;
 
 impl AttentionCheckRates {
     /// Returns the rates of detected faults among the answers of one or more reviewers. Ignores answers to duplicates.
@@ -31,9 +37,21 @@ impl AttentionCheckRates {
         rates
     }
 
+    /// Returns the reviewers who detected fewer than half of at least [`MIN_FAULTS`] planted faults.
+    pub(super) fn inattentive(&self) -> Vec<(&str, &Rate)> {
+        let few = |rate: &Rate| rate.n >= MIN_FAULTS && rate.count * 2 < rate.n;
+        let reviewers = self.by_reviewer.iter();
+        let reviewers = reviewers.filter(|(_, rate)| few(rate));
+        reviewers
+            .map(|(name, rate)| (name.as_str(), rate))
+            .collect()
+    }
+
     /// Computes the intervals by `method`.
     pub(super) fn set_interval(&mut self, method: IntervalMethod) {
-        for rate in self.by_kind.values_mut().chain([&mut self.all]) {
+        let rates = self.by_kind.values_mut();
+        let rates = rates.chain(self.by_reviewer.values_mut());
+        for rate in rates.chain([&mut self.all]) {
             rate.set_interval(method);
         }
     }
@@ -45,8 +63,13 @@ impl AttentionCheckRates {
 /// Returns an error if the catalog cannot be read.
 pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
     let answers = answers_by_reviewer(catalog).await?;
-    let newest = answers.values().flat_map(|answers| newest(answers));
-    Ok(AttentionCheckRates::of(newest))
+    let mut rates = AttentionCheckRates::of(answers.values().flat_map(|answers| newest(answers)));
+    let by_reviewer = answers.iter().map(|(reviewer, answers)| {
+        let rate = AttentionCheckRates::of(newest(answers)).all;
+        (reviewer.clone(), rate)
+    });
+    rates.by_reviewer = by_reviewer.filter(|(_, rate)| rate.n > 0).collect();
+    Ok(rates)
 }
 
 /// Returns each reviewer's answers that were not undone, with the oldest first.

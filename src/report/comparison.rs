@@ -10,6 +10,13 @@ use crate::domain::enum_names;
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: u64 = 100_000;
 
+/// Fewest pairs from which a sample size is estimated.
+const MIN_PAIRS_FOR_ESTIMATE: u64 = 20;
+
+/// What is said with fewer pairs.
+pub(super) const TOO_FEW_TO_ESTIMATE: &str =
+    "how many pairs would show one cannot be estimated from fewer than 20";
+
 /// The comparisons between metrics: every two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
@@ -70,7 +77,7 @@ pub struct Comparison {
     /// `p` after Holm's correction over the comparisons of this basis.
     pub p_holm: Option<f64>,
     /// Pairs that would be needed to show the difference with 80 % power at the 5 % level, rounded up to two significant
-    /// digits. `None` if each metric alone is right on as many pairs as the other.
+    /// digits. `None` if each metric alone is right on as many pairs as the other, or if fewer than 20 pairs are known.
     pub pairs_needed: Option<u64>,
     /// The conclusion, in whole sentences.
     pub conclusion: String,
@@ -107,7 +114,7 @@ impl ComparisonSums {
                 test: McNemarTest::NAME,
                 p: test.p(),
                 p_holm,
-                pairs_needed: test.sample_size().map(two_digits),
+                pairs_needed: pairs_needed(test),
                 conclusion: conclusion(basis, (a, b), test, p_holm),
             })
             .collect()
@@ -138,7 +145,10 @@ fn conclusion(
             "{better} is right more often, but not significantly after correction for several comparisons."
         );
     }
-    let Some(pairs) = test.sample_size().map(two_digits) else {
+    let Some(pairs) = pairs_needed(test) else {
+        if test.a_only != test.b_only {
+            return format!("No significant difference; {TOO_FEW_TO_ESTIMATE}.");
+        }
         return "No significant difference: each alone is right on as many pairs as the other."
             .to_owned();
     };
@@ -147,6 +157,13 @@ fn conclusion(
         "No significant difference. At this rate, {pairs} {known} would be needed to show a difference between {a} and \
          {b} (80 % power, 5 % level)."
     )
+}
+
+/// Estimates how many pairs would show the difference. See [`Comparison::pairs_needed`].
+fn pairs_needed(test: McNemarTest) -> Option<u64> {
+    let is_estimable = test.n >= MIN_PAIRS_FOR_ESTIMATE;
+    let pairs = test.sample_size().filter(|_| is_estimable);
+    pairs.map(two_digits)
 }
 
 /// Rounds a sample size up to two significant digits. The estimate is not more precise than that.
@@ -227,6 +244,19 @@ mod tests {
             (2, [Some(true), Some(true), Some(false)]),
         ]);
         assert!(found[1].conclusion.contains("each alone"), "{found:?}");
+    }
+
+    #[test]
+    fn few_pairs_estimate_no_sample_size() {
+        for (times, is_estimated) in [(1, false), (19, false), (20, true)] {
+            let found = compare(&[
+                (1, [Some(true), Some(false), Some(true)]),
+                (times - 1, [Some(true), Some(true), Some(true)]),
+            ]);
+            assert_eq!(found[1].pairs_needed.is_some(), is_estimated, "{found:?}");
+            let text = &found[1].conclusion;
+            assert_eq!(text.contains("from fewer than 20"), !is_estimated, "{text}");
+        }
     }
 
     #[test]

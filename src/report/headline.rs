@@ -2,12 +2,13 @@
 //!
 //! A command in a sentence stands in backticks, which renderers turn into the code of their format.
 
-use super::comparison::{Basis, Comparison, about};
+use super::attention_checks::AttentionCheckRates;
+use super::comparison::{Basis, Comparison, TOO_FEW_TO_ESTIMATE, about};
 use super::model::{MetricRow, Report};
 use super::number_format::{NumberStyle, counted};
 use super::number_format::{format_count, format_interval, format_p, format_rate, format_share};
-use super::stats::SIGNIFICANCE_LEVEL;
-use crate::domain::{MetricOutcome, ThresholdMetric};
+use super::stats::{Rate, SIGNIFICANCE_LEVEL};
+use crate::domain::{MetricOutcome, ThresholdMetric, sanitize};
 
 /// Returns the sentences, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
@@ -86,7 +87,8 @@ fn accuracy(report: &Report) -> String {
             report.interval.title(),
             format_count(row.passed),
             counted(row.passed + row.failed, "decided result"),
-        ) + &undecided(row),
+        ) + &undecided(row)
+            + &inattentive(report),
         None if report.has_verdicts() => {
             "There is no Acc, because reviewers were unsure about every judged result".to_owned()
         }
@@ -112,6 +114,25 @@ fn undecided(row: &MetricRow) -> String {
     match rest.as_slice() {
         [] => String::new(),
         rest => format!("; {} {verb} not counted", joined(rest)),
+    }
+}
+
+/// Returns the clause on reviewers who missed most planted faults, or an empty text.
+fn inattentive(report: &Report) -> String {
+    let rates = report.attention_checks.iter();
+    let found: Vec<(&str, &Rate)> = rates.flat_map(AttentionCheckRates::inattentive).collect();
+    match found.as_slice() {
+        [] => String::new(),
+        [(reviewer, rate)] => format!(
+            "; {} noticed only {} of {} attention checks, so this Acc may be wrong",
+            sanitize(reviewer, 60),
+            format_count(rate.count),
+            format_count(rate.n)
+        ),
+        more => format!(
+            "; {} reviewers missed most of their attention checks, so this Acc may be wrong",
+            format_count(more.len() as u64)
+        ),
     }
 }
 
@@ -219,6 +240,9 @@ fn no_difference(basis: Basis, family: &[&Comparison]) -> String {
         None if family.iter().any(|found| found.pairs_needed.is_some()) => {
             "more pairs would be needed to show one after the correction".to_owned()
         }
+        None if family.iter().any(|found| found.a_only != found.b_only) => {
+            TOO_FEW_TO_ESTIMATE.to_owned()
+        }
         None => "each metric alone is right on as many pairs as the others".to_owned(),
     };
     format!(
@@ -260,7 +284,8 @@ mod tests {
     use crate::domain::Verdict::{Fail, Pass};
     use crate::domain::{FailureClass, ThresholdMetric, Verdict};
     use crate::report::{
-        IntervalMethod, Report, ReportAccumulator, TruthEvaluation, test_fixtures,
+        AttentionCheckRates, IntervalMethod, Rate, Report, ReportAccumulator, TruthEvaluation,
+        test_fixtures,
     };
 
     /// Returns a report on `n` pairs whose verdicts `verdict` chooses, by pair and metric.
@@ -391,6 +416,45 @@ mod tests {
              160 judged pairs would be needed to show one between Ensemble and Non-luminous SSIM (80 % power, 5 % \
              level)."
         );
+    }
+
+    #[test]
+    fn reviewers_who_missed_the_attention_checks_are_named() {
+        let sentence = |rates: &[(&str, u64, u64)]| {
+            let mut report = ReportAccumulator::default();
+            report.add(
+                &test_fixtures::done("a", 0.8, &[Pass]),
+                &TruthEvaluation::default(),
+            );
+            let by_reviewer = rates.iter();
+            let by_reviewer =
+                by_reviewer.map(|(name, count, n)| ((*name).to_owned(), Rate::new(*count, *n)));
+            report.set_attention_checks(AttentionCheckRates {
+                all: Rate::total(rates.iter().map(|(_, count, n)| Rate::new(*count, *n))),
+                by_reviewer: by_reviewer.collect(),
+                ..AttentionCheckRates::default()
+            });
+            let found = report.finish();
+            (found.headline[1].clone(), found.warnings)
+        };
+        let (one, warnings) = sentence(&[("lan", 0, 5), ("minh", 5, 5)]);
+        let ending = "; lan noticed only 0 of 5 attention checks, so this Acc may be wrong.";
+        assert!(one.ends_with(ending), "{one}");
+        let warned = |text: &String| text.starts_with("lan noticed 0 of 5 attention checks. ");
+        assert_eq!(
+            warnings.iter().filter(|text| warned(text)).count(),
+            1,
+            "{warnings:?}"
+        );
+        let (two, _) = sentence(&[("lan", 1, 5), ("minh", 2, 5)]);
+        assert!(
+            two.contains("; 2 reviewers missed most of their attention checks"),
+            "{two}"
+        );
+        for (count, n) in [(0, 3), (2, 4), (5, 5)] {
+            let (fine, _) = sentence(&[("lan", count, n)]);
+            assert!(!fine.contains("attention"), "{fine}");
+        }
     }
 
     #[test]

@@ -185,7 +185,7 @@ pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
         duplicates: Rate::default(),
         attention_checks: AttentionCheckRates {
             all: detected,
-            by_kind: BTreeMap::new(),
+            ..AttentionCheckRates::default()
         },
     };
     ReviewerAgreement {
@@ -274,10 +274,14 @@ pub(crate) fn full_report() -> Report {
     );
     report.add(&pending("q1"), &TruthEvaluation::default());
     report.set_attention_checks(AttentionCheckRates {
-        all: Rate::new(20, 22),
+        all: Rate::new(18, 22),
         by_kind: BTreeMap::from([
             ("threshold", Rate::new(1, 2)),
-            ("turned", Rate::new(19, 20)),
+            ("turned", Rate::new(17, 20)),
+        ]),
+        by_reviewer: BTreeMap::from([
+            ("lan".to_owned(), Rate::new(1, 5)),
+            ("minh".to_owned(), Rate::new(17, 17)),
         ]),
     });
     Report {

@@ -1,11 +1,13 @@
 //! Caveats on the numbers of a report, in whole sentences.
 
+use super::attention_checks::AttentionCheckRates;
 use super::model::{MetricRow, PairProgress};
 use super::number_format::NumberStyle::Score;
 use super::number_format::{counted, format_count, format_number};
 use super::score_bootstrap::BootstrapSkipped;
 use super::stats::{MAX_UNITS, MIN_UNITS};
 use super::truth_evaluation::TruthProblems;
+use crate::domain::sanitize;
 
 /// Tolerance for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
@@ -16,6 +18,7 @@ pub(super) fn warnings(
     rows: &[MetricRow],
     truth: &TruthProblems,
     skipped: Option<BootstrapSkipped>,
+    attention_checks: Option<&AttentionCheckRates>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
@@ -23,7 +26,20 @@ pub(super) fn warnings(
     warnings.extend(qualified_results(rows));
     warnings.extend(unusable_truth(truth));
     warnings.extend(skipped.map(bootstrap_skipped));
+    warnings.extend(attention_checks.into_iter().flat_map(missed_faults));
     warnings
+}
+
+/// Returns a warning for each reviewer who missed most planted faults.
+fn missed_faults(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
+    rates.inattentive().into_iter().map(|(reviewer, rate)| {
+        let [noticed, n] = [rate.count, rate.n].map(format_count);
+        format!(
+            "{} noticed {noticed} of {n} attention checks. Let another person judge the same results, or let this one \
+             practise (key ? on the review page) and judge again.",
+            sanitize(reviewer, 60)
+        )
+    })
 }
 
 fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {

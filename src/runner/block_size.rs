@@ -1,4 +1,4 @@
-//! Recognizes the scan of a whole block that was given as the scan of one character.
+//! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
 
 use crate::domain::LengthUnit;
 use crate::mesh::Vertices;
@@ -18,6 +18,21 @@ pub(super) fn advice(length: f64, unit: Option<LengthUnit>) -> String {
     format!(
         "; this looks like a whole block ({length_mm:.0} mm): import it with its page by `mocban import --block`"
     )
+}
+
+/// Lengths that a scan of a character or block can have, mm.
+const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
+
+/// Returns why the unit of a scan must be wrong, or `None` if it may be right. `length` is in units of the mesh.
+pub(super) fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
+    let unit = unit?;
+    let length_m = length * unit.mm() / 1000.0;
+    let is_wrong = length > 0.0 && !POSSIBLE_MM.contains(&(length * unit.mm()));
+    is_wrong.then(|| {
+        format!(
+            "with the unit {unit}, the scan is {length_m} m long; correct the unit in the list and import it again"
+        )
+    })
 }
 
 /// Returns the longest side of the bounding box of vertices, in units of the mesh.
@@ -42,7 +57,7 @@ pub(super) fn length_of_map(depth: &DepthMap) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{advice, length_of};
+    use super::{advice, length_of, wrong_unit};
     use crate::domain::LengthUnit;
 
     #[test]
@@ -51,6 +66,25 @@ mod tests {
         assert!(advice(12.6, Some(LengthUnit::In)).contains("320 mm"));
         for (length, unit) in [(12.0, None), (1.2, Some(LengthUnit::Cm)), (2_500.0, None)] {
             assert_eq!(advice(length, unit), "");
+        }
+    }
+
+    #[test]
+    fn impossible_lengths_are_those_of_a_wrong_unit() {
+        let text = wrong_unit(12.5, Some(LengthUnit::M)).expect("12.5 m is no block");
+        assert!(
+            text.starts_with("with the unit m, the scan is 12.5 m long; "),
+            "{text}"
+        );
+        assert!(wrong_unit(0.012, Some(LengthUnit::Mm)).is_some());
+        for (length, unit) in [
+            (12.5, None),
+            (12.5, Some(LengthUnit::Mm)),
+            (0.0125, Some(LengthUnit::M)),
+            (1.6, Some(LengthUnit::M)),
+            (0.0, Some(LengthUnit::M)),
+        ] {
+            assert_eq!(wrong_unit(length, unit), None);
         }
     }
 

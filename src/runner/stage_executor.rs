@@ -54,6 +54,11 @@ impl PipelineExecutor {
 
     fn fit(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let scan = self.inputs.read_scan(pair)?;
+        let length = block_size::length_of(&scan.mesh().vertices);
+        if let Some(reason) = block_size::wrong_unit(length, pair.attributes.unit) {
+            let text = format!("{}: {reason}", pair.attributes.mesh_path);
+            return Err(ExecutionError::failed(FailureClass::BadInput, text));
+        }
         // A fit that does not read the print stays valid when the print changes.
         let print = if self.settings.fit_reads_print() {
             Some(self.inputs.read_print(pair)?)
@@ -61,11 +66,8 @@ impl PipelineExecutor {
             None
         };
         let face_down = pair.attributes.scanned_face_down;
-        let outcome =
-            pipeline::fit(&scan, print.as_ref(), face_down, &self.settings).map_err(|error| {
-                let length = block_size::length_of(&scan.mesh().vertices);
-                in_file(pair, &pair.attributes.mesh_path, &error.into(), length)
-            })?;
+        let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
+            .map_err(|error| in_file(pair, &pair.attributes.mesh_path, &error.into(), length))?;
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);

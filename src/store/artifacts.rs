@@ -223,6 +223,24 @@ impl Project {
         Ok(())
     }
 
+    /// Returns whether the project's folder has no artifacts. Returns `false` if artifacts are in an object store, or if
+    /// the folder cannot be read.
+    pub fn has_no_artifacts(&self) -> bool {
+        if self
+            .storage()
+            .is_some_and(|storage| storage.artifacts().is_some())
+        {
+            return false;
+        }
+        match std::fs::read_dir(self.artifacts_dir()) {
+            Ok(entries) => {
+                let temporary = self.temporary_dir();
+                entries.flatten().all(|entry| entry.path() == temporary)
+            }
+            Err(error) => error.kind() == ErrorKind::NotFound,
+        }
+    }
+
     /// Removes the temporary files of killed processes. No process may write artifacts during this call.
     ///
     /// # Errors

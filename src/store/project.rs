@@ -29,6 +29,9 @@ pub enum StoreError {
     /// The directory holds no catalog.
     #[error("no project at {0}: it has no {CATALOG_FILE}")]
     NoProject(PathBuf),
+    /// A file is where the project's directory should be.
+    #[error("{0} is a file; name the folder of a project")]
+    NotAFolder(PathBuf),
     /// A path that the catalog cannot store.
     #[error("path {0:?} is not UTF-8, so the catalog cannot store it; rename the file or folder")]
     NotUtf8(PathBuf),
@@ -57,6 +60,9 @@ impl Project {
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
         // The content of the file is checked when the catalog is opened.
         let catalog = dir.join(CATALOG_FILE);
+        if dir.is_file() {
+            return Err(StoreError::NotAFolder(dir.to_owned()));
+        }
         if !catalog.try_exists().map_err(StoreError::io(&catalog))? {
             return Err(StoreError::NoProject(dir.to_owned()));
         }

@@ -103,8 +103,19 @@ fn restore_finds_inputs_in_another_directory() {
     let told = restore("new", &moved).expect(0);
     assert_eq!(told.json()["inputs_missing"], 0);
     let restored = Project::open(&dir.path().join("new")).expect("a project");
+    for command in ["status", "run"] {
+        let told = at(&restored, &[command]).expect(0);
+        let text = format!("{}{}", told.out, told.err);
+        assert!(
+            text.contains("the depth maps and masks of the results are not here"),
+            "{text}"
+        );
+        assert!(told.next()[0].ends_with("check --repair"), "{text}");
+    }
     at(&restored, &["check", "--repair"]).expect(0);
     at(&restored, &["run"]).expect(0);
+    let told = at(&restored, &["status"]).expect(0);
+    assert!(!told.out.contains("not here"), "{}", told.out);
     at(&restored, &["check"]).expect(0);
     let found = exported(&restored, "restored");
     assert!(
@@ -366,7 +377,7 @@ fn backup_overwrites_only_a_backup() {
         assert!(refused.err.contains(says), "{place}: {}", refused.err);
     }
     assert_eq!(std::fs::read(&thesis).expect("read"), b"ten years");
-    let nowhere = mocban(project.dir(), &["backup", "no/such/b.sqlite"]).expect(1);
+    let nowhere = mocban(project.dir(), &["backup", "no/such/b.sqlite"]).expect(2);
     assert!(nowhere.err.contains("no/such"), "{}", nowhere.err);
     at(&project, &["check"]).expect(0);
 }

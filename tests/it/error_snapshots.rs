@@ -36,6 +36,51 @@ fn usage_errors() {
 }
 
 #[test]
+fn wrong_projects_and_outputs() {
+    let dir = imported();
+    write(dir.path(), "khối-4.txt", "a file");
+    std::fs::rename(dir.path().join("p"), dir.path().join("khối-4")).expect("renamed");
+    for (name, args) in [
+        (
+            "project_is_a_file",
+            &["-C", "khối-4.txt", "status"] as &[&str],
+        ),
+        ("project_misspelt", &["-C", "khoi_4", "status"]),
+        ("project_forgotten", &["status"]),
+        ("project_as_command", &["khối-4", "status"]),
+        (
+            "output_in_missing_folder",
+            &["-C", "khối-4", "report", "-o", "new/report.html"],
+        ),
+        (
+            "backup_in_missing_folder",
+            &["-C", "khối-4", "backup", "new/b.sqlite"],
+        ),
+        (
+            "export_to_a_file",
+            &["-C", "khối-4", "export", "-o", "khối-4.txt"],
+        ),
+        (
+            "id_without_quotes",
+            &[
+                "-C",
+                "khối-4",
+                "verdict",
+                "set",
+                "chữ",
+                "1",
+                "pass",
+                "--reviewer",
+                "lan",
+            ],
+        ),
+        ("import_of_nothing", &["import"]),
+    ] {
+        assert_call(&format!("error_{name}"), dir.path(), args);
+    }
+}
+
+#[test]
 fn settings_errors() {
     let dir = empty();
     for (name, set) in [

@@ -268,6 +268,7 @@ mod tests {
                 ("threshold", Rate::new(1, 2)),
             ]
             .into(),
+            ..AttentionCheckRates::default()
         });
         let table = attention_checks(&report.finish()).expect("22 were answered");
         let turned = ["turned", "20", "19", "95.0", "76.4–99.1"];

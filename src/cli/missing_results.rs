@@ -1,0 +1,18 @@
+//! Results whose files are missing, as in a project that was made of a backup.
+
+use std::collections::BTreeMap;
+
+use crate::domain::JobStatus;
+use crate::store::Project;
+
+/// What the user sees, without the label.
+pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; `check --repair` lets the next run compute them again";
+
+/// The command that helps.
+pub(super) const NEXT: &str = "check --repair";
+
+/// Returns whether a project has results, but none of their files. Files that are only partly missing are found by
+/// `check`.
+pub(super) fn are_missing(project: &Project, jobs: &BTreeMap<JobStatus, u64>) -> bool {
+    jobs.get(&JobStatus::Done).is_some_and(|done| *done > 0) && project.has_no_artifacts()
+}
