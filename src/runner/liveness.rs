@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use crate::catalog::LeaseHolder;
 use crate::domain::{UnixMillis, WorkerId};
 
-/// Time without a connection and without a new heartbeat after which a worker that was connected is dead, in
-/// milliseconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then usually
-/// connects again at once.
-const UNCONNECTED_MS: i64 = 7_000;
-/// Longest time between two observations, in milliseconds, that is no sign of an outage of the server.
-const USUAL_GAP_MS: i64 = 5_000;
+/// Time without a connection and without a new heartbeat after which a worker that was connected is dead, as a share of
+/// the lease: 7 of 50 seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then
+/// usually connects again at once.
+const UNCONNECTED_SHARE: f64 = 0.14;
+/// Longest time between two observations that is no sign of an outage of the server, as a share of the lease: 5 of 50
+/// seconds.
+const USUAL_GAP_SHARE: f64 = 0.1;
 
 /// Finds dead workers. A worker is dead if its heartbeat does not change during one lease length on the clock of this
 /// process, or for a shorter time if it has no connection to the server either. Only times during which this process
@@ -45,23 +46,26 @@ impl Liveness {
         }
     }
 
-    /// Records the current heartbeats and connections of all workers with leases. Returns the workers that are dead. Must
-    /// be called every few seconds.
+    /// Records the current heartbeats and connections of all workers with leases. Returns those that are dead, as they were
+    /// seen now. Must be called every few seconds.
     pub(super) fn observe(
         &mut self,
         holders: &[LeaseHolder],
         me: WorkerId,
         now: UnixMillis,
-    ) -> Vec<WorkerId> {
+    ) -> Vec<LeaseHolder> {
+        let part_of_lease = |share: f64| (self.lease_ms as f64 * share) as i64;
+        let usual_gap_ms = part_of_lease(USUAL_GAP_SHARE);
+        let unconnected_ms = part_of_lease(UNCONNECTED_SHARE);
         let gap = now - self.observed;
         self.observed = now;
-        if gap > USUAL_GAP_MS {
+        if gap > usual_gap_ms {
             // The others may need longer to connect again, so only their heartbeats count until they have.
             for seen in self.seen.values_mut() {
                 (seen.was_connected, seen.unconnected_since) = (false, None);
             }
         }
-        if gap > USUAL_GAP_MS.max(self.lease_ms / 2) {
+        if gap > self.lease_ms / 2 {
             // This process was away from the catalog, or suspended, and perhaps the others were too.
             self.seen.clear();
         }
@@ -87,9 +91,9 @@ impl Liveness {
                 seen.unconnected_since.get_or_insert(now);
             }
             let unconnected = seen.unconnected_since.map_or(0, |since| now - since);
-            now - seen.since >= self.lease_ms || unconnected >= UNCONNECTED_MS
+            now - seen.since >= self.lease_ms || unconnected >= unconnected_ms
         });
-        dead.map(|holder| holder.worker).collect()
+        dead.copied().collect()
     }
 }
 
@@ -120,43 +124,43 @@ mod tests {
         let holders = holders(heartbeat, is_connected);
         times.into_iter().find(|now| {
             let dead = liveness.observe(&holders, ME, *now);
-            assert!(dead.is_empty() || dead == [OTHER], "{dead:?}");
+            assert!(dead.is_empty() || dead == holders[1..], "{dead:?}");
             !dead.is_empty()
         })
     }
 
     #[test]
     fn a_worker_is_dead_after_a_lease_without_a_new_heartbeat() {
-        let mut liveness = Liveness::new(60_000);
+        let mut liveness = Liveness::new(50_000);
         let every = |from: i64, until: i64| (from..=until).step_by(2_500);
-        assert_eq!(dead_at(&mut liveness, every(0, 50_000), 5, true), None);
-        let found = dead_at(&mut liveness, every(52_500, 200_000), 6, true);
-        assert_eq!(found, Some(112_500));
+        assert_eq!(dead_at(&mut liveness, every(0, 47_500), 5, true), None);
+        let found = dead_at(&mut liveness, every(50_000, 200_000), 6, true);
+        assert_eq!(found, Some(100_000));
     }
 
     #[test]
     fn after_a_gap_the_others_are_watched_anew() {
-        let mut liveness = Liveness::new(60_000);
-        let times = [0, 5_000, 205_000, 235_000, 264_999];
+        let mut liveness = Liveness::new(50_000);
+        let times = [0, 5_000, 205_000, 230_000, 254_999];
         assert_eq!(dead_at(&mut liveness, times, 5, true), None);
-        assert_eq!(dead_at(&mut liveness, [265_000], 5, true), Some(265_000));
+        assert_eq!(dead_at(&mut liveness, [255_000], 5, true), Some(255_000));
     }
 
     #[test]
     fn a_worker_without_a_connection_is_dead_after_seconds() {
-        let mut liveness = Liveness::new(60_000);
+        let mut liveness = Liveness::new(50_000);
         assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
         let times = [2_500, 5_000, 9_499, 9_500];
         assert_eq!(dead_at(&mut liveness, times, 5, false), Some(9_500));
         // A worker that was never seen with a connection may be of an earlier version.
-        let mut liveness = Liveness::new(60_000);
-        let times = (0..60_000).step_by(2_500);
+        let mut liveness = Liveness::new(50_000);
+        let times = (0..50_000).step_by(2_500);
         assert_eq!(dead_at(&mut liveness, times, 5, false), None);
     }
 
     #[test]
     fn a_worker_that_connects_again_or_sends_a_heartbeat_lives() {
-        let mut liveness = Liveness::new(60_000);
+        let mut liveness = Liveness::new(50_000);
         assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
         assert_eq!(
             dead_at(&mut liveness, [1_000, 5_000, 7_000], 5, false),
@@ -169,7 +173,7 @@ mod tests {
 
     #[test]
     fn after_an_outage_only_workers_that_connected_again_are_dead_without_a_connection() {
-        let mut liveness = Liveness::new(60_000);
+        let mut liveness = Liveness::new(50_000);
         assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
         let times = [12_000, 17_000, 22_000, 27_000];
         assert_eq!(dead_at(&mut liveness, times, 5, false), None);

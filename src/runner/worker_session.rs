@@ -90,7 +90,7 @@ impl WorkerSession {
             })
             .await?;
         self.last_heartbeat = now;
-        let dead = DeadWorker::Workers(vec![expired]);
+        let dead = DeadWorker::Expired(expired);
         catalog
             .retry_while_unavailable(async || catalog.recover(dead.clone(), now).await)
             .await?;

@@ -63,6 +63,19 @@ impl Fleet {
         worker.expect("the binary starts")
     }
 
+    /// Returns the number of workers that others took for dead.
+    fn dead_workers(&self) -> i64 {
+        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+        runtime.block_on(async {
+            let conn = <sqlx::PgConnection as sqlx::Connection>::connect(self.server.url()).await;
+            let count = sqlx::query_scalar("SELECT count(*) FROM mocban.worker WHERE died = 1");
+            count
+                .fetch_one(&mut conn.expect("a connection"))
+                .await
+                .expect("a number")
+        })
+    }
+
     /// Asserts that the shared project is whole, and that its export and report are those of the project in a file.
     fn assert_same(&self) {
         self.shared(&["check"]).expect(0);
@@ -160,6 +173,35 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
     for mut worker in workers {
         assert!(worker.wait().expect("an exit code").success());
     }
+    fleet.assert_same();
+    fleet.assert_no_pair_is_left_or_quarantined();
+}
+
+/// While the server is away for longer than a lease, no worker can send a heartbeat. None of them is dead.
+#[test]
+fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
+    /// Leases last 5 seconds with [`TIME_SCALE`].
+    const OUTAGE: Duration = Duration::from_millis(6_500);
+    let Some(fleet) = Fleet::new("12") else {
+        return;
+    };
+    fleet.shared(&["plan"]).expect(0);
+    let workers = [(); 3].map(|()| fleet.worker());
+    let status = || fleet.shared(&["status", "--json"]).expect(0).json();
+    while status()["jobs"]["done"] == 0 {}
+    assert_ne!(status()["jobs"]["leased"], 0, "the work ended too early");
+    fleet.server.stop_at_once();
+    // Leases end by time alone, so there is no event to wait for.
+    std::thread::sleep(OUTAGE);
+    fleet.server.start_again();
+    for mut worker in workers {
+        assert!(worker.wait().expect("an exit code").success());
+    }
+    assert_eq!(
+        fleet.dead_workers(),
+        0,
+        "living workers were taken for dead"
+    );
     fleet.assert_same();
     fleet.assert_no_pair_is_left_or_quarantined();
 }

@@ -1,6 +1,6 @@
 //! Recovers leases of workers that died or hang, and quarantines pairs that kill workers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::json;
 
@@ -45,8 +45,10 @@ pub struct Recovered {
 /// Which workers are dead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeadWorker {
-    /// These workers.
-    Workers(Vec<WorkerId>),
+    /// These workers, as they were last seen. A worker that was heard of since is not dead.
+    Workers(Vec<LeaseHolder>),
+    /// The earlier id of this process, whose leases have expired.
+    Expired(WorkerId),
     /// All workers except this one, which holds the exclusive run lock.
     AllExcept(WorkerId),
 }
@@ -55,6 +57,11 @@ pub(crate) const HOLDERS: &str = "
 SELECT w.id, w.heartbeat, 1 AS is_connected FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1 UNION ALL SELECT worker FROM block_job WHERE status = 1)
 ORDER BY w.id";
+
+/// Selects the workers in `?1`, a list of `[worker, heartbeat]`, that have sent no other heartbeat.
+const STILL_SILENT: &str = "
+SELECT w.id FROM json_each(?1) AS seen CROSS JOIN worker AS w ON w.id = CAST(seen.value ->> 0 AS bigint)
+WHERE w.heartbeat = CAST(seen.value ->> 1 AS bigint)";
 
 /// Selects the given workers that hold leases. `died` is 1 if the worker did not end properly.
 pub(crate) const LEFT_BY: &str = "
@@ -247,8 +254,13 @@ async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
 /// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
 async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     match dead {
-        DeadWorker::Workers(workers) => {
-            let workers = json_array(workers.iter().map(|worker| worker.0));
+        DeadWorker::Workers(seen) => {
+            let workers = json_array(still_dead(conn, seen).await?.iter().map(|worker| worker.0));
+            query(DIED).bind(&workers).execute(conn).await?;
+            Ok(workers)
+        }
+        DeadWorker::Expired(worker) => {
+            let workers = json_array([worker.0]);
             query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
         }
@@ -257,6 +269,30 @@ async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
             holders_but(conn, *me).await
         }
     }
+}
+
+/// Returns the workers that sent no heartbeat since they were seen. One that was seen without a connection, and has one
+/// now, is left out too. Between the observation and this transaction, the catalog may have been unavailable or locked.
+async fn still_dead(conn: &mut Conn, seen: &[LeaseHolder]) -> Result<Vec<WorkerId>> {
+    let items = json_array(
+        seen.iter()
+            .map(|seen| json!([seen.worker.0, seen.heartbeat])),
+    );
+    let silent: Vec<i64> = query_scalar(STILL_SILENT)
+        .bind(items)
+        .fetch_all(&mut *conn)
+        .await?;
+    let unconnected = seen.iter().filter(|seen| !seen.is_connected);
+    let unconnected: Vec<WorkerId> = unconnected.map(|seen| seen.worker).collect();
+    let connected = if unconnected.is_empty() {
+        BTreeSet::new()
+    } else {
+        worker_lock::connected(conn, unconnected.into_iter()).await?
+    };
+    let silent = silent.into_iter().map(WorkerId);
+    Ok(silent
+        .filter(|worker| !connected.contains(worker))
+        .collect())
 }
 
 /// Returns the workers with leases except one, as a JSON array.

@@ -146,7 +146,9 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        let recover = world.catalog.recover(DeadWorker::Workers(vec![worker]), 60);
+        let holders = world.catalog.lease_holders().await.expect("a read");
+        assert_eq!(holders.len(), 1);
+        let recover = world.catalog.recover(DeadWorker::Workers(holders), 60);
         recover.await.expect("a recovery");
         world.assert_counters().await;
     }
@@ -154,6 +156,31 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
     let text = &failures[0].failure.failure.message;
     assert!(text.contains("3 workers died"), "{text}");
+}
+
+#[tokio::test]
+async fn a_worker_that_was_heard_of_since_it_was_seen_is_not_dead() {
+    let world = World::new(1).await;
+    let worker = register(&world.catalog).await;
+    let request = ClaimRequest::new(worker, 1, 1_000);
+    world.catalog.claim(request).await.expect("a claim");
+    let seen = world.catalog.lease_holders().await.expect("a read");
+    let heartbeat = world.catalog.heartbeat(worker, 500, 0, None);
+    assert!(heartbeat.await.expect("an answer"));
+    let recover = async |holders| {
+        let dead = DeadWorker::Workers(holders);
+        world
+            .catalog
+            .recover(dead, 600)
+            .await
+            .expect("a recovery")
+            .ready
+    };
+    assert_eq!(recover(seen).await, 0);
+    assert_eq!(status(&world, "p0").await, JobStatus::Leased);
+    let seen = world.catalog.lease_holders().await.expect("a read");
+    assert_eq!(recover(seen).await, 1);
+    world.assert_counters().await;
 }
 
 #[tokio::test]

@@ -37,10 +37,14 @@ impl Game {
         let other = self.dice.random_range(0..self.model.processes.len());
         let other = self.model.processes[other].worker;
         let recovered = if self.is_likely(0.5) && other != me {
-            let recover = self
-                .world
-                .catalog
-                .recover(DeadWorker::Workers(vec![other]), now);
+            let catalog = &self.world.catalog;
+            let mut holders = catalog.lease_holders().await.expect("a read");
+            holders.retain(|holder| holder.worker == other);
+            let dead = match holders.as_slice() {
+                [] => DeadWorker::Expired(other),
+                _ => DeadWorker::Workers(holders),
+            };
+            let recover = catalog.recover(dead, now);
             (recover.await, self.model.recover(&[other]))
         } else {
             if let Some(index) = self.somebody() {
