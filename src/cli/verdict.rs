@@ -137,9 +137,13 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         at: None,
     };
     let text = set_text(&new);
-    catalog.verdict_set(vec![new], now()).await?;
+    let stored = catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.info(&text);
+    context.info(if stored == 0 {
+        "already recorded"
+    } else {
+        &text
+    });
     Ok(ExitCode::Done)
 }
 

@@ -99,17 +99,25 @@ impl WriteConnection {
     }
 
     /// Connects again if the state of the connection is unknown.
-    pub(crate) async fn reconnect_if_broken(&mut self) {
+    ///
+    /// # Errors
+    /// Returns an error if the server refuses the connection.
+    pub(crate) async fn reconnect_if_broken(&mut self) -> Result<()> {
         if self.is_broken {
-            self.reconnect().await;
+            self.reconnect().await?;
         }
+        Ok(())
     }
 
     /// Connects again after the server was unavailable, and waits until it is available. Returns `false` if the catalog
-    /// is not on a server, if waits were ended, or if the server refuses the connection.
-    pub(crate) async fn reconnect(&mut self) -> bool {
+    /// is not on a server, or if waits were ended.
+    ///
+    /// # Errors
+    /// Returns an error if the server refuses the connection for a reason that waiting does not remove, such as a changed
+    /// password.
+    pub(crate) async fn reconnect(&mut self) -> Result<bool> {
         let Some(server) = &mut self.server else {
-            return false;
+            return Ok(false);
         };
         let mut attempt = 0;
         loop {
@@ -125,17 +133,11 @@ impl WriteConnection {
                         tracing::debug!(%error, "the worker's lock is taken later");
                     }
                     tracing::info!("connected to the database server again");
-                    return true;
+                    return Ok(true);
                 }
-                Err(error)
-                    if error.is_unavailable() && server.retry_wait.wait(attempt, &error).await =>
-                {
-                    attempt += 1;
-                }
-                Err(error) => {
-                    tracing::warn!(%error, "cannot connect to the database server again");
-                    return false;
-                }
+                Err(error) if !error.is_unavailable() => return Err(error),
+                Err(error) if server.retry_wait.wait(attempt, &error).await => attempt += 1,
+                Err(_) => return Ok(false),
             }
         }
     }
@@ -145,7 +147,7 @@ impl WriteConnection {
     /// # Errors
     /// Returns an error if a database operation fails.
     pub(crate) async fn keep_worker_lock(&mut self, worker: WorkerId) -> Result<()> {
-        self.reconnect_if_broken().await;
+        self.reconnect_if_broken().await?;
         loop {
             let Some(server) = &mut self.server else {
                 return Ok(());
@@ -154,7 +156,7 @@ impl WriteConnection {
             match server.state.worker_lock.take(&mut self.conn).await {
                 Err(error) if error.is_unavailable() => {
                     self.is_broken = true;
-                    if !self.reconnect().await {
+                    if !self.reconnect().await? {
                         return Err(error);
                     }
                 }
@@ -180,11 +182,14 @@ impl WriteConnection {
         work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>>,
     ) -> Result<T> {
         self.check_log().await?;
-        self.reconnect_if_broken().await;
+        self.reconnect_if_broken().await?;
         loop {
             let (conn, path, _) = self.parts();
             match retry_while_busy!(path, begin(conn).await) {
-                Err(error) if error.is_unavailable() && self.reconnect().await => {
+                Err(error) if error.is_unavailable() => {
+                    if !self.reconnect().await? {
+                        return Err(error);
+                    }
                     tracing::debug!(%error, "the transaction begins again");
                 }
                 begun => break begun?,

@@ -99,7 +99,7 @@ async fn commit(writer: &mut WriteConnection, batch: Batch) {
 
 async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply> {
     writer.check_log().await?;
-    writer.reconnect_if_broken().await;
+    writer.reconnect_if_broken().await?;
     let reply = loop {
         let (conn, path, mut server) = writer.parts();
         let reply = retry_while_busy!(path, {
@@ -114,7 +114,10 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
         });
         match reply {
             // What was stored before the connection broke is found when the batch is applied again.
-            Err(error) if error.is_unavailable() && writer.reconnect().await => {
+            Err(error) if error.is_unavailable() => {
+                if !writer.reconnect().await? {
+                    break Err(error);
+                }
                 tracing::debug!(%error, "the commit is tried again");
             }
             reply => break reply,

@@ -111,12 +111,21 @@ SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4,
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING id, act";
 
-/// Returns whether a verdict with an id up to `?1` has the same values and was not undone.
+/// Returns whether a verdict with an id up to `?9` has the same values and was not undone.
 const IS_STORED: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict AS v
-    WHERE v.pair = ?2 AND v.metric = ?3 AND v.reviewer = ?4 AND v.id <= ?1 AND v.at = ?5 AND v.result_hash = ?6
-    AND v.verdict = ?7 AND v.reason IS NOT DISTINCT FROM ?8 AND v.note IS NOT DISTINCT FROM ?9
+    WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
+    AND v.verdict = ?5 AND v.reason IS NOT DISTINCT FROM ?6 AND v.note IS NOT DISTINCT FROM ?7
+    AND v.at = ?8 AND v.id <= ?9
     AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act))";
+
+/// Returns whether the reviewer's newest verdict on a result that was not undone has the same values.
+const IS_NEWEST: &str = "
+SELECT EXISTS (SELECT 1 FROM (SELECT v.verdict, v.reason, v.note FROM verdict AS v
+        WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+        ORDER BY v.id DESC LIMIT 1) AS last
+    WHERE last.verdict = ?5 AND last.reason IS NOT DISTINCT FROM ?6 AND last.note IS NOT DISTINCT FROM ?7)";
 
 /// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
 /// that many rows.
@@ -137,7 +146,8 @@ ORDER BY v.pair, v.metric, v.reviewer, v.id";
 impl Catalog {
     /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
     /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
-    /// this call. Returns the number of verdicts of which a row was appended.
+    /// this call. Skips a verdict without `at` if it equals the reviewer's newest one. So a list that is imported twice is
+    /// stored once. Returns the number of verdicts of which a row was appended.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
@@ -218,8 +228,8 @@ impl Catalog {
     }
 }
 
-/// Appends a verdict. Returns `false` if all its rows are already stored. Compares the values only with rows up to the
-/// id `newest`, so that two equal verdicts of one call are both stored.
+/// Appends a verdict. Returns `false` if all its rows are already stored. Compares a verdict with a time only with rows up
+/// to the id `newest`, so that two equal ones of one call are both stored.
 async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis) -> Result<bool> {
     let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = query_as(JUDGED)
         .bind(new.pair.as_str())
@@ -249,24 +259,31 @@ async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis)
     }
 }
 
-/// Returns whether an equal verdict with the same time is among the rows up to `newest`.
+/// Returns whether a verdict is stored already: one with the same values and time among the rows up to `newest`, or, if it
+/// has no time, the reviewer's newest one on the result. A verdict with an angle and without a time is always new.
 async fn is_stored(
     conn: &mut Conn,
     new: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
     newest: i64,
 ) -> Result<bool> {
-    let Some(at) = new.at else { return Ok(false) };
-    let stored = query_scalar(IS_STORED)
-        .bind(newest)
+    let sql = match new.at {
+        Some(_) => IS_STORED,
+        None if new.look.angle_read_deg.is_some() => return Ok(false),
+        None => IS_NEWEST,
+    };
+    let stored = query_scalar(sql)
         .bind(pair)
         .bind(metric.name())
         .bind(&new.reviewer)
-        .bind(at)
         .bind(&result_hash.as_bytes()[..])
         .bind(new.verdict.name())
         .bind(new.reason.map(Reason::name))
         .bind(&new.note);
+    let stored = match new.at {
+        Some(at) => stored.bind(at).bind(newest),
+        None => stored,
+    };
     stored.fetch_one(conn).await
 }
 

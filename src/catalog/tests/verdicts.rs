@@ -59,6 +59,32 @@ async fn the_newest_verdict_of_each_reviewer_counts() {
 }
 
 #[tokio::test]
+async fn a_verdict_without_a_time_that_equals_the_newest_is_not_stored_again() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let set = async |given: &[Verdict]| {
+        let given = given.iter().map(|given| verdict("ana", *given)).collect();
+        world.catalog.verdict_set(given, 5).await.expect("stored")
+    };
+    for (given, stored, newest) in [
+        (&[Verdict::Pass] as &[_], 1, Verdict::Pass),
+        (&[Verdict::Pass], 0, Verdict::Pass),
+        (&[Verdict::Fail, Verdict::Pass], 2, Verdict::Pass),
+        (&[Verdict::Fail, Verdict::Pass], 2, Verdict::Pass),
+        (&[Verdict::Pass, Verdict::Fail], 1, Verdict::Fail),
+    ] {
+        assert_eq!(set(given).await, stored, "{given:?}");
+        assert_eq!(counted(&world.catalog).await, [("ana".to_owned(), newest)]);
+    }
+    world
+        .catalog
+        .verdict_undo(Some("ana"), 6)
+        .await
+        .expect("undone");
+    assert_eq!(set(&[Verdict::Fail]).await, 1);
+}
+
+#[tokio::test]
 async fn undo_affects_the_newest_act_and_the_log_keeps_both() {
     let world = World::new(1).await;
     world.finish_one().await;
