@@ -1,7 +1,7 @@
 // The guide: when to pass, with example pictures.
 
 import { translate } from "./config.js";
-import { images } from "./image-cache.js";
+import { exampleImages } from "./image-cache.js";
 import { alert } from "./ui.js";
 
 const dialog = document.getElementById("guide");
@@ -9,7 +9,7 @@ const dialog = document.getElementById("guide");
 /** Draws the print with the outline of the relief, as the viewer does. */
 async function draw(figure) {
   const canvas = figure.querySelector("canvas");
-  const layers = await images(`example-${figure.dataset.example}`).loading;
+  const layers = await exampleImages(figure.dataset.example);
   [canvas.width, canvas.height] = [layers.width, layers.height];
   const context = canvas.getContext("2d");
   context.drawImage(layers.print, 0, 0);

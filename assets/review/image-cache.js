@@ -46,6 +46,21 @@ export function images(id) {
   return entry;
 }
 
+const exampleCache = new Map();
+
+/**
+ * Returns a promise of the images of an example; they are requested once. All of them stay in memory, because they are few,
+ * and because the guide shows them all at once while the image behind it must not be freed.
+ */
+export function exampleImages(name) {
+  if (!exampleCache.has(name)) {
+    const loading = render("item", `example-${name}`);
+    exampleCache.set(name, loading);
+    loading.catch(() => exampleCache.delete(name));
+  }
+  return exampleCache.get(name);
+}
+
 /** Frees the memory of bitmaps at once instead of at the next garbage collection. */
 function close(value) {
   if (value instanceof ImageBitmap) value.close();

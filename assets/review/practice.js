@@ -1,7 +1,7 @@
 // The practice round: examples with known answers in the viewer. Nothing is stored.
 
 import { examples, REASONS, translate } from "./config.js";
-import { images } from "./image-cache.js";
+import { exampleImages } from "./image-cache.js";
 import * as ui from "./ui.js";
 
 /** Actions without meaning for an example. */
@@ -30,7 +30,7 @@ export class Practice {
     this.viewer.clear();
     ui.practice(this.index, this.examples.length, translate("practice_ask"), false);
     this.refresh();
-    const layers = await images(`example-${example.name}`).loading.catch((error) => {
+    const layers = await exampleImages(example.name).catch((error) => {
       ui.alert(translate("no_image", { why: error.message }));
     });
     if (!layers || this.current !== example) return;

@@ -104,6 +104,24 @@ fn a_new_reviewer_sees_the_guide_and_practises() {
     });
 }
 
+/// The guide and the prefetched images are more than the page keeps of the results.
+#[test]
+fn the_image_behind_the_guide_can_be_drawn_again() {
+    let options = [&PLAIN[1..], &["--metric", "density", "--sample", "2"]].concat();
+    on_a_page_of(read_project, &options, [1440, 900], |_, tab| {
+        tab.wait("document.querySelectorAll('#guide figure[data-drawn]').length === 9");
+        tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+        tab.key("Escape");
+        tab.wait("!document.querySelector('#guide[open]')");
+        let canvas = || tab.eval("document.getElementById('canvas').toDataURL()");
+        let before = canvas();
+        tab.key("BracketLeft");
+        assert_ne!(canvas(), before);
+        tab.key("BracketRight");
+        assert_eq!(canvas(), before);
+    });
+}
+
 #[test]
 fn the_end_page_sums_up_and_names_the_next_commands() {
     let Some(browser) = Browser::start() else {
@@ -120,7 +138,7 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         "--min-view-ms",
         "0",
     ];
-    for reviewer in ["bo", "lan"] {
+    for (reviewer, key) in [("bo", "KeyF"), ("lan", "KeyF"), ("minh", "KeyP")] {
         let page = Page::start(&project, reviewer, &options);
         let tab = enter(&browser, &page, [1366, 660]);
         let all = tab
@@ -129,19 +147,27 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
             .expect("a count");
         assert!(all >= 8.0, "three results and five attention checks: {all}");
         for _ in 1..all as usize {
-            judge(&tab, "KeyF");
+            judge(&tab, key);
         }
         tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
-        tab.key("KeyF");
+        tab.key(key);
         tab.wait("document.getElementById('end').dataset.ready");
         tab.screenshot(&format!("end-{reviewer}"));
         let text = tab.eval("document.getElementById('end').innerText");
         let text = text.as_str().expect("a text");
+        let (counts, noticed) = if key == "KeyF" {
+            ("0 passed, 3 failed", 5)
+        } else {
+            ("3 passed, 0 failed", 0)
+        };
         assert!(
-            text.contains("3 results judged: 0 passed, 3 failed, 0 unsure"),
+            text.contains(&format!("3 results judged: {counts}, 0 unsure")),
             "{text}"
         );
-        assert!(text.contains("5 of 5 attention checks noticed"), "{text}");
+        let noticed_text = format!("{noticed} of 5 attention checks noticed");
+        assert!(text.contains(&noticed_text), "{text}");
+        let missed = text.contains("Most attention checks were missed");
+        assert_eq!(missed, noticed == 0, "{text}");
         assert!(text.contains("report -f html -o report.html"), "{text}");
         let agrees = text.contains("3 of 3 answers are the same as those of bo");
         assert_eq!(agrees, reviewer == "lan", "{text}");
