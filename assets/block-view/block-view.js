@@ -2,7 +2,7 @@
 
 import { followPage, PageCamera } from "./block-camera.js";
 import { blockText } from "./block-messages.js";
-import { preferredLanguage } from "./scan-messages.js";
+import { localNumber, preferredLanguage } from "./scan-messages.js";
 import { element } from "./scan-panel.js";
 import { mountScanViewer } from "./scan-viewer.js";
 
@@ -26,7 +26,7 @@ function svg(tag, attributes) {
 
 /** Returns the words that describe a character, its pair and its result. */
 function description(one) {
-  const shown = (key, value) => (value === null ? [] : [text(key, { value: value.toFixed(2) })]);
+  const shown = (key, value) => (value === null ? [] : [text(key, { value: localNumber(value, 2) })]);
   return [
     one.character && one.character !== one.label ? `${one.label} ${one.character}` : one.label,
     text(one.status), ...shown("confidence", one.confidence), ...shown("iou", one.iou),

@@ -188,8 +188,8 @@ export class AlignmentEditor {
   summary() {
     const { iou, dice } = this.scores;
     return [
-      `${translate("iou")} ${iou.toFixed(3)}`,
-      `${translate("dice")} ${dice.toFixed(3)}`,
+      `${translate("iou")} ${fixed(iou, 3)}`,
+      `${translate("dice")} ${fixed(dice, 3)}`,
       translate("rotated_by", { deg: fixed(this.rotation, 2) }),
     ].join(" · ");
   }

@@ -9,7 +9,7 @@ export async function showDetails(item) {
   const response = await fetch(`/api/details/${item.id}`);
   if (!response.ok) return ui.announce(translate("answer_first"));
   const { pair, metrics, iou, dice, others } = await response.json();
-  const number = (value) => value.toFixed(3);
+  const number = (value) => ui.fixed(value, 3);
   const verdicts = others.map((other) => `${other.reviewer}: ${ui.answerText(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
     pair,

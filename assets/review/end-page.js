@@ -34,6 +34,7 @@ function lines({ results, reviewer, others }) {
 /** Shows a heading, and the summary once the server has it. */
 export async function showEnd(heading, hasItems) {
   element.hidden = false;
+  document.body.classList.add("ended");
   element.replaceChildren(create("h2", heading));
   if (!hasItems) return;
   // Without a connection, or before the last answer is stored, there is no summary yet.
@@ -42,7 +43,7 @@ export async function showEnd(heading, hasItems) {
   const summary = await response.json();
   const command = (text) => create("code", `mocban -C ${quoted(summary.project)} ${text}`);
   element.replaceChildren(
-    create("h2", heading),
+    create("h2", translate("summary")),
     create("ul", "", ...lines(summary).map((text) => create("li", text))),
     create("h3", translate("next_steps")),
     create("p", `${translate("next_report")} `, command("report -f html -o report.html")),
@@ -53,5 +54,6 @@ export async function showEnd(heading, hasItems) {
 
 export function hideEnd() {
   element.hidden = true;
+  document.body.classList.remove("ended");
   delete element.dataset.ready;
 }

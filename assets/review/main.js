@@ -78,7 +78,6 @@ function display(item, layers, pressedAt) {
     if (queue.current !== item) return;
     shownAt = performance.now();
     if (pressedAt) document.body.dataset.paintMs = String(Math.round(shownAt - pressedAt));
-    ui.paintTime(pressedAt ? translate("painted", { ms: document.body.dataset.paintMs }) : "");
     updateSurroundings(item, layers);
     document.body.dataset.shown = item.id;
     prefetch(item);
@@ -135,7 +134,7 @@ function refresh() {
 /** Returns the text below the image, apart from the legend. */
 function caption() {
   if (editor) return editor.summary();
-  if (viewer.rotation) return translate("rotated_by", { deg: viewer.rotation.toFixed(2) });
+  if (viewer.rotation) return translate("rotated_by", { deg: ui.fixed(viewer.rotation, 2) });
   const alignment = viewer.layers && queue.current?.manual_alignment;
   return alignment ? ui.alignmentText(alignment) : "";
 }
@@ -247,7 +246,7 @@ async function saveAlignment() {
   if (!editor || editor.item !== item) return;
   const stored = await requests.push("/api/align", editor.body(crypto.randomUUID(), note));
   item.manual_alignment = { ...stored, map };
-  ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${stored.iou.toFixed(3)}, ${translate("dice")} ${stored.dice.toFixed(3)}`);
+  ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${ui.fixed(stored.iou, 3)}, ${translate("dice")} ${ui.fixed(stored.dice, 3)}`);
   closeEditor();
 }
 

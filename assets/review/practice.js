@@ -7,6 +7,9 @@ import * as ui from "./ui.js";
 /** Actions without meaning for an example. */
 const UNUSED = new Set(["undo", "note", "previous", "jump", "details", "align", "scan_view"]);
 
+/** Share of correct answers below which another round is suggested. */
+const MIN_RIGHT = 0.8;
+
 export class Practice {
   /** Shows the first example. `refresh` updates the buttons; `onEnd` is called after the last example or a skip. */
   constructor(viewer, refresh, onEnd) {
@@ -57,7 +60,9 @@ export class Practice {
     const isRight = this.answer.verdict === expected.verdict;
     if (isRight) this.rightCount += 1;
     const values = { answer: ui.answerText(expected), why: translate(`why_${name}`) };
-    const text = isRight ? translate("practice_right", values) : translate("practice_wrong", values);
+    const isOtherReason = isRight && reason && reason !== expected.reason;
+    const key = isOtherReason ? "practice_other_reason" : isRight ? "practice_right" : "practice_wrong";
+    const text = translate(key, values);
     ui.practice(this.index, this.examples.length, text, true);
     this.refresh();
   }
@@ -74,6 +79,7 @@ export class Practice {
     this.index = all;
     ui.endPractice();
     this.onEnd();
-    ui.announce(translate("practice_done", { right, all }));
+    const key = right < MIN_RIGHT * all ? "practice_done_again" : "practice_done";
+    ui.announce(translate(key, { right, all }));
   }
 }

@@ -73,14 +73,17 @@ export function answerText(answer) {
   return `${translate(answer.verdict)}${reason}`;
 }
 
-/** Formats a number with a fixed number of digits, without a sign on zero. */
-export const fixed = (value, digits) => value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
+/** Formats a number with a fixed number of digits, without a sign on zero, in the language of the page. */
+export const fixed = (value, digits) =>
+  value
+    .toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: false })
+    .replace(/^-(0([.,]0*)?)$/, "$1");
 
 /** Returns a manual alignment as text. */
 export function alignmentText({ reviewer, rotation_deg: deg, shift_px: [x, y], scale, mirrored, iou }) {
   return translate("aligned_by", {
-    reviewer, deg: fixed(deg, 1), px: Math.hypot(x, y).toFixed(1), scale: scale.toFixed(3),
-    mirrored: mirrored ? translate("and_mirrored") : "", iou: iou.toFixed(3),
+    reviewer, deg: fixed(deg, 1), px: fixed(Math.hypot(x, y), 1), scale: fixed(scale, 3),
+    mirrored: mirrored ? translate("and_mirrored") : "", iou: fixed(iou, 3),
   });
 }
 
@@ -128,8 +131,6 @@ export function hint(text) {
   byId("hint").textContent = text;
   byId("hint").hidden = text === "";
 }
-
-export const paintTime = (text) => (byId("paint-time").textContent = text);
 
 /** Announces a text in the live region, for screen readers too. */
 export const announce = (text) => (byId("live").textContent = text);
@@ -183,7 +184,7 @@ export function askPair(names, go) {
 /** Asks whether an alignment that agrees less with the print is saved; resolves with the answer. */
 export function confirmWorse(before, after) {
   const dialog = byId("confirm");
-  const values = { before: before.toFixed(3), after: after.toFixed(3) };
+  const values = { before: fixed(before, 3), after: fixed(after, 3) };
   byId("confirm-text").textContent = translate("worse_alignment", values);
   dialog.returnValue = "";
   dialog.showModal();

@@ -34,9 +34,15 @@ const SCAN_MESSAGES = {
   no_data: { en: "The scan cannot be displayed: {why}", vi: "Không hiển thị được bản quét: {why}" },
 };
 
-/** Returns the language of the browser, or English if it is not supported. */
+/** Returns the first supported language of the browser, or English if there is none. */
 export function preferredLanguage() {
-  return navigator.languages?.some((language) => language.startsWith("vi")) ? "vi" : "en";
+  return navigator.languages?.find((language) => /^(vi|en)\b/.test(language))?.slice(0, 2) ?? "en";
+}
+
+/** Formats a number with a fixed number of digits in the language of the page. */
+export function localNumber(value, digits = 0) {
+  const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+  return value.toLocaleString(document.documentElement.lang || "en", format);
 }
 
 /** Returns a text with `{name}` replaced by the values. */

@@ -1,5 +1,7 @@
 // The controls beside the scan: sliders, switches, and a disc that moves the light.
 
+import { localNumber } from "./scan-messages.js";
+
 /** Settings at the start. The light comes from the upper left. */
 export function initialSettings({ threshold, writing_is_mirrored: isMirrored }) {
   return {
@@ -27,7 +29,7 @@ export class ScanPanel {
     const [low, high] = header.height_range;
     const fine = 10 ** Math.floor(Math.log10(Math.max(high - low, 1e-9) / 100));
     const digits = Math.max(0, Math.ceil(-Math.log10(fine)));
-    this.heightText = (value) => `${value.toFixed(digits)} ${unit}`.trim();
+    this.heightText = (value) => `${localNumber(value, digits)} ${unit}`.trim();
     this.slider("ink", text("colour"), 0, 1, 0.01, (value) => `${Math.round(100 * value)} %`);
     this.lightPad();
     this.slider("lightDirection", text("light_direction"), 0, 360, 5, (value) => `${value}°`);

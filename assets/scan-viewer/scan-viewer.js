@@ -1,6 +1,6 @@
 // The 3D view of a scan: canvas, controls and keys. `view`, the review page and exported pages show it.
 
-import { preferredLanguage, scanText } from "./scan-messages.js";
+import { localNumber, preferredLanguage, scanText } from "./scan-messages.js";
 import { decodeScan } from "./scan-data.js";
 import { followPointers } from "./scan-orbit.js";
 import { ScanScene } from "./scan-scene.js";
@@ -74,9 +74,9 @@ class MountedScan {
   summary() {
     const { triangles, vertices, source_elements: source, unit } = this.scan.header;
     const count = triangles || vertices;
-    const shown = this.text(triangles ? "triangles" : "points", { n: count.toLocaleString() });
+    const shown = this.text(triangles ? "triangles" : "points", { n: localNumber(count) });
     const step = this.text("grid_step", { step: `${this.scene.gridStep} ${unit ?? ""}`.trim() });
-    const from = count < source ? [this.text("simplified", { n: source.toLocaleString() })] : [];
+    const from = count < source ? [this.text("simplified", { n: localNumber(source) })] : [];
     return [shown, ...from, step].join(" · ");
   }
 

@@ -134,15 +134,12 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
         _ => None,
     };
     let tip = match error.kind() {
-        ErrorKind::InvalidSubcommand => word(ContextKind::InvalidSubcommand)
-            .filter(|word| Path::new(word).is_dir())
-            .map(|folder| {
-                let folder = shell_quoted(&folder);
-                format!("{folder} is a folder; name it with -C, as in: mocban -C {folder} status")
-            }),
-        ErrorKind::UnknownArgument => word(ContextKind::InvalidArg)
-            .filter(|word| !word.starts_with('-'))
-            .map(|_| "put a name or path with spaces in quotes, as in: \"block 4\"".to_owned()),
+        ErrorKind::InvalidSubcommand => {
+            word(ContextKind::InvalidSubcommand).and_then(|word| command_tip(&word))
+        }
+        ErrorKind::UnknownArgument => {
+            word(ContextKind::InvalidArg).and_then(|word| argument_tip(&word))
+        }
         _ => None,
     };
     if let Some(tip) = tip {
@@ -153,6 +150,31 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
     }
     error
 }
+
+/// Returns a tip on a word where a command is expected.
+fn command_tip(word: &str) -> Option<String> {
+    if let Some(option) = word.strip_prefix(LONG_DASHES) {
+        return Some(format!(
+            "type a hyphen instead of the dash, as in: -{option}"
+        ));
+    }
+    Path::new(word).is_dir().then(|| {
+        let folder = shell_quoted(word);
+        format!("{folder} is a folder; name it with -C, as in: mocban -C {folder} status")
+    })
+}
+
+/// Returns a tip on a word or option that is not expected.
+fn argument_tip(word: &str) -> Option<String> {
+    if ["-c", "--C", "--directory"].contains(&word) {
+        return Some("the folder of a project is named with a capital -C".to_owned());
+    }
+    let is_word = !word.starts_with('-');
+    is_word.then(|| "put a name or path with spaces in quotes, as in: \"block 4\"".to_owned())
+}
+
+/// Dashes that word processors write instead of hyphens.
+const LONG_DASHES: [char; 3] = ['\u{2012}', '\u{2013}', '\u{2014}'];
 
 /// Counts `-v`. Only for a command line that clap has accepted: in such a line, no value starts with a dash.
 fn count_verbose(args: &[OsString]) -> u8 {
@@ -240,6 +262,10 @@ mod tests {
         assert!(folder.contains("mocban -C src status"), "{folder}");
         let spaces = error("mocban verdict set block 4 pass --reviewer lan");
         assert!(spaces.contains("spaces in quotes"), "{spaces}");
+        let dash = error("mocban \u{2013}C blocks status");
+        assert!(dash.contains("as in: -C"), "{dash}");
+        let small = error("mocban -c blocks status");
+        assert!(small.contains("capital -C"), "{small}");
         let plain = error("mocban report --fomat html");
         assert!(plain.contains("'--format'"), "{plain}");
     }

@@ -92,6 +92,9 @@ pub(super) async fn contact_sheet(
     })
 }
 
+/// Maximum number of incomplete pairs that are named.
+const MAX_WARNINGS: usize = 5;
+
 /// Draws the sheet, writes it and returns its path.
 ///
 /// # Errors
@@ -124,8 +127,14 @@ pub(super) async fn write(
         let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
         return Err(Refusal::NothingSelected(text).into());
     }
-    for (pair, why) in &sheet.problems {
+    for (pair, why) in sheet.problems.iter().take(MAX_WARNINGS) {
         context.warn(&format!("{pair} is not drawn completely: {why}"));
+    }
+    if let Some(more) = sheet.problems.len().checked_sub(MAX_WARNINGS + 1) {
+        let pairs = count(more as u64 + 1, "more pair");
+        context.warn(&format!(
+            "{pairs} not drawn completely; `check` lists all missing files"
+        ));
     }
     let is_complete = args.allow_missing || sheet.problems.is_empty();
     files::write_output(&path, &png_rgb8(&sheet.picture), is_complete)?;

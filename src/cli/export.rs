@@ -287,6 +287,9 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         summary.pairs.without_result
     ));
     context.info(&explanation(args));
+    if summary.pairs.done == 0 && summary.pairs.without_result > 0 {
+        context.next("run");
+    }
     if let Some(counts) = &summary.split {
         let [train, validation, test] = counts.pairs;
         context.info(&format!(

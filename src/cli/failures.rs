@@ -13,6 +13,14 @@ const READ_LIMIT: usize = 200;
 const NAME_LIMIT: usize = 3;
 const NO_LIMIT: usize = i64::MAX as usize;
 
+/// Returns whether a failure of a class may not occur again with the same files and settings.
+pub(super) const fn may_succeed_unchanged(class: FailureClass) -> bool {
+    match class {
+        FailureClass::Io | FailureClass::Resource | FailureClass::Bug => true,
+        FailureClass::BadInput | FailureClass::NoSolution => false,
+    }
+}
+
 /// The failed pairs of a project.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Failures {
@@ -43,6 +51,12 @@ impl Failures {
             names_per_class,
             blocks: BlockStatus::read(catalog, all).await?,
         })
+    }
+
+    /// Returns whether a failed pair may succeed with the same files and settings. A run finds changed ones itself.
+    pub(super) fn may_succeed_unchanged(&self) -> bool {
+        let mut classes = self.counts.iter().map(|(class, _)| *class);
+        classes.any(may_succeed_unchanged)
     }
 
     /// Returns the first failed pair.

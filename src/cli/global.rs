@@ -2,14 +2,29 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{ArgAction, Args, ColorChoice, ValueEnum};
+
+use super::input_paths::is_windows_path;
+
+/// Parses the project's directory. Refuses a path of a Windows computer elsewhere: a folder with such a name would be
+/// created in the current one.
+fn project_folder(path: PathBuf) -> Result<PathBuf, String> {
+    if is_windows_path(&path) {
+        return Err(
+            "this is a path of a Windows computer; write the path that the folder has here"
+                .to_owned(),
+        );
+    }
+    Ok(path)
+}
 
 /// Flags of every command.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Global options")]
 pub(super) struct Global {
     /// The project's directory [default: the current one]
-    #[arg(short = 'C', value_name = "DIR", global = true)]
+    #[arg(short = 'C', value_name = "DIR", global = true, value_parser = PathBufValueParser::new().try_map(project_folder))]
     pub(super) directory: Option<PathBuf>,
     /// Read settings from this file instead of the project's mocban.toml; "default" and "paper" are built in
     #[arg(long, value_name = "FILE", global = true)]

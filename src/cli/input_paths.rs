@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use unicode_normalization::UnicodeNormalization as _;
+use unicode_normalization::char::is_combining_mark;
 
 /// Replaces the path of a file whose name is written differently in a list by its path on disk: with the other Unicode
 /// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), or without the
@@ -46,11 +47,47 @@ fn in_any_form(path: &Path) -> Option<PathBuf> {
     Some(found)
 }
 
+/// Largest number of entries of a folder that are compared with the name of a missing file.
+const MAX_ENTRIES: usize = 10_000;
+
+/// Returns the name of a file in the folder of a missing file that differs from it only in accents or in upper and lower
+/// case.
+pub(super) fn similar_file(missing: &Path) -> Option<String> {
+    let wanted = plain_letters(missing.file_name()?.to_str()?);
+    let entries = std::fs::read_dir(missing.parent()?).ok()?;
+    let names = entries.take(MAX_ENTRIES).flatten();
+    let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    names.find(|name| plain_letters(name) == wanted)
+}
+
+/// Returns a name in lower case and without accents, so that `Khoi-4` is similar to `khối-4`.
+pub(super) fn plain_letters(name: &str) -> String {
+    let letters = name.nfd().filter(|c| !is_combining_mark(*c));
+    let letters = letters.map(|c| match c {
+        'đ' | 'Đ' => 'd',
+        c => c,
+    });
+    letters.collect::<String>().to_lowercase()
+}
+
+/// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
+/// The path of a list's folder may stand before it.
+pub(super) fn is_windows_path(path: &Path) -> bool {
+    let mut parts = path
+        .components()
+        .map(|part| part.as_os_str().as_encoded_bytes());
+    let is_absolute = |part: &[u8]| {
+        matches!(part, [letter, b':'] | [letter, b':', b'\\', ..] if letter.is_ascii_alphabetic())
+            || part.starts_with(br"\\")
+    };
+    cfg!(not(windows)) && parts.any(is_absolute)
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
 
-    use super::find_on_disk;
+    use super::{find_on_disk, similar_file};
 
     #[test]
     fn other_unicode_forms_and_backslashes_are_found() {
@@ -72,5 +109,15 @@ mod tests {
         let mut path = other.clone();
         assert!(!find_on_disk(&mut path).expect("readable"));
         assert_eq!(path, other);
+    }
+
+    #[test]
+    fn a_file_with_other_accents_is_similar() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        fs::write(dir.path().join("chữ số 1.stl"), "").expect("written");
+        let similar = |name: &str| similar_file(&dir.path().join(name));
+        assert_eq!(similar("Chu so 1.stl").as_deref(), Some("chữ số 1.stl"));
+        assert_eq!(similar("chu so 2.stl"), None);
+        assert_eq!(similar("missing/chu so 1.stl"), None);
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::find_on_disk;
+use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
 use crate::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use crate::manifest::{
@@ -130,11 +130,21 @@ impl Listing {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
         };
+        // A search for a similar name lists a folder, so only the first missing files get one.
+        let mut searches = MAX_SEARCHES;
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
             let missing = files
-                .filter_map(|(kind, path)| locate_file(place, kind, path, &row.name, project))
+                .filter_map(|(kind, path)| {
+                    let text = locate_file(place, kind, path, &row.name, project)?;
+                    let similar = (searches > 0).then(|| similar_file(path)).flatten();
+                    searches = searches.saturating_sub(1);
+                    Some(match similar {
+                        Some(name) => format!("{text}; there is {name}"),
+                        None => text,
+                    })
+                })
                 .collect();
             each(row, missing);
         };
@@ -193,6 +203,9 @@ impl SimilarIds {
     }
 }
 
+/// Maximum number of missing files for which a similar name is searched.
+const MAX_SEARCHES: usize = 10;
+
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
 
@@ -217,19 +230,6 @@ pub(super) fn locate_file(
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
     Some(format!("{label} {line}: {kind} {path} of {name} {problem}"))
-}
-
-/// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
-/// The path of a list's folder may stand before it.
-fn is_windows_path(path: &Path) -> bool {
-    let mut parts = path
-        .components()
-        .map(|part| part.as_os_str().as_encoded_bytes());
-    let is_absolute = |part: &[u8]| {
-        matches!(part, [letter, b':'] | [letter, b':', b'\\', ..] if letter.is_ascii_alphabetic())
-            || part.starts_with(br"\\")
-    };
-    cfg!(not(windows)) && parts.any(is_absolute)
 }
 
 /// Returns `ignored, mesh without print: a.stl, b.stl and 3 more`.
@@ -292,6 +292,12 @@ mod tests {
         assert_eq!(missing.len(), 1);
         assert!(
             missing[0].contains("pairs.csv: line 2: mesh "),
+            "{missing:?}"
+        );
+        std::fs::write(dir.path().join("Á.stl"), "").expect("written");
+        listing.rows(&Project::at(dir.path()), |_, lines| missing.extend(lines));
+        assert!(
+            missing[1].ends_with(" does not exist; there is Á.stl"),
             "{missing:?}"
         );
         let refused = Listing::from_file(dir.path()).expect_err("a directory");

@@ -6,7 +6,7 @@ use crate::domain::JobStatus;
 use crate::store::Project;
 
 /// What the user sees, without the label.
-pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; `check --repair` lets the next run compute them again";
+pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; if the scans and prints are at their places, `check --repair` lets the next run compute them again (`restore --inputs DIR` finds them elsewhere)";
 
 /// The command that helps.
 pub(super) const NEXT: &str = "check --repair";

@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use unicode_normalization::UnicodeNormalization as _;
-use unicode_normalization::char::is_combining_mark;
-
+use super::input_paths::plain_letters;
 use crate::config::nearest;
 use crate::store::CATALOG_FILE;
 
@@ -51,16 +49,6 @@ fn projects_in(folder: &Path) -> Vec<PathBuf> {
         .collect();
     projects.sort();
     projects
-}
-
-/// Returns a name in lower case and without accents, so that `Khoi-4` is similar to `khối-4`.
-fn plain_letters(name: &str) -> String {
-    let letters = name.nfd().filter(|c| !is_combining_mark(*c));
-    let letters = letters.map(|c| match c {
-        'đ' | 'Đ' => 'd',
-        c => c,
-    });
-    letters.collect::<String>().to_lowercase()
 }
 
 #[cfg(test)]

@@ -96,7 +96,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
-    let language = args.lang.unwrap_or_else(language_of_system);
+    let language = args.lang.or_else(language_of_system);
     let options = ReviewOptions {
         listen: SocketAddr::new(
             args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
@@ -221,15 +221,13 @@ fn announce(
     Ok(if is_for_script { None } else { open(&url) })
 }
 
-/// Returns Vietnamese if the locale is Vietnamese, otherwise English.
-fn language_of_system() -> Language {
+/// Returns Vietnamese if the locale is Vietnamese. Otherwise, the browser decides.
+fn language_of_system() -> Option<Language> {
     let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
     let set = names.iter().filter_map(|name| std::env::var(name).ok());
     let mut set = set.filter(|value| !value.is_empty());
-    match set.next() {
-        Some(value) if value.starts_with("vi") => Language::Vietnamese,
-        Some(_) | None => Language::English,
-    }
+    let locale = set.next()?;
+    locale.starts_with("vi").then_some(Language::Vietnamese)
 }
 
 #[cfg(test)]

@@ -77,7 +77,9 @@ pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<Strin
     }
     if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
-        steps.push("retry".to_owned());
+        if failures.may_succeed_unchanged() {
+            steps.push("retry".to_owned());
+        }
     }
     if jobs(JobStatus::Done) > 0 && !summary.stopped {
         steps.extend(review_step(&summary.status));

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::context::{Context, shell_quoted};
 use super::exit::{ExitCode, Refusal};
+use super::failures::may_succeed_unchanged;
 use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
@@ -102,6 +103,9 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     lines.push(palette.paint(Tone::Strong, "next run"));
     lines.push(match (why, detail.results.status) {
         (Some(entry), _) => format!("  from {}: {entry}", entry.from),
+        (None, JobStatus::Quarantined) if !may_retry(detail) => {
+            "  nothing until a file, a value of its list or a setting is corrected; then `run` computes it again".to_owned()
+        }
         (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
         (None, JobStatus::Leased) => "  running now".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {
@@ -116,9 +120,16 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     lines.join("\n")
 }
 
+/// Returns whether a failed pair may succeed with the same files and settings.
+fn may_retry(detail: &PairDetail) -> bool {
+    let failure = detail.results.failure.as_ref();
+    failure.is_none_or(|stored| may_succeed_unchanged(stored.failure.class))
+}
+
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
     let name = shell_quoted(detail.results.attributes.name.as_str());
     match detail.results.status {
+        JobStatus::Quarantined if !may_retry(detail) => Vec::new(),
         JobStatus::Quarantined => vec![format!("retry {name}")],
         JobStatus::Leased => vec!["status --watch".to_owned()],
         JobStatus::Ready | JobStatus::Backoff => vec![format!("run {name}")],

@@ -93,7 +93,12 @@ impl PairPage<'_> {
             JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => Tone::Warn,
         };
         let status = self.palette.paint(tone, state_name(results.status));
-        let stage = results.next_stage.map(|stage| format!(" before {stage}"));
+        let word = if results.status == JobStatus::Quarantined {
+            "at"
+        } else {
+            "before"
+        };
+        let stage = results.next_stage.map(|stage| format!(" {word} {stage}"));
         let crashes = match self.detail.crashes {
             0 => String::new(),
             crashes => format!(", {crashes} workers died on it"),

@@ -52,6 +52,28 @@ impl Problem {
     }
 }
 
+impl Problem {
+    /// Returns the lines if all places are lines.
+    fn lines(&self) -> Option<Vec<usize>> {
+        let places = self.places.iter();
+        let lines = places.map(|place| match place {
+            ProblemPlace::Line(line) => Some(*line),
+            ProblemPlace::File(_) | ProblemPlace::List => None,
+        });
+        lines.collect()
+    }
+}
+
+/// Joins three or more successive lines, such as `2-21`.
+fn ranges(lines: &[usize]) -> Vec<String> {
+    let runs = lines.chunk_by(|one, next| *next == one + 1);
+    let texts = runs.flat_map(|run| match run {
+        [first, _, .., last] => vec![format!("{first}-{last}")],
+        few => few.iter().map(usize::to_string).collect(),
+    });
+    texts.collect()
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = |place: &ProblemPlace| match place {
@@ -59,7 +81,10 @@ impl fmt::Display for Problem {
             ProblemPlace::File(path) => Some(path.clone()),
             ProblemPlace::List => None,
         };
-        let names: Vec<String> = self.places.iter().filter_map(name).collect();
+        let names: Vec<String> = match self.lines() {
+            Some(lines) => ranges(&lines),
+            None => self.places.iter().filter_map(name).collect(),
+        };
         match (self.places.as_slice(), self.more) {
             ([ProblemPlace::Line(_)], 0) => f.write_str("line ")?,
             ([ProblemPlace::Line(_), ..], _) => f.write_str("lines ")?,
@@ -190,12 +215,9 @@ mod tests {
         }
         let text = error.to_string();
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            lines[0],
-            "lines 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21 and 9 more: no unit"
-        );
-        assert_eq!(lines[1], "lines 2, 3, 4: no id");
-        assert!(lines[2].starts_with("lines 5, 6, ") && lines[2].ends_with(" and 6 more: no mesh"));
+        assert_eq!(lines[0], "lines 2-21 and 9 more: no unit");
+        assert_eq!(lines[1], "lines 2-4: no id");
+        assert_eq!(lines[2], "lines 5-24 and 6 more: no mesh");
         let mut error = ManifestError::from(at_file("a".as_ref(), "too long"));
         error.add(at_file("b".as_ref(), "too long"));
         assert_eq!(error.to_string(), "a, b: too long");

@@ -4,17 +4,31 @@ use std::borrow::Cow;
 
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Invalid UTF-16 text.
+/// Why a file is not a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
-pub struct NotText;
+pub enum NotText {
+    /// Invalid UTF-16 text.
+    #[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
+    DamagedUtf16,
+    /// A file of Excel or LibreOffice.
+    #[error(
+        "this is a workbook of a spreadsheet program, not a list; save it there as \"CSV UTF-8\""
+    )]
+    Workbook,
+}
+
+/// First bytes of a ZIP archive, such as an `.xlsx` or `.ods` file, and of an `.xls` file.
+const WORKBOOKS: [&[u8]; 2] = [b"PK\x03\x04", b"\xd0\xcf\x11\xe0"];
 
 /// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns all other bytes unchanged: if they are not valid
 /// UTF-8, the parser reports the line.
 ///
 /// # Errors
-/// Returns an error if UTF-16 is truncated or damaged.
+/// Returns an error if UTF-16 is truncated or damaged, or if the bytes are those of a workbook.
 pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
+    if WORKBOOKS.iter().any(|start| bytes.starts_with(start)) {
+        return Err(NotText::Workbook);
+    }
     match *bytes {
         [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, ref rest @ ..] => from_utf16(rest, u16::from_be_bytes),
@@ -61,13 +75,13 @@ pub(super) fn encoding_hint(list: &[u8]) -> String {
 
 fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, NotText> {
     let (pairs, []) = bytes.as_chunks::<2>() else {
-        return Err(NotText);
+        return Err(NotText::DamagedUtf16);
     };
     let units = pairs.iter().map(|pair| unit(*pair));
     let text: Result<String, _> = char::decode_utf16(units).collect();
     text.map(|text| text.into_bytes().into())
         .ok()
-        .ok_or(NotText)
+        .ok_or(NotText::DamagedUtf16)
 }
 
 /// Returns the column separator: the most frequent of tab, semicolon and comma in the first line that is not blank.
@@ -135,7 +149,11 @@ mod tests {
         ] {
             assert_eq!(as_utf8(&bytes).as_deref(), Ok(text.as_bytes()));
         }
-        assert_eq!(as_utf8(&little[..little.len() - 1]), Err(NotText));
+        assert_eq!(
+            as_utf8(&little[..little.len() - 1]),
+            Err(NotText::DamagedUtf16)
+        );
+        assert_eq!(as_utf8(b"PK\x03\x04\x14\0"), Err(NotText::Workbook));
         assert_eq!(as_utf8(b""), Ok(b"".as_slice().into()));
     }
 

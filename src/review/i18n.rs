@@ -21,6 +21,16 @@ pub enum Language {
 }
 
 impl Language {
+    /// Returns the first supported language of an `Accept-Language` header, such as `vi-VN,vi;q=0.9,en;q=0.8`. Browsers list
+    /// the preferred language first.
+    pub(super) fn accepted(header: &str) -> Option<Self> {
+        let tags = header.split(',').map(str::trim);
+        tags.into_iter().find_map(|tag| {
+            let end = tag.find(['-', ';']).unwrap_or(tag.len());
+            tag[..end].to_ascii_lowercase().parse().ok()
+        })
+    }
+
     /// Returns the other language.
     #[must_use]
     pub(super) const fn other(self) -> Self {
@@ -71,6 +81,19 @@ mod tests {
         after
             .map(|rest| rest.split_once('}').expect("a closed brace").0)
             .collect()
+    }
+
+    #[test]
+    fn the_first_supported_language_of_the_browser_is_chosen() {
+        for (header, language) in [
+            ("vi-VN,vi;q=0.9,en;q=0.8", Some(Language::Vietnamese)),
+            ("fr, EN-gb;q=0.8, vi;q=0.5", Some(Language::English)),
+            ("vi", Some(Language::Vietnamese)),
+            ("*", None),
+            ("", None),
+        ] {
+            assert_eq!(Language::accepted(header), language, "{header}");
+        }
     }
 
     #[test]

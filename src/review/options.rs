@@ -40,8 +40,8 @@ impl QueueOptions {
 pub struct ReviewOptions {
     /// Whose queue is served, and what it contains.
     pub queue: QueueOptions,
-    /// Language of the page.
-    pub language: Language,
+    /// Language of the page; `None` for that of the browser.
+    pub language: Option<Language>,
     /// Map of physical keys to actions, from [`key_map`](super::key_map).
     pub keys: BTreeMap<String, String>,
     /// Minimum time in milliseconds that an image must be shown before the page accepts a verdict.

@@ -119,7 +119,7 @@ fn viewer(language: Language) -> Markup {
                 p #hint .hint hidden {}
                 div #end .end tabindex="0" role="region" aria-label=(language.translate("summary")) hidden {}
             }
-            p.caption { span #legend {} span.spacer {} span #paint-time {} }
+            p.caption { span #legend {} }
         }
     }
 }

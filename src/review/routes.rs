@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, RawQuery, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router, middleware};
@@ -114,8 +114,12 @@ impl IntoResponse for ApiError {
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
 /// Opens the session.
-async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
-    let language = state.options.language;
+async fn start(
+    State(state): State<Arc<ServerState>>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Response {
+    let language = language(&state, &headers);
     let (forward, refused) = (page::forward, page::token_used);
     state.access.start(
         query.as_deref(),
@@ -124,11 +128,23 @@ async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery)
     )
 }
 
-async fn index(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Html<String> {
+async fn index(
+    State(state): State<Arc<ServerState>>,
+    RawQuery(query): RawQuery,
+    headers: HeaderMap,
+) -> Html<String> {
     let query = query.as_deref();
     let requested = query.and_then(|query| query.strip_prefix("lang=")?.parse().ok());
-    let language = requested.unwrap_or(state.options.language);
+    let language = requested.unwrap_or_else(|| language(&state, &headers));
     Html(page::review(&state.options.queue, language).into_string())
+}
+
+/// Returns the language of the options, or else that of the browser.
+fn language(state: &ServerState, headers: &HeaderMap) -> Language {
+    let accepted = headers.get(header::ACCEPT_LANGUAGE);
+    let of_browser = accepted.and_then(|value| Language::accepted(value.to_str().ok()?));
+    let chosen = state.options.language.or(of_browser);
+    chosen.unwrap_or(Language::English)
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

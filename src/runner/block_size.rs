@@ -23,16 +23,27 @@ pub(super) fn advice(length: f64, unit: Option<LengthUnit>) -> String {
 /// Lengths that a scan of a character or block can have, mm.
 const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
 
+/// Lengths of most scans of characters and blocks, mm.
+const USUAL_MM: std::ops::RangeInclusive<f64> = 5.0..=1_000.0;
+
 /// Returns why the unit of a scan must be wrong, or `None` if it may be right. `length` is in units of the mesh.
 pub(super) fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
     let unit = unit?;
-    let length_m = length * unit.mm() / 1000.0;
-    let is_wrong = length > 0.0 && !POSSIBLE_MM.contains(&(length * unit.mm()));
-    is_wrong.then(|| {
-        format!(
-            "with the unit {unit}, the scan is {length_m} m long; correct the unit in the list and import it again"
-        )
-    })
+    let length_mm = length * unit.mm();
+    if length == 0.0 || POSSIBLE_MM.contains(&length_mm) {
+        return None;
+    }
+    let shown = if length_mm > 1.0 {
+        format!("{:.1} m", length_mm / 1000.0)
+    } else {
+        format!("{length_mm:.3} mm")
+    };
+    let mut units = LengthUnit::ALL.into_iter();
+    let likely = units.find(|unit| USUAL_MM.contains(&(length * unit.mm())));
+    let likely = likely.map_or_else(String::new, |unit| format!(" (perhaps {unit})"));
+    Some(format!(
+        "with the unit {unit}, the scan is {shown} long; correct the unit in the list{likely} and import it again"
+    ))
 }
 
 /// Returns the longest side of the bounding box of vertices, in units of the mesh.
@@ -71,12 +82,17 @@ mod tests {
 
     #[test]
     fn impossible_lengths_are_those_of_a_wrong_unit() {
-        let text = wrong_unit(12.5, Some(LengthUnit::M)).expect("12.5 m is no block");
+        assert_eq!(
+            wrong_unit(12.54, Some(LengthUnit::M)).as_deref(),
+            Some(
+                "with the unit m, the scan is 12.5 m long; correct the unit in the list (perhaps mm) and import it again"
+            )
+        );
+        let text = wrong_unit(0.012, Some(LengthUnit::Mm)).expect("a grain of dust");
         assert!(
-            text.starts_with("with the unit m, the scan is 12.5 m long; "),
+            text.contains("0.012 mm long") && text.contains("perhaps m)"),
             "{text}"
         );
-        assert!(wrong_unit(0.012, Some(LengthUnit::Mm)).is_some());
         for (length, unit) in [
             (12.5, None),
             (12.5, Some(LengthUnit::Mm)),

@@ -51,7 +51,7 @@ pub enum RegisterError {
     EmptyMask(ThresholdMetric),
     /// The relief reads in mirror writing.
     #[error(
-        "the relief matches the print better in mirror writing ({} as well); was the mesh mirrored, or does the scan show another side of the block?",
+        "the relief matches the mirrored print better ({} as well as the print itself); the print may be of another character, the mesh may be mirrored, or the scan may show another side of the block",
         ratio(*.times)
     )]
     Mirrored {
