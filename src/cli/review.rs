@@ -58,7 +58,7 @@ pub(super) struct ReviewArgs {
     /// Listen on this address instead of 127.0.0.1; anyone who can reach it sees that the page exists
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<IpAddr>,
-    /// Language of the page, en or vi [default: from LANG]
+    /// Language of the page, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
     #[arg(long)]
     lang: Option<Language>,
     /// Print the address without opening a browser

@@ -184,7 +184,7 @@ impl GallerySubject {
         GalleryItem {
             pair: attributes.name.clone(),
             character: attributes.character.clone(),
-            files: [attributes.mesh_path.clone(), attributes.print_path.clone()],
+            files: [&attributes.mesh_path, &attributes.print_path].map(|path| file_name(path)),
             metrics: self.metrics.clone(),
             numbers: self.numbers(),
             verdicts: self.verdicts(),
@@ -232,6 +232,11 @@ impl GallerySubject {
             .map(verdict_text)
             .collect()
     }
+}
+
+/// Returns the last part of a stored path. The folders before it belong to this computer, and reports are sent to others.
+fn file_name(stored: &str) -> String {
+    stored.rsplit('/').take(1).collect()
 }
 
 #[cfg(test)]
@@ -291,5 +296,12 @@ mod tests {
         assert_ne!(names(1, 90), names(2, 90));
         assert_eq!(names(1, 90).len(), SAMPLE_SIZE);
         assert_eq!(names(1, 7).len(), 7);
+    }
+
+    #[test]
+    fn reports_name_files_without_their_folders() {
+        for (stored, shown) in [("/home/lan/quét/1.stl", "1.stl"), ("1.stl", "1.stl")] {
+            assert_eq!(super::file_name(stored), shown);
+        }
     }
 }

@@ -10,7 +10,7 @@ pub enum NotText {
     /// Invalid UTF-16 text.
     #[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
     DamagedUtf16,
-    /// A file of Excel or LibreOffice.
+    /// A workbook, such as a file of Excel.
     #[error(
         "this is a workbook of a spreadsheet program, not a list; save it there as \"CSV UTF-8\""
     )]

@@ -48,7 +48,7 @@ pub struct GalleryItem {
     pub pair: PairName,
     /// The character. `None` if it is not known.
     pub character: Option<String>,
-    /// Paths of mesh and print.
+    /// File names of mesh and print.
     pub files: [String; 2],
     /// The metrics whose results look like this.
     pub metrics: Vec<ThresholdMetric>,
