@@ -21,7 +21,7 @@ pub(super) struct Liveness {
     lease_ms: i64,
     seen: BTreeMap<WorkerId, SeenWorker>,
     /// Time of the last call of [`Self::observe`].
-    observed: UnixMillis,
+    observed: Option<UnixMillis>,
 }
 
 /// What was seen of a worker.
@@ -30,7 +30,7 @@ struct SeenWorker {
     heartbeat: UnixMillis,
     /// When the heartbeat was first seen.
     since: UnixMillis,
-    /// Whether it was seen with a connection.
+    /// Whether it had a connection since the last gap.
     was_connected: bool,
     /// Since when it has no connection.
     unconnected_since: Option<UnixMillis>,
@@ -42,7 +42,7 @@ impl Liveness {
         Self {
             lease_ms,
             seen: BTreeMap::new(),
-            observed: 0,
+            observed: None,
         }
     }
 
@@ -57,9 +57,10 @@ impl Liveness {
         let part_of_lease = |share: f64| (self.lease_ms as f64 * share) as i64;
         let usual_gap_ms = part_of_lease(USUAL_GAP_SHARE);
         let unconnected_ms = part_of_lease(UNCONNECTED_SHARE);
-        let gap = now - self.observed;
-        self.observed = now;
-        if gap > usual_gap_ms {
+        let gap = self.observed.map_or(i64::MAX, |last| now - last);
+        self.observed = Some(now);
+        let is_steady = gap <= usual_gap_ms;
+        if !is_steady {
             // The others may need longer to connect again, so only their heartbeats count until they have.
             for seen in self.seen.values_mut() {
                 (seen.was_connected, seen.unconnected_since) = (false, None);
@@ -76,7 +77,8 @@ impl Liveness {
             let seen = self.seen.entry(holder.worker).or_insert(SeenWorker {
                 heartbeat: holder.heartbeat,
                 since: now,
-                was_connected: false,
+                // A worker takes its lock when it starts. After a gap, it may not have connected again yet.
+                was_connected: is_steady,
                 unconnected_since: None,
             });
             seen.was_connected |= holder.is_connected;
@@ -152,7 +154,12 @@ mod tests {
         assert_eq!(dead_at(&mut liveness, [0], 5, true), None);
         let times = [2_500, 5_000, 9_499, 9_500];
         assert_eq!(dead_at(&mut liveness, times, 5, false), Some(9_500));
-        // A worker that was never seen with a connection may be of an earlier version.
+        // A worker that died before anybody saw its connection.
+        let mut liveness = Liveness::new(50_000);
+        assert!(liveness.observe(&[], ME, 0).is_empty());
+        let times = [2_500, 5_000, 7_500, 9_500];
+        assert_eq!(dead_at(&mut liveness, times, 5, false), Some(9_500));
+        // When this process starts, others may be about to connect again.
         let mut liveness = Liveness::new(50_000);
         let times = (0..50_000).step_by(2_500);
         assert_eq!(dead_at(&mut liveness, times, 5, false), None);
