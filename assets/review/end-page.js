@@ -14,15 +14,12 @@ function create(tag, text, ...children) {
 /** Quotes a path for a shell if it has characters other than the common ones. */
 const quoted = (path) => (/^[\w./-]+$/.test(path) ? path : `'${path.replaceAll("'", "'\\''")}'`);
 
-/** Whether most of enough attention checks were missed. The report warns about the same reviewers. */
-const isInattentive = ({ count, n }) => n >= 4 && count * 2 < n;
-
-function lines({ results, reviewer, others }) {
+function lines({ results, reviewer, is_inattentive: isInattentive, others }) {
   const { pass, fail, unsure } = results;
   const texts = [translate("summary_results", { n: pass + fail + unsure, pass, fail, unsure })];
   const { attention_checks: checks, duplicates } = reviewer;
   if (checks.n > 0) texts.push(translate("summary_checks", checks));
-  if (isInattentive(checks)) texts.push(translate("summary_practise"));
+  if (isInattentive) texts.push(translate("summary_practise"));
   if (duplicates.n > 0) texts.push(translate("summary_shown_twice", duplicates));
   for (const { a, b, n, agreed } of others) {
     const other = a === reviewer.reviewer ? b : a;

@@ -18,6 +18,7 @@ export class Practice {
     this.examples = used.sort((a, b) => a.practice - b.practice);
     this.index = 0;
     this.rightCount = 0;
+    this.answeredCount = 0;
     document.getElementById("practice-next").onclick = () => this.next();
     document.getElementById("practice-skip").onclick = () => this.end();
     this.show();
@@ -56,6 +57,7 @@ export class Practice {
     if (this.answer) return;
     const reason = REASONS.includes(action) ? action : null;
     this.answer = { verdict: reason ? "fail" : action, reason };
+    this.answeredCount += 1;
     const { name, ...expected } = this.current;
     const isRight = this.answer.verdict === expected.verdict;
     if (isRight) this.rightCount += 1;
@@ -75,11 +77,10 @@ export class Practice {
   }
 
   end() {
-    const [right, all] = [this.rightCount, this.examples.length];
-    this.index = all;
+    const [right, all] = [this.rightCount, this.answeredCount];
+    this.index = this.examples.length;
     ui.endPractice();
     this.onEnd();
-    const key = right < MIN_RIGHT * all ? "practice_done_again" : "practice_done";
-    ui.announce(translate(key, { right, all }));
+    if (all > 0) ui.announce(translate(right < MIN_RIGHT * all ? "practice_done_again" : "practice_done", { right, all }));
   }
 }

@@ -151,30 +151,51 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
     error
 }
 
-/// Returns a tip on a word where a command is expected.
+/// Returns a tip on a word that is no command.
 fn command_tip(word: &str) -> Option<String> {
-    if let Some(option) = word.strip_prefix(LONG_DASHES) {
-        return Some(format!(
-            "type a hyphen instead of the dash, as in: -{option}"
-        ));
+    dash_tip(word).or_else(|| folder_tip(word))
+}
+
+/// Returns a tip on an argument or option that is not expected.
+fn argument_tip(word: &str) -> Option<String> {
+    if ["-c", "--C", "--directory"].contains(&word) {
+        return Some("the folder of a project is named with a capital -C".to_owned());
     }
+    if word.starts_with('-') {
+        return None;
+    }
+    let tip = dash_tip(word).or_else(|| folder_tip(word));
+    tip.or_else(|| {
+        Some(format!(
+            "if {word} belongs to a name or path with spaces, put all of it in quotes"
+        ))
+    })
+}
+
+/// Dashes, and a minus sign, that word processors write instead of hyphens.
+const LONG_DASHES: [char; 6] = [
+    '\u{2010}', '\u{2011}', '\u{2012}', '\u{2013}', '\u{2014}', '\u{2212}',
+];
+
+/// Returns a tip on an option that begins with a dash instead of a hyphen.
+fn dash_tip(word: &str) -> Option<String> {
+    let option = word.trim_start_matches(LONG_DASHES).trim_start_matches('-');
+    let is_typed = word.starts_with(LONG_DASHES) && !option.is_empty();
+    let hyphens = if option.chars().count() == 1 {
+        "-"
+    } else {
+        "--"
+    };
+    is_typed.then(|| format!("type hyphens instead of the dash, as in: {hyphens}{option}"))
+}
+
+/// Returns a tip on a word that is the name of a folder.
+fn folder_tip(word: &str) -> Option<String> {
     Path::new(word).is_dir().then(|| {
         let folder = shell_quoted(word);
         format!("{folder} is a folder; name it with -C, as in: mocban -C {folder} status")
     })
 }
-
-/// Returns a tip on a word or option that is not expected.
-fn argument_tip(word: &str) -> Option<String> {
-    if ["-c", "--C", "--directory"].contains(&word) {
-        return Some("the folder of a project is named with a capital -C".to_owned());
-    }
-    let is_word = !word.starts_with('-');
-    is_word.then(|| "put a name or path with spaces in quotes, as in: \"block 4\"".to_owned())
-}
-
-/// Dashes that word processors write instead of hyphens.
-const LONG_DASHES: [char; 3] = ['\u{2012}', '\u{2013}', '\u{2014}'];
 
 /// Counts `-v`. Only for a command line that clap has accepted: in such a line, no value starts with a dash.
 fn count_verbose(args: &[OsString]) -> u8 {
@@ -261,9 +282,16 @@ mod tests {
         assert!(folder.contains("tip: src is a folder"), "{folder}");
         assert!(folder.contains("mocban -C src status"), "{folder}");
         let spaces = error("mocban verdict set block 4 pass --reviewer lan");
-        assert!(spaces.contains("spaces in quotes"), "{spaces}");
+        assert!(
+            spaces.contains("if pass belongs to a name or path with spaces"),
+            "{spaces}"
+        );
         let dash = error("mocban \u{2013}C blocks status");
-        assert!(dash.contains("as in: -C"), "{dash}");
+        assert!(dash.contains("as in: -C\n"), "{dash}");
+        let json = error("mocban status \u{2014}json");
+        assert!(json.contains("as in: --json\n"), "{json}");
+        let folder = error("mocban status src");
+        assert!(folder.contains("mocban -C src status"), "{folder}");
         let small = error("mocban -c blocks status");
         assert!(small.contains("capital -C"), "{small}");
         let plain = error("mocban report --fomat html");

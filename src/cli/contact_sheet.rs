@@ -130,10 +130,10 @@ pub(super) async fn write(
     for (pair, why) in sheet.problems.iter().take(MAX_WARNINGS) {
         context.warn(&format!("{pair} is not drawn completely: {why}"));
     }
-    if let Some(more) = sheet.problems.len().checked_sub(MAX_WARNINGS + 1) {
-        let pairs = count(more as u64 + 1, "more pair");
+    let more = sheet.problems.len().saturating_sub(MAX_WARNINGS);
+    if more > 0 {
         context.warn(&format!(
-            "{pairs} not drawn completely; `check` lists all missing files"
+            "{more} more are not drawn completely; `check` lists all missing files"
         ));
     }
     let is_complete = args.allow_missing || sheet.problems.is_empty();

@@ -133,7 +133,7 @@ async fn align(
     run_text::print_outcome(&summary, &failures, context);
     let done = summary.status.jobs.get(&JobStatus::Done).copied();
     if summary.stopped || done.unwrap_or(0) == 0 {
-        for command in run_text::next_steps(&summary, &failures) {
+        for command in run_text::next_steps(&summary, &failures, false) {
             context.next(&command);
         }
         return Ok(run::code(&summary));

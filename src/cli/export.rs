@@ -288,7 +288,7 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
     ));
     context.info(&explanation(args));
     if summary.pairs.done == 0 && summary.pairs.without_result > 0 {
-        context.next("run");
+        context.next("status");
     }
     if let Some(counts) = &summary.split {
         let [train, validation, test] = counts.pairs;

@@ -71,7 +71,7 @@ pub(super) fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
     }
 }
 
-/// Refuses to write over a catalog, a backup, or another file by which a project works, or into a missing folder.
+/// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
 pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     refuse_missing_folder(path)?;
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());

@@ -54,7 +54,9 @@ const MAX_ENTRIES: usize = 10_000;
 /// case.
 pub(super) fn similar_file(missing: &Path) -> Option<String> {
     let wanted = plain_letters(missing.file_name()?.to_str()?);
-    let entries = std::fs::read_dir(missing.parent()?).ok()?;
+    // The parent of a bare file name is empty.
+    let folder = Path::new(".").join(missing.parent()?);
+    let entries = std::fs::read_dir(folder).ok()?;
     let names = entries.take(MAX_ENTRIES).flatten();
     let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
     names.find(|name| plain_letters(name) == wanted)
@@ -86,6 +88,7 @@ pub(super) fn is_windows_path(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use std::fs;
+    use std::path::Path;
 
     use super::{find_on_disk, similar_file};
 
@@ -117,6 +120,7 @@ mod tests {
         fs::write(dir.path().join("chữ số 1.stl"), "").expect("written");
         let similar = |name: &str| similar_file(&dir.path().join(name));
         assert_eq!(similar("Chu so 1.stl").as_deref(), Some("chữ số 1.stl"));
+        assert_eq!(similar_file(Path::new("SRC")).as_deref(), Some("src"));
         assert_eq!(similar("chu so 2.stl"), None);
         assert_eq!(similar("missing/chu so 1.stl"), None);
     }

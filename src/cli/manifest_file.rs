@@ -138,12 +138,13 @@ impl Listing {
             let missing = files
                 .filter_map(|(kind, path)| {
                     let text = locate_file(place, kind, path, &row.name, project)?;
-                    let similar = (searches > 0).then(|| similar_file(path)).flatten();
-                    searches = searches.saturating_sub(1);
-                    Some(match similar {
-                        Some(name) => format!("{text}; there is {name}"),
-                        None => text,
-                    })
+                    if searches == 0 || path.exists() {
+                        return Some(text);
+                    }
+                    searches -= 1;
+                    let similar = similar_file(path).map(|name| sanitize(&name, MAX_PATH_CHARS));
+                    let hint = similar.map(|name| format!("; there is {name}"));
+                    Some(text + &hint.unwrap_or_default())
                 })
                 .collect();
             each(row, missing);

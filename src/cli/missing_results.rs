@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use crate::domain::JobStatus;
 use crate::store::Project;
 
-/// What the user sees, without the label.
-pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; if the scans and prints are at their places, `check --repair` lets the next run compute them again (`restore --inputs DIR` finds them elsewhere)";
+/// Explains what is missing and what to do, for `status` and `run`.
+pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; once scans and prints are at their places, `check --repair` lets the next run compute them again (if they are elsewhere, restore the backup into a new folder with --inputs)";
 
 /// The command that helps.
 pub(super) const NEXT: &str = "check --repair";

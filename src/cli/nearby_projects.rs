@@ -6,7 +6,7 @@ use super::input_paths::plain_letters;
 use crate::config::nearest;
 use crate::store::CATALOG_FILE;
 
-/// Largest number of entries of a folder that are looked at.
+/// Largest number of entries of a folder that are read.
 const MAX_ENTRIES: usize = 1000;
 /// Largest number of projects that are suggested.
 const MAX_SUGGESTED: usize = 3;
@@ -29,9 +29,12 @@ pub(super) fn nearby_projects(dir: &Path) -> Vec<PathBuf> {
     let names: Vec<String> = beside.iter().map(|path| name(path)).collect();
     let typed = plain_letters(&typed.to_string_lossy());
     let similar = nearest(&typed, names.iter().map(String::as_str), MAX_SUGGESTED);
-    let found = similar.into_iter().filter_map(|similar| {
-        let at = names.iter().position(|name| name == similar)?;
-        Some(beside[at].clone())
+    // Two names may have the same plain letters.
+    let found = similar.iter().flat_map(|similar| {
+        let named = names.iter().zip(&beside);
+        named
+            .filter(move |(name, _)| *name == similar)
+            .map(|(_, path)| path.clone())
     });
     found.collect()
 }
@@ -60,12 +63,15 @@ mod tests {
     fn projects_with_a_similar_name_or_below_are_found() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let root = dir.path();
-        for project in ["khối-4", "đình-1", "other"] {
+        for project in ["khối-4", "khơi-4", "đình-1"] {
             std::fs::create_dir(root.join(project)).expect("a folder");
             std::fs::write(root.join(project).join(CATALOG_FILE), "").expect("written");
         }
         std::fs::create_dir(root.join("khối-5")).expect("a folder without a catalog");
-        assert_eq!(nearby_projects(&root.join("Khoi-4")), [root.join("khối-4")]);
+        assert_eq!(
+            nearby_projects(&root.join("Khoi-4")),
+            [root.join("khơi-4"), root.join("khối-4")]
+        );
         assert_eq!(nearby_projects(&root.join("dinh1")), [root.join("đình-1")]);
         assert_eq!(nearby_projects(&root.join("zzzz")).len(), 0);
         assert_eq!(nearby_projects(root).len(), 3);

@@ -6,13 +6,14 @@ use clap::Args;
 use serde_json::json;
 
 use super::browser::open;
-use super::context::{Context, now};
+use super::context::{Context, now, shell_quoted};
 use super::exit::{ExitCode, Refusal};
 use super::files::input_file_limits;
 use super::output;
 use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
+use crate::catalog::StatusCounts;
 use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
@@ -221,6 +222,25 @@ fn announce(
     Ok(if is_for_script { None } else { open(&url) })
 }
 
+/// Returns the `review` command as a next step, or `None` if there are verdicts.
+pub(super) fn review_step(counts: &StatusCounts) -> Option<String> {
+    let is_unjudged = counts.verdicts.values().all(|number| *number == 0);
+    is_unjudged.then(|| review_command(user_name().as_deref()))
+}
+
+/// Returns the `review` command with the user's name as the reviewer.
+fn review_command(user: Option<&str>) -> String {
+    let name = user.and_then(|user| reviewer_name(user).ok());
+    let name = name.unwrap_or_else(|| "me".to_owned());
+    format!("review --reviewer {}", shell_quoted(&name))
+}
+
+/// Returns the name of the user, as Unix or Windows gives it.
+fn user_name() -> Option<String> {
+    let mut names = ["USER", "USERNAME"].into_iter();
+    names.find_map(|name| std::env::var(name).ok())
+}
+
 /// Returns Vietnamese if the locale is Vietnamese. Otherwise, the browser decides.
 fn language_of_system() -> Option<Language> {
     let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
@@ -232,7 +252,7 @@ fn language_of_system() -> Option<Language> {
 
 #[cfg(test)]
 mod tests {
-    use super::{QueueCounts, order, percent, progress};
+    use super::{QueueCounts, order, percent, progress, review_command};
     use crate::config::{Sources, load};
     use crate::domain::ReviewOrder;
     use crate::review::key_map;
@@ -270,5 +290,11 @@ mod tests {
         assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
         assert_eq!(order("least-confident"), Ok(ReviewOrder::LeastConfident));
         assert!(order("adjudicate").is_err());
+    }
+
+    #[test]
+    fn the_suggested_reviewer_is_the_user() {
+        assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
+        assert_eq!(review_command(None), "review --reviewer me");
     }
 }

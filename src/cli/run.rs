@@ -90,13 +90,12 @@ pub(super) async fn execute(
     let (summary, failures) = driven?;
     context.print_json(&as_json(&summary))?;
     print_outcome(&summary, &failures, context);
-    if missing_results::are_missing(&project, &summary.status.jobs) {
+    let are_results_missing = missing_results::are_missing(&project, &summary.status.jobs);
+    if are_results_missing {
         context.warn(missing_results::TEXT);
         context.next(missing_results::NEXT);
-        context.next("run");
-        return Ok(code(&summary));
     }
-    for command in next_steps(&summary, &failures) {
+    for command in next_steps(&summary, &failures, are_results_missing) {
         context.next(&command);
     }
     Ok(code(&summary))

@@ -2,9 +2,9 @@
 
 use super::context::{Context, shell_quoted};
 use super::failures::Failures;
+use super::review::review_step;
 use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
-use super::verdict::review_step;
 use crate::catalog::{BlockPlanEntry, Plan};
 use crate::domain::JobStatus;
 use crate::runner::{BlockSummary, RunSummary};
@@ -63,13 +63,19 @@ fn pair_headline(summary: &RunSummary) -> String {
 }
 
 /// Returns the commands that make sense after a run.
-pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
+pub(super) fn next_steps(
+    summary: &RunSummary,
+    failures: &Failures,
+    are_results_missing: bool,
+) -> Vec<String> {
     let mut steps = Vec::new();
     if summary.status.pairs == 0 && failures.blocks.is_empty() {
         steps.push("import pairs.csv".to_owned());
     }
     let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
-    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0 {
+    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0
+        || are_results_missing
+    {
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.blocks.first_failed() {
@@ -82,7 +88,9 @@ pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<Strin
         }
     }
     if jobs(JobStatus::Done) > 0 && !summary.stopped {
-        steps.extend(review_step(&summary.status));
+        if !are_results_missing {
+            steps.extend(review_step(&summary.status));
+        }
         steps.push("report".to_owned());
     }
     steps

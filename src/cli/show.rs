@@ -104,7 +104,7 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     lines.push(match (why, detail.results.status) {
         (Some(entry), _) => format!("  from {}: {entry}", entry.from),
         (None, JobStatus::Quarantined) if !may_retry(detail) => {
-            "  nothing until a file, a value of its list or a setting is corrected; then `run` computes it again".to_owned()
+            "  nothing; correct the file, its row in the list or a setting, and `run` computes the pair again".to_owned()
         }
         (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
         (None, JobStatus::Leased) => "  running now".to_owned(),

@@ -11,10 +11,10 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::missing_results;
 use super::output;
+use super::review::review_step;
 use super::screen::{Palette, Tone, clear_code};
 use super::status_hosts;
 use super::table::{columns, count};
-use super::verdict::review_step;
 use crate::catalog::{Catalog, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
@@ -293,8 +293,10 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if status.counts.low_confidence > 0 {
         steps.push("contact-sheet --order confidence".to_owned());
     }
-    if status.jobs(JobStatus::Done) > 0 && !running && !status.are_results_missing {
-        steps.extend(review_step(&status.counts));
+    if status.jobs(JobStatus::Done) > 0 && !running {
+        if !status.are_results_missing {
+            steps.extend(review_step(&status.counts));
+        }
         steps.push("report".to_owned());
     }
     steps
@@ -387,7 +389,7 @@ mod tests {
         assert_eq!(next_steps(&done), ["report"]);
         done.are_results_missing = true;
         done.running = false;
-        assert_eq!(next_steps(&done), ["check --repair", "run"]);
+        assert_eq!(next_steps(&done), ["check --repair", "run", "report"]);
         let text = screen(&done, "demo", Palette::PLAIN);
         assert!(
             text.contains("files        the depth maps and masks"),

@@ -14,7 +14,7 @@ use super::select;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
-use crate::catalog::{Catalog, NewVerdict, ReviewContext, StatusCounts, VerdictEvent};
+use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// Commands on verdicts.
@@ -94,19 +94,6 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Returns the `review` command as a next step, or `None` if there are verdicts.
-pub(super) fn review_step(counts: &StatusCounts) -> Option<String> {
-    let is_unjudged = counts.verdicts.values().all(|number| *number == 0);
-    is_unjudged.then(|| review_command(std::env::var("USER").ok().as_deref()))
-}
-
-/// Returns the `review` command with the user's name as the reviewer.
-fn review_command(user: Option<&str>) -> String {
-    let name = user.and_then(|user| reviewer_name(user).ok());
-    let name = name.unwrap_or_else(|| "me".to_owned());
-    format!("review --reviewer {}", shell_quoted(&name))
-}
-
 pub(super) async fn verdict(
     command: VerdictCommand,
     context: &Context,
@@ -136,27 +123,32 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         },
         at: None,
     };
-    let text = set_text(&new);
+    let (text, known) = (set_text(&new), known_text(&new));
     let stored = catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.info(if stored == 0 {
-        "already recorded"
-    } else {
-        &text
-    });
+    context.info(if stored == 0 { &known } else { &text });
     Ok(ExitCode::Done)
 }
 
 /// Returns what `verdict set` recorded, and how to record less or to take it back.
 fn set_text(new: &NewVerdict) -> String {
     let undo = format!("`verdict undo --reviewer {}`", shell_quoted(&new.reviewer));
-    let (pair, verdict) = (&new.pair, new.verdict);
-    match new.metric {
-        Some(metric) => format!("{pair}, {metric}: {verdict}; {undo} takes it back"),
-        None => format!(
-            "{pair}, all metrics: {verdict}; {undo} takes it back, and --metric judges the result of one metric only"
-        ),
-    }
+    let one_only = match new.metric {
+        Some(_) => "",
+        None => ", and --metric judges the result of one metric only",
+    };
+    format!("{}; {undo} takes it back{one_only}", verdict_text(new))
+}
+
+/// Returns that a verdict was recorded before.
+fn known_text(new: &NewVerdict) -> String {
+    format!("{} is already recorded", verdict_text(new))
+}
+
+/// Returns `b01-0117, density: pass`.
+fn verdict_text(new: &NewVerdict) -> String {
+    let metric = new.metric.map_or("all metrics", ThresholdMetric::name);
+    format!("{}, {metric}: {}", new.pair, new.verdict)
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -298,15 +290,4 @@ fn view_text(look: &ReviewContext) -> String {
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();
     parts.join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::review_command;
-
-    #[test]
-    fn the_reviewer_is_the_user() {
-        assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
-        assert_eq!(review_command(None), "review --reviewer me");
-    }
 }

@@ -236,7 +236,8 @@ impl GallerySubject {
 
 /// Returns the last part of a stored path. The folders before it belong to this computer, and reports are sent to others.
 fn file_name(stored: &str) -> String {
-    stored.rsplit('/').take(1).collect()
+    let mut parts = stored.rsplit(['/', '\\']);
+    parts.next().unwrap_or(stored).to_owned()
 }
 
 #[cfg(test)]
@@ -300,7 +301,11 @@ mod tests {
 
     #[test]
     fn reports_name_files_without_their_folders() {
-        for (stored, shown) in [("/home/lan/quét/1.stl", "1.stl"), ("1.stl", "1.stl")] {
+        for (stored, shown) in [
+            ("/home/lan/quét/1.stl", "1.stl"),
+            ("C:\\a\\1.stl", "1.stl"),
+            ("1.stl", "1.stl"),
+        ] {
             assert_eq!(super::file_name(stored), shown);
         }
     }

@@ -352,7 +352,7 @@ mod tests {
             "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
              mech, print"
         );
-        // Two letters are similar to too many words: `in` is Vietnamese for print.
+        // `in` and `tên` are Vietnamese names of the columns.
         let vietnamese = refusal("in,mesh,tên\na,b,c\n");
         let renamed: Vec<_> = vietnamese
             .lines()

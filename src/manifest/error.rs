@@ -50,9 +50,7 @@ impl Problem {
             }
         }
     }
-}
 
-impl Problem {
     /// Returns the lines if all places are lines.
     fn lines(&self) -> Option<Vec<usize>> {
         let places = self.places.iter();

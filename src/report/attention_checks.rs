@@ -22,7 +22,7 @@ pub struct AttentionCheckRates {
 }
 
 /// Fewest answered planted faults from which a reviewer's rate is judged.
-const MIN_FAULTS: u64 = 4;
+const MIN_CHECKS: u64 = 4;
 
 impl AttentionCheckRates {
     /// Returns the rates of detected faults among the answers of one or more reviewers. Ignores answers to duplicates.
@@ -37,11 +37,10 @@ impl AttentionCheckRates {
         rates
     }
 
-    /// Returns the reviewers who detected fewer than half of at least [`MIN_FAULTS`] planted faults.
+    /// Returns the reviewers who detected fewer than half of at least [`MIN_CHECKS`] planted faults.
     pub(super) fn inattentive(&self) -> Vec<(&str, &Rate)> {
-        let few = |rate: &Rate| rate.n >= MIN_FAULTS && rate.count * 2 < rate.n;
         let reviewers = self.by_reviewer.iter();
-        let reviewers = reviewers.filter(|(_, rate)| few(rate));
+        let reviewers = reviewers.filter(|(_, rate)| is_inattentive(rate));
         reviewers
             .map(|(name, rate)| (name.as_str(), rate))
             .collect()
@@ -55,6 +54,11 @@ impl AttentionCheckRates {
             rate.set_interval(method);
         }
     }
+}
+
+/// Returns whether fewer than half of at least [`MIN_CHECKS`] planted faults were detected.
+pub fn is_inattentive(rate: &Rate) -> bool {
+    rate.n >= MIN_CHECKS && rate.count * 2 < rate.n
 }
 
 /// Returns the rates of detected faults among the answers of all reviewers of a project.

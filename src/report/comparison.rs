@@ -13,7 +13,7 @@ const MAX_SAMPLE_SIZE: u64 = 100_000;
 /// Fewest pairs from which a sample size is estimated.
 const MIN_PAIRS_FOR_ESTIMATE: u64 = 20;
 
-/// What is said with fewer pairs.
+/// Replaces the sample size in texts if there are fewer pairs.
 pub(super) const TOO_FEW_TO_ESTIMATE: &str =
     "how many pairs would show one cannot be estimated from fewer than 20";
 

@@ -2,13 +2,12 @@
 //!
 //! A command in a sentence stands in backticks, which renderers turn into the code of their format.
 
-use super::attention_checks::AttentionCheckRates;
+use super::accuracy_sentence::accuracy;
 use super::comparison::{Basis, Comparison, TOO_FEW_TO_ESTIMATE, about};
 use super::model::{MetricRow, Report};
-use super::number_format::{NumberStyle, counted};
-use super::number_format::{format_count, format_interval, format_p, format_rate, format_share};
-use super::stats::{Rate, SIGNIFICANCE_LEVEL};
-use crate::domain::{MetricOutcome, ThresholdMetric, sanitize};
+use super::number_format::{format_count, format_p, joined};
+use super::stats::SIGNIFICANCE_LEVEL;
+use crate::domain::{MetricOutcome, ThresholdMetric};
 
 /// Returns the sentences, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
@@ -73,81 +72,6 @@ fn nothing_to_judge(report: &Report) -> String {
     format!("There is no result to judge yet; `{command}` {what}.")
 }
 
-/// Returns the sentence on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
-fn accuracy(report: &Report) -> String {
-    let by_default = report.row(ThresholdMetric::DEFAULT);
-    let judged = by_default.filter(|row| row.acc.is_some());
-    let judged = judged.or_else(|| report.rows.iter().find(|row| row.acc.is_some()));
-    let mut sentence = match judged.and_then(|row| Some((row, row.acc?, row.acc_ci95?))) {
-        Some((row, acc, bounds)) => format!(
-            "Acc of {} is {} % ({}, {} interval): reviewers passed {} of {}",
-            row.metric.title(),
-            format_share(acc),
-            format_interval(bounds, NumberStyle::Share),
-            report.interval.title(),
-            format_count(row.passed),
-            counted(row.passed + row.failed, "decided result"),
-        ) + &undecided(row)
-            + &inattentive(report),
-        None if report.has_verdicts() => {
-            "There is no Acc, because reviewers were unsure about every judged result".to_owned()
-        }
-        None => "Nobody has judged a result yet, so there is no Acc (`mocban review --reviewer NAME` starts judging)"
-            .to_owned(),
-    };
-    sentence.extend(judged.or(by_default).and_then(truth));
-    sentence + "."
-}
-
-/// Returns the clause on results that were judged and count neither as passed nor as failed, or an empty text.
-fn undecided(row: &MetricRow) -> String {
-    let unsure = row.unsure - row.conflicts;
-    let rest = [
-        (row.conflicts, "on which reviewers disagree"),
-        (unsure, "about which they were unsure"),
-    ];
-    let rest = rest.into_iter().filter(|(n, _)| *n > 0);
-    let rest: Vec<String> = rest
-        .map(|(n, what)| format!("{} {what}", format_count(n)))
-        .collect();
-    let verb = if row.unsure == 1 { "is" } else { "are" };
-    match rest.as_slice() {
-        [] => String::new(),
-        rest => format!("; {} {verb} not counted", joined(rest)),
-    }
-}
-
-/// Returns the clause on reviewers who missed most planted faults, or an empty text.
-fn inattentive(report: &Report) -> String {
-    let rates = report.attention_checks.iter();
-    let found: Vec<(&str, &Rate)> = rates.flat_map(AttentionCheckRates::inattentive).collect();
-    match found.as_slice() {
-        [] => String::new(),
-        [(reviewer, rate)] => format!(
-            "; {} noticed only {} of {} attention checks, so this Acc may be wrong",
-            sanitize(reviewer, 60),
-            format_count(rate.count),
-            format_count(rate.n)
-        ),
-        more => format!(
-            "; {} reviewers missed most of their attention checks, so this Acc may be wrong",
-            format_count(more.len() as u64)
-        ),
-    }
-}
-
-/// Returns the clause on a metric's errors against ground truth, or `None` without ground truth.
-fn truth(row: &MetricRow) -> Option<String> {
-    let truth = row.truth.as_ref()?;
-    let rate = format_rate(truth.acc?, truth.acc_ci95);
-    let [passed, n] = [truth.passed, truth.n].map(format_count);
-    let title = row.metric.title();
-    let verb = if truth.passed == 1 { "is" } else { "are" };
-    Some(format!(
-        "; against ground truth, {passed} of {n} results of {title} {verb} right, {rate}"
-    ))
-}
-
 /// Returns the sentence on differences between metrics: by verdicts if there are any, otherwise by ground truth.
 fn significance(report: &Report) -> String {
     let family = |basis| -> Vec<&Comparison> {
@@ -205,15 +129,6 @@ fn better_than(significant: &[&Comparison]) -> String {
         })
         .collect();
     joined(&clauses)
-}
-
-/// Joins words by commas and, before the last one, by `and`.
-fn joined(words: &[String]) -> String {
-    match words {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 /// Returns the sentence on a basis without a significant difference, with the number of pairs that would show one.

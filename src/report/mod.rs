@@ -4,6 +4,7 @@
 //! verdicts. The numbers come from [`stats`]; the renderers only read the finished [`Report`].
 
 mod accumulate;
+mod accuracy_sentence;
 mod adjudication;
 mod attention_checks;
 mod block_accuracy;
@@ -39,7 +40,7 @@ mod warnings;
 
 pub use accumulate::ReportAccumulator;
 pub use adjudication::AdjudicationRules;
-pub use attention_checks::AttentionCheckRates;
+pub use attention_checks::{AttentionCheckRates, is_inattentive};
 pub use block_accuracy::{BlockAccuracy, BoxAccuracy, PrecisionRecall};
 pub use build::{build, build_with};
 pub use comparison::{Basis, COMPARED_METRICS, Comparison};

@@ -120,6 +120,15 @@ pub fn count_list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join(", "))
 }
 
+/// Joins words by commas and, before the last one, by `and`.
+pub fn joined(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::NumberStyle::{Count, Degrees, PValue, Percent, Score, Seconds, Share};

@@ -26,12 +26,12 @@ pub(super) fn warnings(
     warnings.extend(qualified_results(rows));
     warnings.extend(unusable_truth(truth));
     warnings.extend(skipped.map(bootstrap_skipped));
-    warnings.extend(attention_checks.into_iter().flat_map(missed_faults));
+    warnings.extend(attention_checks.into_iter().flat_map(missed_checks));
     warnings
 }
 
 /// Returns a warning for each reviewer who missed most planted faults.
-fn missed_faults(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
+fn missed_checks(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
     rates.inattentive().into_iter().map(|(reviewer, rate)| {
         let [noticed, n] = [rate.count, rate.n].map(format_count);
         format!(

@@ -24,8 +24,8 @@ impl Language {
     /// Returns the first supported language of an `Accept-Language` header, such as `vi-VN,vi;q=0.9,en;q=0.8`. Browsers list
     /// the preferred language first.
     pub(super) fn accepted(header: &str) -> Option<Self> {
-        let tags = header.split(',').map(str::trim);
-        tags.into_iter().find_map(|tag| {
+        let mut tags = header.split(',').map(str::trim);
+        tags.find_map(|tag| {
             let end = tag.find(['-', ';']).unwrap_or(tag.len());
             tag[..end].to_ascii_lowercase().parse().ok()
         })

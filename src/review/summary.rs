@@ -6,7 +6,7 @@ use super::review_queue::ReviewQueue;
 use super::state::ServerState;
 use crate::catalog::CatalogError;
 use crate::domain::Verdict;
-use crate::report::{ReviewerPair, ReviewerRecord, agreement};
+use crate::report::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
 
 /// The summary of a review.
 #[derive(Debug, Serialize)]
@@ -15,6 +15,8 @@ pub(super) struct ReviewSummary {
     results: VerdictCounts,
     /// The reviewer's attention checks, over all their reviews of the project.
     reviewer: ReviewerRecord,
+    /// Whether the reviewer missed most attention checks, which the report says too.
+    is_inattentive: bool,
     /// Agreement with every other reviewer who judged the same results.
     others: Vec<ReviewerPair>,
     /// Folder of the project, for the next commands.
@@ -65,13 +67,13 @@ impl ReviewSummary {
         let own = &state.options.queue.reviewer;
         let mut others = agreement.reviewer_pairs;
         others.retain(|pair| pair.a == *own || pair.b == *own);
+        let mut reviewers = agreement.reviewers.into_iter();
+        let reviewer = reviewers.find(|record| record.reviewer == *own);
+        let reviewer = reviewer.unwrap_or_default();
         Ok(Some(Self {
             results: VerdictCounts::of(on_results.map(|(_, verdict)| *verdict)),
-            reviewer: agreement
-                .reviewers
-                .into_iter()
-                .find(|record| record.reviewer == *own)
-                .unwrap_or_default(),
+            is_inattentive: is_inattentive(&reviewer.attention_checks.all),
+            reviewer,
             others,
             project: state.project.dir().display().to_string(),
         }))

@@ -15,7 +15,7 @@ use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, PairReport, RunContext};
-use super::stop::StopLevel;
+use super::stop::{Stop, StopLevel};
 use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
 use crate::domain::{Failure, FailureClass, Stage, WaitReason};
 use crate::failpoint::{self, Point};
@@ -61,7 +61,12 @@ async fn compute(
 ) -> PairOutcome {
     let timeout = context.stage_timeout;
     let failed = loop {
-        match thread.next_event(timeout, &context.stop).await {
+        let event = tokio::select! {
+            biased;
+            event = thread.next_event(timeout, &context.stop) => event,
+            () = reading_after_stop(&pair.file_in_use, &context.stop) => ComputeEvent::Stopped,
+        };
+        match event {
             ComputeEvent::Started(started, inputs) => {
                 (stage, pair.inputs) = (started, inputs);
                 let pair = pair.attributes.name.clone();
@@ -109,6 +114,21 @@ async fn compute(
         }
     };
     PairOutcome::Ended(fail(context, checkpointer, stage, pair, failed).await)
+}
+
+/// Time after a stop request during which one input file may still be read.
+const LONGEST_READ_AFTER_STOP: Duration = Duration::from_millis(1500);
+
+/// Waits for a stop request, and then until a file has been read for too long: its disk or object store may be unavailable.
+async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
+    stop.reached(StopLevel::Drain).await;
+    loop {
+        let before = file.get();
+        tokio::time::sleep(LONGEST_READ_AFTER_STOP).await;
+        if before.is_some() && file.get() == before {
+            return;
+        }
+    }
 }
 
 /// Describes a stage that took too long, and the input file that it was reading.

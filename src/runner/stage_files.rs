@@ -5,8 +5,8 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-use tokio::sync::{Notify, mpsc};
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::sync::mpsc;
+use tokio::time::{Instant, timeout_at};
 
 use super::compute_thread::{ComputedStage, run_blocking};
 use super::error::RunError;
@@ -27,11 +27,11 @@ const STORE_PAUSE: Duration = Duration::from_secs(1);
 /// Much shorter than the time after a deadline when another process recovers the lease.
 const SHORTEST_STORE_WAIT: Duration = Duration::from_secs(10);
 
-/// An object store is considered unavailable if it has not finished a write for this long.
-const SLOW_WRITE: Duration = Duration::from_secs(20);
+/// After a stop request, a write to an object store is given up once it has lasted this long.
+const LONGEST_WRITE_AFTER_STOP: Duration = Duration::from_secs(5);
 
-/// Time after a stop request during which an unavailable object store is still waited for.
-const STORE_WAIT_AFTER_STOP: Duration = Duration::from_secs(5);
+/// After a stop request, a write is given at least this long.
+const SHORTEST_WRITE_AFTER_STOP: Duration = Duration::from_secs(1);
 
 /// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
 /// and `false` if a stage is unwritten because of a stop request or an unavailable object store.
@@ -133,7 +133,7 @@ async fn write_pack(
 
 /// Runs `writing` on a thread for blocking calls, again and again while the object store is unavailable. Returns `None`
 /// if nothing is stored within `longest`, before another process considers the lease overdue and blames the pair. After a
-/// stop request, it also returns `None` if the store is unavailable, or at once if the stop is immediate.
+/// stop request, it also returns `None` if the write lasts too long, or at once if the stop is immediate.
 ///
 /// # Errors
 /// Returns the error of `writing` unless the store is unavailable.
@@ -142,13 +142,12 @@ async fn stored_in_bucket<T: Send + 'static>(
     writing: impl Fn() -> Result<T, ArtifactError> + Clone + Send + 'static,
     longest: Duration,
 ) -> Result<Option<T>, ArtifactError> {
-    let unavailable = Notify::new();
+    let begun = Instant::now();
     let storing = async {
         let mut warned = false;
         loop {
             match run_blocking(writing.clone()).await {
                 Err(error) if error.is_unavailable() => {
-                    unavailable.notify_one();
                     if !warned {
                         tracing::warn!("{error}; waiting for it to store results");
                     }
@@ -160,10 +159,9 @@ async fn stored_in_bucket<T: Send + 'static>(
         }
     };
     let gave_up = async {
-        // Returns at once if the store was unavailable before.
-        let _ = timeout(SLOW_WRITE, unavailable.notified()).await;
         context.stop.reached(StopLevel::Drain).await;
-        tokio::time::sleep(STORE_WAIT_AFTER_STOP).await;
+        let first = Instant::now() + SHORTEST_WRITE_AFTER_STOP;
+        tokio::time::sleep_until(first.max(begun + LONGEST_WRITE_AFTER_STOP)).await;
     };
     tokio::select! {
         biased;

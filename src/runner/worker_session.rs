@@ -1,5 +1,7 @@
 //! Registers this process as a worker in the catalog, stores its heartbeats, and recovers the pairs of dead workers.
 
+use std::time::Instant;
+
 use super::error::RunError;
 use super::input_changes;
 use super::input_reads::ReadLimits;
@@ -90,7 +92,7 @@ impl WorkerSession {
             })
             .await?;
         self.last_heartbeat = now;
-        let dead = DeadWorker::Expired(expired);
+        let dead = DeadWorker::Known(expired);
         catalog
             .retry_while_unavailable(async || catalog.recover(dead.clone(), now).await)
             .await?;
@@ -108,11 +110,14 @@ impl WorkerSession {
         let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
         let holders = holders.await?;
         // The time after the reply, which may have been waited for.
-        let now = context.clock.now();
+        let (now, replied) = (context.clock.now(), Instant::now());
         let dead = self.liveness.observe(&holders, me, now);
         let (mut ready, mut poisoned) = (0, Vec::new());
         if !dead.is_empty() {
-            let dead = DeadWorker::Workers(dead);
+            let dead = DeadWorker::Observed {
+                workers: dead,
+                valid_until: replied + context.timing.recover_every,
+            };
             let recovered =
                 catalog.retry_while_unavailable(async || catalog.recover(dead.clone(), now).await);
             let recovered = recovered.await?;

@@ -223,8 +223,8 @@ impl Project {
         Ok(())
     }
 
-    /// Returns whether the project's folder has no artifacts. Returns `false` if artifacts are in an object store, or if
-    /// the folder cannot be read.
+    /// Returns whether the folder of artifacts is missing or holds none. Returns `false` if artifacts are in an object
+    /// store, or if the folder cannot be read.
     pub fn has_no_artifacts(&self) -> bool {
         if self
             .storage()

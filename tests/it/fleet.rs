@@ -63,17 +63,43 @@ impl Fleet {
         worker.expect("the binary starts")
     }
 
-    /// Returns the number of workers that others took for dead.
-    fn dead_workers(&self) -> i64 {
+    /// Runs SQL statements on the server.
+    fn sql(&self, text: &str) {
         let runtime = tokio::runtime::Runtime::new().expect("a runtime");
         runtime.block_on(async {
             let conn = <sqlx::PgConnection as sqlx::Connection>::connect(self.server.url()).await;
-            let count = sqlx::query_scalar("SELECT count(*) FROM mocban.worker WHERE died = 1");
-            count
-                .fetch_one(&mut conn.expect("a connection"))
-                .await
-                .expect("a number")
+            let text = sqlx::AssertSqlSafe(text.to_owned());
+            let mut conn = conn.expect("a connection");
+            let done = sqlx::raw_sql(text).execute(&mut conn).await;
+            done.expect("valid SQL");
+        });
+    }
+
+    /// Runs a query that returns a number.
+    fn number(&self, text: &str) -> i64 {
+        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+        runtime.block_on(async {
+            let conn = <sqlx::PgConnection as sqlx::Connection>::connect(self.server.url()).await;
+            let query = sqlx::query_scalar(sqlx::AssertSqlSafe(text.to_owned()));
+            let number = query.fetch_one(&mut conn.expect("a connection")).await;
+            number.expect("a number")
         })
+    }
+
+    /// Waits until at least one pair is done, and more are leased. Asserts that the workers are at work.
+    fn wait_for_work(&self, workers: &mut [Child]) {
+        loop {
+            let status = self.shared(&["status", "--json"]).expect(0).json();
+            let is_working = |worker: &mut Child| worker.try_wait().expect("a state").is_none();
+            assert!(
+                workers.iter_mut().all(is_working),
+                "a worker ended: {status}"
+            );
+            let jobs = &status["jobs"];
+            if jobs["done"].as_u64() > Some(0) && jobs["leased"].as_u64() > Some(0) {
+                return;
+            }
+        }
     }
 
     /// Asserts that the shared project is whole, and that its export and report are those of the project in a file.
@@ -182,14 +208,20 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
 fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     /// Leases last 5 seconds with [`TIME_SCALE`].
     const OUTAGE: Duration = Duration::from_millis(6_500);
-    let Some(fleet) = Fleet::new("12") else {
+    let Some(fleet) = Fleet::new("40") else {
         return;
     };
     fleet.shared(&["plan"]).expect(0);
-    let workers = [(); 3].map(|()| fleet.worker());
-    let status = || fleet.shared(&["status", "--json"]).expect(0).json();
-    while status()["jobs"]["done"] == 0 {}
-    assert_ne!(status()["jobs"]["leased"], 0, "the work ended too early");
+    // A later heartbeat or stage would hide that a worker was marked, or a pair blamed.
+    fleet.sql(
+        "CREATE TABLE public.taken (worker bigint);
+        CREATE FUNCTION public.note() RETURNS trigger LANGUAGE plpgsql AS
+            'BEGIN INSERT INTO public.taken VALUES (new.id); RETURN null; END';
+        CREATE TRIGGER note AFTER UPDATE ON mocban.worker FOR EACH ROW WHEN (new.died > old.died)
+            EXECUTE FUNCTION public.note();",
+    );
+    let mut workers = [(); 3].map(|()| fleet.worker());
+    fleet.wait_for_work(&mut workers);
     fleet.server.stop_at_once();
     // Leases end by time alone, so there is no event to wait for.
     std::thread::sleep(OUTAGE);
@@ -197,11 +229,37 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     for mut worker in workers {
         assert!(worker.wait().expect("an exit code").success());
     }
-    assert_eq!(
-        fleet.dead_workers(),
-        0,
-        "living workers were taken for dead"
+    let taken = fleet.number("SELECT count(*) FROM public.taken");
+    assert_eq!(taken, 0, "living workers were taken for dead");
+    fleet.assert_same();
+    fleet.assert_no_pair_is_left_or_quarantined();
+}
+
+/// Waiting does not help if the server refuses the user from now on.
+#[test]
+fn a_worker_that_may_not_connect_again_says_why_and_ends() {
+    let Some(fleet) = Fleet::new("40") else {
+        return;
+    };
+    fleet.shared(&["plan"]).expect(0);
+    fleet.sql("CREATE ROLE grid LOGIN SUPERUSER");
+    let url = fleet.server.url().replace("mocban@", "grid@");
+    let mut command = binary();
+    command.current_dir(fleet.path()).envs([TIME_SCALE]);
+    command.args(["-C", "shared", "--catalog", &url, "worker", "-j", "1"]);
+    let worker = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+    let mut workers = [worker.expect("the binary starts")];
+    fleet.wait_for_work(&mut workers);
+    fleet.sql(
+        "ALTER ROLE grid NOLOGIN;
+        SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = 'grid';",
     );
+    let [worker] = workers;
+    let ended = worker.wait_with_output().expect("an exit code");
+    let text = String::from_utf8_lossy(&ended.stderr);
+    assert!(!ended.status.success(), "{text}");
+    assert!(text.contains("not permitted to log in"), "{text}");
+    assert!(fleet.worker().wait().expect("an exit code").success());
     fleet.assert_same();
     fleet.assert_no_pair_is_left_or_quarantined();
 }
@@ -258,16 +316,7 @@ fn every_refusal_of_the_server_says_what_to_do() {
         command.current_dir(fleet.path()).env_remove("PGPASSWORD");
         call(command.args(["-C", "shared", "--catalog", url]).args(args))
     };
-    let sql = |text: &str| {
-        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-        runtime.block_on(async {
-            let mut conn = <sqlx::PgConnection as sqlx::Connection>::connect(url).await;
-            let conn = conn.as_mut().expect("a connection");
-            let text = sqlx::AssertSqlSafe(text.to_owned());
-            sqlx::raw_sql(text).execute(conn).await.expect("valid SQL");
-        });
-    };
-    sql("CREATE ROLE guarded LOGIN PASSWORD 'secret'; CREATE ROLE viewer LOGIN;
+    fleet.sql("CREATE ROLE guarded LOGIN PASSWORD 'secret'; CREATE ROLE viewer LOGIN;
         GRANT USAGE ON SCHEMA mocban TO viewer; GRANT SELECT ON ALL TABLES IN SCHEMA mocban TO viewer;");
     let mut cases = Vec::new();
     cases.push((
@@ -302,7 +351,7 @@ fn every_refusal_of_the_server_says_what_to_do() {
     let viewer = url.replace("mocban@", "viewer@");
     at(&viewer, &["status"]).expect(0);
     cases.push((at(&viewer, &["worker"]), "more rights"));
-    sql("UPDATE mocban.catalog_version SET version = 9000");
+    fleet.sql("UPDATE mocban.catalog_version SET version = 9000");
     cases.push((at(url, &["status"]), "another version"));
     for (call, way_on) in cases {
         assert_ne!(call.code, 0);

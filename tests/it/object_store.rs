@@ -6,7 +6,7 @@ use std::io::{BufRead as _, BufReader, Lines};
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::atomic::Ordering;
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use mocban::catalog::Catalog;
 use mocban::check::{CheckOptions, check};
@@ -227,6 +227,34 @@ fn a_stop_request_ends_the_wait_for_a_store_that_is_away() {
     assert_eq!(status["jobs"]["leased"], 0, "{status}");
     assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
     outage.end();
+    remote.remote(port, &["run"]).expect(0);
+    remote.assert_same_results();
+}
+
+/// Requests are repeated for minutes before the store counts as unavailable. A stop request does not wait for that.
+#[cfg(unix)]
+#[test]
+fn a_stop_request_does_not_wait_until_a_request_is_given_up() {
+    const LONGEST: Duration = Duration::from_secs(30);
+    let Some(remote) = Remote::new() else { return };
+    let outage = Outage::default();
+    let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    outage.begin_at_put();
+    let mut command = remote.command(port, "cache", &["run", "-j", "2"]);
+    let mut run = command.spawn().expect("the binary starts");
+    while !outage.has_begun() {
+        assert!(run.try_wait().expect("a state").is_none(), "it ended");
+        std::thread::yield_now();
+    }
+    let asked = Instant::now();
+    let id = rustix::process::Pid::from_child(&run);
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("sent");
+    assert_eq!(run.wait().expect("an exit code").code(), Some(130));
+    assert!(asked.elapsed() < LONGEST, "{:?}", asked.elapsed());
+    outage.end();
+    let status = remote.remote(port, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["jobs"]["leased"], 0, "{status}");
+    assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
     remote.remote(port, &["run"]).expect(0);
     remote.assert_same_results();
 }

@@ -233,6 +233,12 @@ impl Outage {
         self.begins_at_put.store(true, Ordering::SeqCst);
     }
 
+    /// Returns whether it has begun.
+    #[allow(dead_code, reason = "not every test binary waits for an outage")]
+    pub(crate) fn has_begun(&self) -> bool {
+        self.is_away.load(Ordering::SeqCst)
+    }
+
     /// Ends.
     pub(crate) fn end(&self) {
         self.is_away.store(false, Ordering::SeqCst);

@@ -101,7 +101,7 @@ impl WriteConnection {
     /// Connects again if the state of the connection is unknown.
     ///
     /// # Errors
-    /// Returns an error if the server refuses the connection.
+    /// Returns an error if waits were ended, or if the server refuses the connection.
     pub(crate) async fn reconnect_if_broken(&mut self) -> Result<()> {
         if self.is_broken {
             self.reconnect().await?;
@@ -109,16 +109,17 @@ impl WriteConnection {
         Ok(())
     }
 
-    /// Connects again after the server was unavailable, and waits until it is available. Returns `false` if the catalog
-    /// is not on a server, or if waits were ended.
+    /// Connects again after the server was unavailable, and waits until it is available. Does nothing if the catalog is a
+    /// file.
     ///
     /// # Errors
-    /// Returns an error if the server refuses the connection for a reason that waiting does not remove, such as a changed
-    /// password.
-    pub(crate) async fn reconnect(&mut self) -> Result<bool> {
+    /// Returns an error if waits were ended, or if the server refuses the connection for a reason that waiting does not
+    /// remove, such as a changed password.
+    pub(crate) async fn reconnect(&mut self) -> Result<()> {
         let Some(server) = &mut self.server else {
-            return Ok(false);
+            return Ok(());
         };
+        self.is_broken = true;
         let mut attempt = 0;
         loop {
             match server.address.reconnect().await {
@@ -133,11 +134,14 @@ impl WriteConnection {
                         tracing::debug!(%error, "the worker's lock is taken later");
                     }
                     tracing::info!("connected to the database server again");
-                    return Ok(true);
+                    return Ok(());
                 }
-                Err(error) if !error.is_unavailable() => return Err(error),
-                Err(error) if server.retry_wait.wait(attempt, &error).await => attempt += 1,
-                Err(_) => return Ok(false),
+                Err(error)
+                    if error.is_unavailable() && server.retry_wait.wait(attempt, &error).await =>
+                {
+                    attempt += 1;
+                }
+                Err(error) => return Err(error),
             }
         }
     }
@@ -154,12 +158,7 @@ impl WriteConnection {
             };
             server.state.worker_lock.set_worker(worker);
             match server.state.worker_lock.take(&mut self.conn).await {
-                Err(error) if error.is_unavailable() => {
-                    self.is_broken = true;
-                    if !self.reconnect().await? {
-                        return Err(error);
-                    }
-                }
+                Err(error) if error.is_unavailable() => self.reconnect().await?,
                 outcome => return outcome,
             }
         }
@@ -186,10 +185,8 @@ impl WriteConnection {
         loop {
             let (conn, path, _) = self.parts();
             match retry_while_busy!(path, begin(conn).await) {
-                Err(error) if error.is_unavailable() => {
-                    if !self.reconnect().await? {
-                        return Err(error);
-                    }
+                Err(error) if error.is_unavailable() && self.is_on_server() => {
+                    self.reconnect().await?;
                     tracing::debug!(%error, "the transaction begins again");
                 }
                 begun => break begun?,

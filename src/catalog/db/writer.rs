@@ -114,10 +114,8 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
         });
         match reply {
             // What was stored before the connection broke is found when the batch is applied again.
-            Err(error) if error.is_unavailable() => {
-                if !writer.reconnect().await? {
-                    break Err(error);
-                }
+            Err(error) if error.is_unavailable() && writer.is_on_server() => {
+                writer.reconnect().await?;
                 tracing::debug!(%error, "the commit is tried again");
             }
             reply => break reply,
@@ -131,6 +129,7 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
 fn is_of_the_file(error: &CatalogError) -> bool {
     use CatalogErrorKind::{Contradiction, Statement};
     let kind = error.kind();
-    error.log_loss().is_some()
+    matches!(error, CatalogError::NotConnected { .. })
+        || error.log_loss().is_some()
         || kind.is_some_and(|kind| !matches!(kind, Contradiction | Statement))
 }

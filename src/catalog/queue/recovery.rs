@@ -1,6 +1,7 @@
 //! Recovers leases of workers that died or hang, and quarantines pairs that kill workers.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
 
 use serde_json::json;
 
@@ -45,10 +46,16 @@ pub struct Recovered {
 /// Which workers are dead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeadWorker {
-    /// These workers, as they were last seen. A worker that was heard of since is not dead.
-    Workers(Vec<LeaseHolder>),
-    /// The earlier id of this process, whose leases have expired.
-    Expired(WorkerId),
+    /// These workers, with the heartbeats and connections observed. One that has sent a heartbeat or connected since is
+    /// left out. After `valid_until`, nobody is: the server may have been unavailable meanwhile, for the others too.
+    Observed {
+        /// The workers.
+        workers: Vec<LeaseHolder>,
+        /// When the observation is too old.
+        valid_until: Instant,
+    },
+    /// This worker, which is known to be dead, such as an earlier id of this process.
+    Known(WorkerId),
     /// All workers except this one, which holds the exclusive run lock.
     AllExcept(WorkerId),
 }
@@ -58,7 +65,7 @@ SELECT w.id, w.heartbeat, 1 AS is_connected FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1 UNION ALL SELECT worker FROM block_job WHERE status = 1)
 ORDER BY w.id";
 
-/// Selects the workers in `?1`, a list of `[worker, heartbeat]`, that have sent no other heartbeat.
+/// Selects the workers in `?1`, a list of `[worker, heartbeat]`, whose stored heartbeat is still the given one.
 const STILL_SILENT: &str = "
 SELECT w.id FROM json_each(?1) AS seen CROSS JOIN worker AS w ON w.id = CAST(seen.value ->> 0 AS bigint)
 WHERE w.heartbeat = CAST(seen.value ->> 1 AS bigint)";
@@ -254,12 +261,20 @@ async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
 /// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
 async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     match dead {
-        DeadWorker::Workers(seen) => {
-            let workers = json_array(still_dead(conn, seen).await?.iter().map(|worker| worker.0));
+        DeadWorker::Observed {
+            workers,
+            valid_until,
+        } => {
+            let workers = if Instant::now() < *valid_until {
+                still_dead(conn, workers).await?
+            } else {
+                Vec::new()
+            };
+            let workers = json_array(workers.iter().map(|worker| worker.0));
             query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
         }
-        DeadWorker::Expired(worker) => {
+        DeadWorker::Known(worker) => {
             let workers = json_array([worker.0]);
             query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
@@ -271,8 +286,8 @@ async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     }
 }
 
-/// Returns the workers that sent no heartbeat since they were seen. One that was seen without a connection, and has one
-/// now, is left out too. Between the observation and this transaction, the catalog may have been unavailable or locked.
+/// Returns the workers that have sent no heartbeat since they were observed. A worker that had no connection and has one now
+/// is left out too.
 async fn still_dead(conn: &mut Conn, seen: &[LeaseHolder]) -> Result<Vec<WorkerId>> {
     let items = json_array(
         seen.iter()

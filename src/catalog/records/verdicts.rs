@@ -146,8 +146,8 @@ ORDER BY v.pair, v.metric, v.reviewer, v.id";
 impl Catalog {
     /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
     /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
-    /// this call. Skips a verdict without `at` if it equals the reviewer's newest one. So a list that is imported twice is
-    /// stored once. Returns the number of verdicts of which a row was appended.
+    /// this call. Skips a verdict without `at` and context if it equals the reviewer's newest one. Returns the number of
+    /// verdicts of which a row was appended.
     ///
     /// # Errors
     /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
@@ -260,7 +260,7 @@ async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis)
 }
 
 /// Returns whether a verdict is stored already: one with the same values and time among the rows up to `newest`, or, if it
-/// has no time, the reviewer's newest one on the result. A verdict with an angle and without a time is always new.
+/// has no time, the reviewer's newest one on the result. Without a time, a verdict with a context, such as an angle, is always new.
 async fn is_stored(
     conn: &mut Conn,
     new: &NewVerdict,
@@ -269,7 +269,7 @@ async fn is_stored(
 ) -> Result<bool> {
     let sql = match new.at {
         Some(_) => IS_STORED,
-        None if new.look.angle_read_deg.is_some() => return Ok(false),
+        None if new.look != ReviewContext::default() => return Ok(false),
         None => IS_NEWEST,
     };
     let stored = query_scalar(sql)

@@ -20,14 +20,16 @@ mod together;
 mod verdicts;
 mod workers;
 
+use std::time::{Duration, Instant};
+
 use serde_json::{Map, json};
 
 pub(in crate::catalog) use self::place::Place;
 use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
-    InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
-    WorkerSettings,
+    InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, RerunPolicy, StageCheckpoint,
+    WorkerInfo, WorkerSettings,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
@@ -276,5 +278,14 @@ fn metric(metric: ThresholdMetric) -> MetricOutcome {
         margin: 0.2,
         confidence: Some(0.1 + 0.2),
         at_bound: false,
+    }
+}
+
+/// Returns workers that were observed just now and may be dead.
+fn observed(workers: Vec<LeaseHolder>) -> DeadWorker {
+    let valid_until = Instant::now() + Duration::from_hours(1);
+    DeadWorker::Observed {
+        workers,
+        valid_until,
     }
 }

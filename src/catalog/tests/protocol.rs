@@ -1,6 +1,6 @@
 //! Leases, checkpoints, failures, recovery and counters.
 
-use super::{World, done, name, register, row};
+use super::{World, done, name, observed, register, row};
 use crate::catalog::{
     Catalog, CatalogError, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction,
     RetrySelection, StageFailure,
@@ -148,7 +148,7 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
         );
         let holders = world.catalog.lease_holders().await.expect("a read");
         assert_eq!(holders.len(), 1);
-        let recover = world.catalog.recover(DeadWorker::Workers(holders), 60);
+        let recover = world.catalog.recover(observed(holders), 60);
         recover.await.expect("a recovery");
         world.assert_counters().await;
     }
@@ -159,7 +159,7 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
 }
 
 #[tokio::test]
-async fn a_worker_that_was_heard_of_since_it_was_seen_is_not_dead() {
+async fn a_worker_with_a_newer_heartbeat_than_observed_is_not_dead() {
     let world = World::new(1).await;
     let worker = register(&world.catalog).await;
     let request = ClaimRequest::new(worker, 1, 1_000);
@@ -168,7 +168,7 @@ async fn a_worker_that_was_heard_of_since_it_was_seen_is_not_dead() {
     let heartbeat = world.catalog.heartbeat(worker, 500, 0, None);
     assert!(heartbeat.await.expect("an answer"));
     let recover = async |holders| {
-        let dead = DeadWorker::Workers(holders);
+        let dead = observed(holders);
         world
             .catalog
             .recover(dead, 600)
@@ -179,6 +179,12 @@ async fn a_worker_that_was_heard_of_since_it_was_seen_is_not_dead() {
     assert_eq!(recover(seen).await, 0);
     assert_eq!(status(&world, "p0").await, JobStatus::Leased);
     let seen = world.catalog.lease_holders().await.expect("a read");
+    let too_old = DeadWorker::Observed {
+        workers: seen.clone(),
+        valid_until: std::time::Instant::now(),
+    };
+    let late = world.catalog.recover(too_old, 600).await;
+    assert_eq!(late.expect("a recovery").ready, 0);
     assert_eq!(recover(seen).await, 1);
     world.assert_counters().await;
 }

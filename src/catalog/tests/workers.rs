@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{World, register};
+use super::{World, observed, register};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::query_scalar;
 use crate::catalog::{WorkerRecord, WorkerState};
@@ -150,10 +150,16 @@ async fn others_see_whether_a_worker_is_connected() {
         holders[0].is_connected
     };
     assert_eq!(is_connected().await, !other.is_shared());
+    let unconnected = other.lease_holders().await.expect("a read");
     // The second call finds the lock held.
     for _ in 0..2 {
         world.catalog.keep_worker_lock(me).await.expect("the lock");
         assert!(is_connected().await);
+    }
+    if other.is_shared() {
+        // It has connected since it was observed.
+        let recovered = other.recover(observed(unconnected), 60).await;
+        assert_eq!(recovered.expect("a recovery").ready, 0);
     }
     // The lock of another connection is no error, such as after a broken connection that the server still keeps.
     other.keep_worker_lock(me).await.expect("an answer");

@@ -4,7 +4,7 @@ use rand::RngExt as _;
 
 use super::super::model::LEASE;
 use super::super::state_machine::JobState;
-use super::super::{fingerprints, name, row};
+use super::super::{fingerprints, name, observed, row};
 use super::{Game, LONGEST, MOST_PAIRS};
 use crate::catalog::{DeadWorker, NewVerdict, RerunPolicy, RetrySelection, ReviewContext};
 use crate::domain::{JobStatus, Stage, ThresholdMetric, Verdict};
@@ -41,8 +41,8 @@ impl Game {
             let mut holders = catalog.lease_holders().await.expect("a read");
             holders.retain(|holder| holder.worker == other);
             let dead = match holders.as_slice() {
-                [] => DeadWorker::Expired(other),
-                _ => DeadWorker::Workers(holders),
+                [] => DeadWorker::Known(other),
+                _ => observed(holders),
             };
             let recover = catalog.recover(dead, now);
             (recover.await, self.model.recover(&[other]))
