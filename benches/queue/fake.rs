@@ -1,5 +1,7 @@
 //! Checkpoints of faked stages, which compute nothing.
 
+use std::time::Instant;
+
 use mocban::catalog::{BlockSettings, Catalog, ClaimRequest, WorkerInfo, WorkerSettings};
 use mocban::catalog::{
     CheckpointOutcome, FingerprintIds, Fingerprints, InputVersion, InputVersions, Lease,
@@ -170,6 +172,7 @@ fn checkpoints(
             at: 1,
             next_deadline: 2_000,
             alive_since: 0,
+            written: Instant::now(),
         }
     };
     Stage::ALL.map(checkpoint).to_vec()

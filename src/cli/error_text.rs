@@ -204,6 +204,11 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
     if let Some(loss) = error.log_loss() {
         return Some(log_lost(&path, loss));
     }
+    if let Some(reason) = error.refused_user() {
+        return Some(format!(
+            "the database server of the catalog refused the connection: {reason}"
+        ));
+    }
     if error.is_of_pooler() {
         return Some(
             "a connection pooler such as PgBouncer changes the connection between transactions; set pool_mode = session there, or connect to PostgreSQL directly".to_owned(),

@@ -96,7 +96,11 @@ pub(super) async fn execute(
         context.next(missing_results::NEXT);
     }
     for command in next_steps(&summary, &failures, are_results_missing) {
-        context.next(&command);
+        let command = match (part, command.as_str()) {
+            (RunPart::Work, "run") => "worker",
+            (_, command) => command,
+        };
+        context.next(command);
     }
     Ok(code(&summary))
 }

@@ -1,6 +1,7 @@
 //! Stores results and failures of the stages of a block.
 
 use std::collections::BTreeSet;
+use std::time::Instant;
 
 use super::block_inputs::as_failure;
 use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
@@ -73,6 +74,7 @@ pub(super) async fn store_stage(
         at: context.clock.now(),
         next_deadline: context.block_deadline(),
         alive_since: context.alive_since(),
+        written: Instant::now(),
     };
     match stage.next() {
         Some(next) => advance(context, block, record, checkpoint, next).await,

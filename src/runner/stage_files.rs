@@ -61,6 +61,7 @@ fn with_times(context: &RunContext, stage: StageCheckpoint) -> StageCheckpoint {
         at: context.clock.now(),
         next_deadline: context.deadline(),
         alive_since: context.alive_since(),
+        written: std::time::Instant::now(),
         ..stage
     }
 }

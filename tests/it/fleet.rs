@@ -1,9 +1,10 @@
 //! Several processes on a catalog in PostgreSQL: the results are those of one process on a file, also when the server and
 //! the processes crash. `MOCBAN_KILLS` and `MOCBAN_KILLED_PAIRS` set the numbers of crashes and pairs.
 
+use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -208,7 +209,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
 fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     /// Leases last 5 seconds with [`TIME_SCALE`].
     const OUTAGE: Duration = Duration::from_millis(6_500);
-    let Some(fleet) = Fleet::new("40") else {
+    let Some(fleet) = Fleet::new("30") else {
         return;
     };
     fleet.shared(&["plan"]).expect(0);
@@ -235,10 +236,41 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     fleet.assert_no_pair_is_left_or_quarantined();
 }
 
+/// A commit that waited for long may name files that were removed meanwhile as unreferenced.
+#[test]
+fn after_a_long_outage_no_result_names_files_that_were_removed() {
+    /// Commits wait for at most 2 seconds with this scale.
+    const COMMITS: (&str, &str) = ("MOCBAN_COMMIT_TIME_SCALE", "900");
+    const OUTAGE: Duration = Duration::from_millis(2_500);
+    let Some(fleet) = Fleet::new("30") else {
+        return;
+    };
+    fleet.shared(&["plan"]).expect(0);
+    let mut workers = [(); 3].map(|()| fleet.worker_with(&[TIME_SCALE, COMMITS]));
+    fleet.wait_for_work(&mut workers);
+    fleet.server.stop_at_once();
+    // The time since a commit began is what matters, so there is no event to wait for.
+    std::thread::sleep(OUTAGE);
+    let old = SystemTime::now() - Duration::from_hours(2);
+    for path in files(&fleet.path().join("shared/artifacts")).keys() {
+        let file = File::options()
+            .write(true)
+            .open(fleet.path().join("shared/artifacts").join(path));
+        file.expect("a file").set_modified(old).expect("changed");
+    }
+    fleet.server.start_again();
+    fleet.shared(&["check", "--collect=1"]);
+    for mut worker in workers {
+        assert!(worker.wait().expect("an exit code").success());
+    }
+    fleet.assert_same();
+    fleet.assert_no_pair_is_left_or_quarantined();
+}
+
 /// Waiting does not help if the server refuses the user from now on.
 #[test]
 fn a_worker_that_may_not_connect_again_says_why_and_ends() {
-    let Some(fleet) = Fleet::new("40") else {
+    let Some(fleet) = Fleet::new("30") else {
         return;
     };
     fleet.shared(&["plan"]).expect(0);

@@ -3,6 +3,7 @@
 use crate::catalog::blocks::model::{BlockCheckpoint, BlockInputVersions, BlockLease};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::queue::lease::was_written_long_ago;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{BlockId, BlockStage, UnixMillis, WorkerId};
 use crate::failpoint::{self, Point};
@@ -113,16 +114,19 @@ pub(crate) async fn store(
     stage: &BlockCheckpoint,
 ) -> Result<Stored> {
     let (record, index) = (&stage.record, stage.record.stage.index() as i64);
-    let advanced: Option<BlockId> = query_scalar(ADVANCE)
+    let advance = query_scalar(ADVANCE)
         .bind(lease.block.0)
         .bind(lease.worker.0)
         .bind(lease.token)
         .bind(stage.alive_since)
         .bind(index)
         .bind(index + 1)
-        .bind(stage.next_deadline)
-        .fetch_optional(&mut *conn)
-        .await?;
+        .bind(stage.next_deadline);
+    let advanced: Option<BlockId> = if was_written_long_ago(stage.written) {
+        None
+    } else {
+        advance.fetch_optional(&mut *conn).await?
+    };
     if advanced.is_none() {
         let stored = query_scalar(IS_STORED)
             .bind(lease.block.0)

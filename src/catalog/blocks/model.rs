@@ -1,5 +1,7 @@
 //! Blocks as plain values: attributes, leases, and what is stored under a lease.
 
+use std::time::Instant;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -192,6 +194,8 @@ pub struct BlockCheckpoint {
     pub next_deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
+    /// When its files were written.
+    pub written: Instant,
 }
 
 /// What happens to a block whose stage failed.

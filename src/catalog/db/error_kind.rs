@@ -3,6 +3,7 @@
 use sqlx::postgres::PgDatabaseError;
 
 use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::postgres::connection_error;
 
 /// The kind of a database error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,6 +87,18 @@ impl CatalogError {
     /// Returns whether the database server cannot be reached at the moment.
     pub fn is_unavailable(&self) -> bool {
         self.kind() == Some(CatalogErrorKind::Unavailable)
+    }
+
+    /// Explains why the server refused the user of a connection, such as after a change of the password. Returns `None` for
+    /// other errors.
+    pub fn refused_user(&self) -> Option<String> {
+        let error = match self {
+            Self::Database(error) => error,
+            Self::Shared(error) => return error.refused_user(),
+            _ => return None,
+        };
+        let code = error.as_database_error()?.code()?;
+        code.starts_with("28").then(|| connection_error(error))
     }
 
     /// Returns whether a statement that this connection prepared is unknown, because a connection pooler has changed the

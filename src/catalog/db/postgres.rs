@@ -266,7 +266,7 @@ UNION ALL SELECT set_config('plan_cache_mode', 'auto', true)
 UNION ALL SELECT CAST(pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482)) AS text)";
 
 /// Describes why a connection failed, with what to do.
-fn connection_error(error: &sqlx::Error) -> String {
+pub(crate) fn connection_error(error: &sqlx::Error) -> String {
     let Some(refused) = error.as_database_error() else {
         return match CatalogErrorKind::of(error) {
             Some(CatalogErrorKind::Unavailable) => {
@@ -278,7 +278,9 @@ fn connection_error(error: &sqlx::Error) -> String {
     let text = refused.message();
     match refused.code().as_deref() {
         Some("28P01" | "28000") => {
-            format!("{text}; check the user and the password in ~/.pgpass or PGPASSWORD")
+            format!(
+                "{text}; check the user, the password in ~/.pgpass or PGPASSWORD, and pg_hba.conf of the server"
+            )
         }
         Some("3D000") => format!("{text}; create it with `createdb`, or correct the address"),
         Some("53300") => format!("{text}; close other programs, or raise max_connections"),

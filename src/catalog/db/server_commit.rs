@@ -11,7 +11,7 @@ use crate::catalog::db::write_connection::CatalogServerState;
 use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::ClaimRequest;
 use crate::catalog::queue::counters::{self, DONE};
-use crate::catalog::queue::lease::Lease;
+use crate::catalog::queue::lease::{Lease, StageCheckpoint, was_written_long_ago};
 use crate::catalog::queue::{server_checkpoint, server_claim};
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
@@ -67,6 +67,13 @@ async fn commit_parts(
     Ok(reply)
 }
 
+/// Returns whether files of a checkpoint may have been removed.
+fn is_late(stages: &[StageCheckpoint]) -> bool {
+    stages
+        .iter()
+        .any(|stage| was_written_long_ago(stage.written))
+}
+
 /// Stores checkpoints. Returns for each whether it is stored.
 async fn store(
     conn: &mut Conn,
@@ -76,7 +83,8 @@ async fn store(
     let Conn::Postgres(server) = conn else {
         unreachable!("a server is PostgreSQL");
     };
-    let stored = server_checkpoint::store(server, checkpoints.iter().copied()).await?;
+    let timely = checkpoints.iter().copied().filter(|item| !is_late(&item.1));
+    let stored = server_checkpoint::store(server, timely).await?;
     let mut earlier = Vec::new();
     // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
     if state.leases.is_searching() {

@@ -230,6 +230,7 @@ impl WriteConnection {
                 return;
             }
             Conn::Sqlite(Held::Owned(conn)) => conn.close().await,
+            Conn::Postgres(Held::Owned(_)) if self.is_broken => return,
             Conn::Postgres(Held::Owned(conn)) => conn.close().await,
             Conn::Sqlite(_) | Conn::Postgres(_) => return,
         };

@@ -1,5 +1,7 @@
 //! Leases, and what is stored under them.
 
+use std::time::{Duration, Instant};
+
 use serde::Serialize;
 
 use crate::catalog::db::row::from_row;
@@ -8,6 +10,7 @@ use crate::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, Stage, UnixMillis,
     WorkerId,
 };
+use crate::failpoint;
 
 /// The right to run stages of one pair. A claim creates the lease, and a checkpoint continues it. Results and failures
 /// of stages are stored only under a valid lease.
@@ -151,6 +154,18 @@ pub struct StageCheckpoint {
     pub next_deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
+    /// When its files were written.
+    #[serde(skip)]
+    pub written: Instant,
+}
+
+/// Longest time from the writing of files to the commit of their rows, which may wait for a server that is unavailable.
+/// Later, the files may have been removed as unreferenced (`store/collect.rs`), so their stages are computed again.
+const LONGEST_COMMIT: Duration = Duration::from_mins(30);
+
+/// Returns whether files that were written at this time may have been removed, because no row names them yet.
+pub(crate) fn was_written_long_ago(written: Instant) -> bool {
+    written.elapsed() > LONGEST_COMMIT / failpoint::time_scale("MOCBAN_COMMIT_TIME_SCALE")
 }
 
 /// What happens to a failed job.

@@ -69,6 +69,7 @@ fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
         at: 100,
         next_deadline: 2_000,
         alive_since: 0,
+        written: std::time::Instant::now(),
     }
 }
 
