@@ -11,9 +11,6 @@ function create(tag, text, ...children) {
   return created;
 }
 
-/** Quotes a path for a shell if it has characters other than the common ones. */
-const quoted = (path) => (/^[\w./-]+$/.test(path) ? path : `'${path.replaceAll("'", "'\\''")}'`);
-
 function lines({ results, reviewer, is_inattentive: isInattentive, others }) {
   const { pass, fail, unsure } = results;
   const texts = [translate("summary_results", { n: pass + fail + unsure, pass, fail, unsure })];
@@ -38,12 +35,12 @@ export async function showEnd(heading, hasItems) {
   const response = await fetch("/api/summary").catch(() => null);
   if (!response?.ok || element.hidden) return;
   const summary = await response.json();
-  const command = (text) => create("code", `mocban -C ${quoted(summary.project)} ${text}`);
+  const command = (text) => create("code", `${summary.command} ${text}`);
   element.replaceChildren(
     create("h2", translate("summary")),
     create("ul", "", ...lines(summary).map((text) => create("li", text))),
     create("h3", translate("next_steps")),
-    create("p", `${translate("next_report")} `, command("report -f html -o report.html")),
+    create("p", `${translate("next_report")} `, command("report -o report.html")),
     create("p", `${translate("next_reviewer")} `, command("review --reviewer NAME")),
   );
   element.dataset.ready = "true";

@@ -56,7 +56,7 @@ impl AttentionCheckRates {
     }
 }
 
-/// Returns whether fewer than half of at least [`MIN_CHECKS`] planted faults were detected.
+/// Returns whether fewer than half of at least four planted faults were detected.
 pub fn is_inattentive(rate: &Rate) -> bool {
     rate.n >= MIN_CHECKS && rate.count * 2 < rate.n
 }

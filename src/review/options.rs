@@ -40,6 +40,8 @@ impl QueueOptions {
 pub struct ReviewOptions {
     /// Whose queue is served, and what it contains.
     pub queue: QueueOptions,
+    /// The command line that names this project, such as `mocban -C blocks`. The last page shows the next commands.
+    pub command: String,
     /// Language of the page; `None` for that of the browser.
     pub language: Option<Language>,
     /// Map of physical keys to actions, from [`key_map`](super::key_map).

@@ -19,8 +19,8 @@ pub(super) struct ReviewSummary {
     is_inattentive: bool,
     /// Agreement with every other reviewer who judged the same results.
     others: Vec<ReviewerPair>,
-    /// Folder of the project, for the next commands.
-    project: String,
+    /// The command line that names this project, for the next commands.
+    command: String,
 }
 
 /// Number of results by verdict.
@@ -75,7 +75,7 @@ impl ReviewSummary {
             is_inattentive: is_inattentive(&reviewer.attention_checks.all),
             reviewer,
             others,
-            project: state.project.dir().display().to_string(),
+            command: state.options.command.clone(),
         }))
     }
 }

@@ -168,7 +168,7 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         assert!(text.contains(&noticed_text), "{text}");
         let missed = text.contains("Most attention checks were missed");
         assert_eq!(missed, noticed == 0, "{text}");
-        assert!(text.contains("report -f html -o report.html"), "{text}");
+        assert!(text.contains("report -o report.html"), "{text}");
         let agrees = text.contains("3 of 3 answers are the same as those of bo");
         assert_eq!(agrees, reviewer == "lan", "{text}");
         tab.key("Backspace");

@@ -54,13 +54,25 @@ fn line(table: &Table, row: &[Option<String>]) -> Markup {
     }
 }
 
-/// Returns a cell. The hyphen of a negative number becomes a minus sign.
+/// Returns a cell. Hyphens of negative numbers become minus signs.
 fn cell_text(cell: Option<&str>, format: ColumnFormat) -> Markup {
     match (cell, format) {
-        (Some(text), ColumnFormat::Number(_)) => html! { (text.replace('-', "\u{2212}")) },
-        (Some(text), ColumnFormat::Text | ColumnFormat::Interval) => html! { (text) },
+        (Some(text), ColumnFormat::Number(_) | ColumnFormat::Interval) => {
+            html! { (text.replace('-', "\u{2212}")) }
+        }
+        // Two bounds that are negative stand in a text, such as `-0.017, -0.007`.
+        (Some(text), ColumnFormat::Text) if is_numeric(text) => {
+            html! { (text.replace('-', "\u{2212}")) }
+        }
+        (Some(text), ColumnFormat::Text) => html! { (text) },
         (None, _) => html! { span.none title="does not exist" { "\u{2013}" } },
     }
+}
+
+/// Returns whether a text has only numbers and separators.
+fn is_numeric(text: &str) -> bool {
+    let is_part = |c: char| c.is_ascii_digit() || "-., ".contains(c);
+    text.contains(|c: char| c.is_ascii_digit()) && text.chars().all(is_part)
 }
 
 const fn class(column: &TableColumn) -> &'static str {
