@@ -80,8 +80,8 @@ fn a_mirrored_mesh_never_passes() {
         "{error}"
     );
     let text = |times| RegisterError::Mirrored { times }.to_string();
-    assert!(text(2.34).contains("(2.34 times as well)"));
-    assert!(text(34_847.79).contains("(more than 100 times as well)"));
+    assert!(text(2.34).contains("(2.34 times as well as the print itself)"));
+    assert!(text(34_847.79).contains("(more than 100 times as well as the print itself)"));
 }
 
 #[test]
