@@ -11,8 +11,8 @@
 //!   It must name a point on a thread for blocking code: `computed`, `written` or `synced`.
 //! - `MOCBAN_PANIC_AT` panics. It can name the same points as `MOCBAN_HOLD_AT`.
 //!
-//! `MOCBAN_TIME_SCALE=N` divides intervals of heartbeats, leases and recovery by N, and `MOCBAN_STORE_TIME_SCALE=N` the time
-//! limits of an object store.
+//! `MOCBAN_TIME_SCALE=N` divides intervals of heartbeats, leases, recovery and reconnection by N, `MOCBAN_STORE_TIME_SCALE=N`
+//! the time limits of an object store, and `MOCBAN_COMMIT_TIME_SCALE=N` the longest wait of a commit.
 //!
 //! Only builds with debug assertions read these variables.
 

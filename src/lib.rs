@@ -104,14 +104,13 @@
 //! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
 //! rights first, so that `review` and `verdict` can say what is missing.
 //!
-//! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`). If the server
-//! refuses the connection for good, the run ends. If an earlier
-//! attempt was stored but its reply was lost, the fencing token and the position of the job show it; leases whose claim had
-//! no reply are searched for too (`db/known_leases.rs`). The write connection of each worker holds a lock
-//! (`queue/worker_lock.rs`): if it is free for about 7 seconds, the worker is dead (`runner/liveness.rs`). The
-//! transaction that recovers its pairs looks again first (`queue/recovery.rs`).
-//! `Catalog::retry_while_unavailable` repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with
-//! other settings.
+//! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`); if the
+//! server refuses the connection for good, the run ends. If an earlier attempt was stored but its reply was lost, the
+//! fencing token and the position of the job show it; leases whose claim had no reply are searched for too
+//! (`db/known_leases.rs`). The write connection of each worker holds a lock (`queue/worker_lock.rs`): a worker whose
+//! lock is free for about 7 seconds and that sends no heartbeat is dead, except after an outage (`runner/liveness.rs`).
+//! The transaction that recovers its pairs looks again first (`queue/recovery.rs`). `Catalog::retry_while_unavailable`
+//! repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with other settings.
 //!
 //! ## Files in an object store
 //!

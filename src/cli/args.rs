@@ -180,7 +180,7 @@ const LONG_DASHES: [char; 6] = [
 /// Returns a tip on an option that begins with a dash instead of a hyphen.
 fn dash_tip(word: &str) -> Option<String> {
     let option = word.trim_start_matches(LONG_DASHES).trim_start_matches('-');
-    let is_typed = word.starts_with(LONG_DASHES) && !option.is_empty();
+    let is_typed = word.starts_with(LONG_DASHES) && option.starts_with(char::is_alphabetic);
     let hyphens = if option.chars().count() == 1 {
         "-"
     } else {

@@ -6,7 +6,7 @@ use crate::domain::JobStatus;
 use crate::store::Project;
 
 /// Explains what is missing and what to do, for `status` and `run`.
-pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; once scans and prints are at their places, `check --repair` lets the next run compute them again (if they are elsewhere, restore the backup into a new folder with --inputs)";
+pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; once the scans and prints are in place, `check --repair` lets the next run compute them again; if they are in another folder, restore the backup into a new folder with `--inputs DIR`";
 
 /// The command that helps.
 pub(super) const NEXT: &str = "check --repair";

@@ -103,7 +103,11 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
             args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
             args.port,
         ),
-        command: context.command("").trim_end().to_owned(),
+        command: context
+            .without_setting_flags()
+            .command("")
+            .trim_end()
+            .to_owned(),
         language,
         keys,
         min_view_ms: args.min_view_ms,

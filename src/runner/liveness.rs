@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use crate::catalog::LeaseHolder;
 use crate::domain::{UnixMillis, WorkerId};
 
-/// Time without a connection and without a new heartbeat after which a worker that was connected is dead, as a share of
-/// the lease: 7 of 50 seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then
+/// Time without a connection and without a new heartbeat after which a worker is dead, as a share of the lease: 7 of 50
+/// seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then
 /// usually connects again at once.
 const UNCONNECTED_SHARE: f64 = 0.14;
 /// Longest time between two observations that is no sign of an outage of the server, as a share of the lease: 5 of 50
@@ -22,6 +22,8 @@ pub(super) struct Liveness {
     seen: BTreeMap<WorkerId, SeenWorker>,
     /// Time of the last call of [`Self::observe`].
     observed: Option<UnixMillis>,
+    /// Time of the first observation after the last gap.
+    steady_since: UnixMillis,
 }
 
 /// What was seen of a worker.
@@ -30,7 +32,8 @@ struct SeenWorker {
     heartbeat: UnixMillis,
     /// When the heartbeat was first seen.
     since: UnixMillis,
-    /// Whether it had a connection since the last gap.
+    /// Whether it had a connection since the last gap, or appeared when there was none for long, so that it must have had
+    /// one.
     was_connected: bool,
     /// Since when it has no connection.
     unconnected_since: Option<UnixMillis>,
@@ -43,11 +46,17 @@ impl Liveness {
             lease_ms,
             seen: BTreeMap::new(),
             observed: None,
+            steady_since: 0,
         }
     }
 
-    /// Records the current heartbeats and connections of all workers with leases. Returns those that are dead, as they were
-    /// seen now. Must be called every few seconds.
+    /// Returns for how long, in milliseconds, this process could read the catalog without a gap.
+    pub(super) const fn steady_for(&self, now: UnixMillis) -> i64 {
+        now - self.steady_since
+    }
+
+    /// Records the current heartbeats and connections of all workers with leases. Returns the dead ones, as observed now.
+    /// Must be called every few seconds.
     pub(super) fn observe(
         &mut self,
         holders: &[LeaseHolder],
@@ -61,6 +70,7 @@ impl Liveness {
         self.observed = Some(now);
         let is_steady = gap <= usual_gap_ms;
         if !is_steady {
+            self.steady_since = now;
             // The others may need longer to connect again, so only their heartbeats count until they have.
             for seen in self.seen.values_mut() {
                 (seen.was_connected, seen.unconnected_since) = (false, None);

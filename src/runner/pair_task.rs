@@ -116,16 +116,23 @@ async fn compute(
     PairOutcome::Ended(fail(context, checkpointer, stage, pair, failed).await)
 }
 
-/// Time after a stop request during which one input file may still be read.
-const LONGEST_READ_AFTER_STOP: Duration = Duration::from_millis(1500);
+/// Longest time for which a file is read after a stop request. It includes decoding, so it is longer than that of the
+/// largest usual scans.
+const LONGEST_READ_AFTER_STOP: Duration = Duration::from_secs(5);
+/// Interval at which the file in use is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
 
-/// Waits for a stop request, and then until a file has been read for too long: its disk or object store may be unavailable.
+/// Waits for a stop request, and then until one file has been read for too long: its disk or object store may be
+/// unavailable.
 async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
     stop.reached(StopLevel::Drain).await;
+    let (mut path, mut since) = (file.get(), Instant::now());
     loop {
-        let before = file.get();
-        tokio::time::sleep(LONGEST_READ_AFTER_STOP).await;
-        if before.is_some() && file.get() == before {
+        tokio::time::sleep(LOOK_EVERY).await;
+        let now = file.get();
+        if now != path {
+            (path, since) = (now, Instant::now());
+        } else if path.is_some() && since.elapsed() >= LONGEST_READ_AFTER_STOP {
             return;
         }
     }

@@ -45,7 +45,8 @@ pub(super) async fn write_batch(
         return write_pack(context, pair, first, stages).await;
     }
     let (mut batch, mut next) = (Vec::new(), Some(first));
-    while let Some((stage, files)) = next {
+    while let Some((mut stage, files)) = next {
+        stage.written = std::time::Instant::now();
         if !write_files(context, pair, stage.stage, files).await? {
             return Ok((batch, false));
         }
@@ -61,7 +62,6 @@ fn with_times(context: &RunContext, stage: StageCheckpoint) -> StageCheckpoint {
         at: context.clock.now(),
         next_deadline: context.deadline(),
         alive_since: context.alive_since(),
-        written: std::time::Instant::now(),
         ..stage
     }
 }
@@ -101,6 +101,9 @@ async fn write_pack(
         batch.push(stage);
         counts.push(more.len());
         files.extend(more);
+    }
+    for stage in &mut batch {
+        stage.written = std::time::Instant::now();
     }
     let (project, name) = (context.project.clone(), pair.clone());
     let last = batch[batch.len() - 1].stage;

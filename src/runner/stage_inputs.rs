@@ -112,11 +112,13 @@ impl StageInputs {
             .get(&stage)
             .and_then(|stored| stored.files.get(role))
             .ok_or(ExecutionError::RerunFrom(stage))?;
-        self.metrics
-            .waiting(WaitReason::Artifacts, || {
-                self.project.read_artifact(artifact)
-            })
-            .map_err(|error| match error {
+        pair.file_in_use
+            .set(Some(&self.project.artifact_path(artifact)));
+        let bytes = self.metrics.waiting(WaitReason::Artifacts, || {
+            self.project.read_artifact(artifact)
+        });
+        pair.file_in_use.set(None);
+        bytes.map_err(|error| match error {
                 ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
                     tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
                     ExecutionError::RerunFrom(stage)

@@ -124,9 +124,13 @@ impl WorkerSession {
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
         }
+        // Deadlines pass during an outage. After it, each worker ends or renews its leases within the longest deadline, that
+        // of a block.
+        let longest = 2 * context.stage_timeout.as_millis() as i64;
+        let is_steady = self.liveness.steady_for(now) > longest;
         let is_due =
             now - self.overdue_checked >= context.timing.heartbeat_every.as_millis() as i64;
-        if is_due && holders.iter().any(|holder| holder.worker != me) {
+        if is_due && is_steady && holders.iter().any(|holder| holder.worker != me) {
             self.overdue_checked = now;
             let margin = context.timing.deadline_margin.as_millis() as i64;
             let overdue = catalog

@@ -1,12 +1,13 @@
 //! Removes unreferenced artifacts while runs may be active: files and packs that no row names and that are older than a
 //! given age.
 //!
-//! A worker names new files in a row within the time limit of a stage, or, if the catalog's server is unavailable, within
-//! half an hour. So an older file without a row will never have one. A pack has a name that is never used again. An object that is named by its content, such as the mesh of a cut
-//! character, may be written again at the moment when it is removed, so it is removed only while no run is active. A
-//! file in the project's folder is named by its content, and a worker may find that an unreferenced file holds just the
-//! bytes that it wants to write. It then sets the file's time of change, and the collector looks at this time again
-//! after it has moved the file aside.
+//! A worker stores the row of a new file within the time limit of a stage. If the database server is unavailable, the row is
+//! stored within half an hour or never. So an older file without a row will never have one. A pack has a name that is
+//! never used again. An object that is named by its content, such as the mesh of a cut character, may be written again
+//! at the moment when it is removed, so it is removed only while no run is active. A file in the project's folder is
+//! named by its content, and a worker may find that an unreferenced file holds just the bytes that it wants to write.
+//! It then sets the file's time of change, and the collector looks at this time again after it has moved the file
+//! aside.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};

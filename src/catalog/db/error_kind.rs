@@ -3,7 +3,6 @@
 use sqlx::postgres::PgDatabaseError;
 
 use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::postgres::connection_error;
 
 /// The kind of a database error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,8 +96,12 @@ impl CatalogError {
             Self::Shared(error) => return error.refused_user(),
             _ => return None,
         };
-        let code = error.as_database_error()?.code()?;
-        code.starts_with("28").then(|| connection_error(error))
+        let server = error.as_database_error()?;
+        let server = server.try_downcast_ref::<PgDatabaseError>()?;
+        server
+            .code()
+            .starts_with("28")
+            .then(|| connection_error(error))
     }
 
     /// Returns whether a statement that this connection prepared is unknown, because a connection pooler has changed the
@@ -142,6 +145,32 @@ impl CatalogError {
             Self::Shared(error) => error.kind(),
             _ => None,
         }
+    }
+}
+
+/// Describes why a connection failed, with what to do.
+pub(crate) fn connection_error(error: &sqlx::Error) -> String {
+    let Some(refused) = error.as_database_error() else {
+        return match CatalogErrorKind::of(error) {
+            Some(CatalogErrorKind::Unavailable) => {
+                format!("{error}; check the host, the port and that PostgreSQL runs")
+            }
+            _ => error.to_string(),
+        };
+    };
+    let text = refused.message();
+    match refused.code().as_deref() {
+        Some("28P01" | "28000") => {
+            format!(
+                "{text}; check the user, the password in ~/.pgpass or PGPASSWORD, and pg_hba.conf of the server"
+            )
+        }
+        Some("3D000") => format!("{text}; create it with `createdb`, or correct the address"),
+        Some("53300") => format!("{text}; close other programs, or raise max_connections"),
+        _ if text.contains("unsupported startup parameter") => {
+            format!("{text}; PgBouncer permits it with `ignore_startup_parameters`")
+        }
+        _ => text.to_owned(),
     }
 }
 

@@ -6,7 +6,7 @@ use sqlx::postgres::{PgPool, PgPoolOptions};
 use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Row as _, Transaction};
 
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::db::error_kind::CatalogErrorKind;
+use crate::catalog::db::error_kind::{CatalogErrorKind, connection_error};
 use crate::catalog::db::open::SCHEMA_VERSION;
 use crate::catalog::db::postgres_address::PostgresAddress;
 
@@ -264,29 +264,3 @@ SELECT set_config(name, 'on', true) FROM (VALUES ('enable_bitmapscan'), ('enable
     ('enable_seqscan')) AS setting (name)
 UNION ALL SELECT set_config('plan_cache_mode', 'auto', true)
 UNION ALL SELECT CAST(pg_advisory_xact_lock(hashtextextended(current_setting('search_path'), 1836016482)) AS text)";
-
-/// Describes why a connection failed, with what to do.
-pub(crate) fn connection_error(error: &sqlx::Error) -> String {
-    let Some(refused) = error.as_database_error() else {
-        return match CatalogErrorKind::of(error) {
-            Some(CatalogErrorKind::Unavailable) => {
-                format!("{error}; check the host, the port and that PostgreSQL runs")
-            }
-            _ => error.to_string(),
-        };
-    };
-    let text = refused.message();
-    match refused.code().as_deref() {
-        Some("28P01" | "28000") => {
-            format!(
-                "{text}; check the user, the password in ~/.pgpass or PGPASSWORD, and pg_hba.conf of the server"
-            )
-        }
-        Some("3D000") => format!("{text}; create it with `createdb`, or correct the address"),
-        Some("53300") => format!("{text}; close other programs, or raise max_connections"),
-        _ if text.contains("unsupported startup parameter") => {
-            format!("{text}; PgBouncer permits it with `ignore_startup_parameters`")
-        }
-        _ => text.to_owned(),
-    }
-}

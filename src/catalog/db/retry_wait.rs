@@ -39,7 +39,7 @@ impl RetryWait {
         // Between 0.5 and 1.5. The standard library seeds each state at random.
         let random = RandomState::new().hash_one(attempt) >> 32;
         let factor = 0.5 + random as f64 / f64::from(u32::MAX);
-        let longest = LONGEST_WAIT / failpoint::time_scale("MOCBAN_TIME_SCALE").max(1);
+        let longest = LONGEST_WAIT / failpoint::time_scale("MOCBAN_TIME_SCALE");
         let wait = tokio::time::sleep(doubled.min(longest).mul_f64(factor));
         let stopped = self.stopped.notified();
         if self.is_stopped.load(Ordering::Acquire) {

@@ -10,7 +10,7 @@ use crate::catalog::db::known_leases::stored_before;
 use crate::catalog::db::write_connection::CatalogServerState;
 use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::ClaimRequest;
-use crate::catalog::queue::counters::{self, DONE};
+use crate::catalog::queue::counters::{self, DONE, cursor};
 use crate::catalog::queue::lease::{Lease, StageCheckpoint, was_written_long_ago};
 use crate::catalog::queue::{server_checkpoint, server_claim};
 
@@ -85,12 +85,21 @@ async fn store(
     };
     let timely = checkpoints.iter().copied().filter(|item| !is_late(&item.1));
     let stored = server_checkpoint::store(server, timely).await?;
+    if checkpoints.iter().any(|item| is_late(&item.1)) {
+        // The next claim gets these leases back, and computes the stages again.
+        state.leases.replies_may_be_lost();
+    }
     let mut earlier = Vec::new();
     // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
     if state.leases.is_searching() {
+        // A late checkpoint of stages that were computed again may end where its lease began, stored or not.
+        let is_unclear = |(lease, stages): &LeasedCheckpoints| {
+            let end = position_after(stages);
+            is_late(stages) && end.is_some_and(|(at, _)| at == cursor(lease.cursor))
+        };
         let others = checkpoints
             .iter()
-            .filter(|(lease, _)| !lease.is_in(&stored));
+            .filter(|item| !item.0.is_in(&stored) && !is_unclear(item));
         earlier = stored_before(conn, others.copied(), [].into_iter()).await?;
     }
     let is_kept = |lease: &Lease| lease.is_in(&stored) || lease.is_in(&earlier);

@@ -109,6 +109,15 @@ impl WriteConnection {
         Ok(())
     }
 
+    /// Waits before a connection is opened for the `repeats`th time in a row, because a server may end every connection after
+    /// its first statement. Returns `false` if waits were ended.
+    pub(crate) async fn may_repeat(&self, repeats: u32, error: &CatalogError) -> bool {
+        match &self.server {
+            Some(server) if repeats > 0 => server.retry_wait.wait(repeats, error).await,
+            _ => self.is_on_server(),
+        }
+    }
+
     /// Connects again after the server was unavailable, and waits until it is available. Does nothing if the catalog is a
     /// file.
     ///
@@ -152,13 +161,17 @@ impl WriteConnection {
     /// Returns an error if a database operation fails.
     pub(crate) async fn keep_worker_lock(&mut self, worker: WorkerId) -> Result<()> {
         self.reconnect_if_broken().await?;
+        let mut repeats = 0;
         loop {
             let Some(server) = &mut self.server else {
                 return Ok(());
             };
             server.state.worker_lock.set_worker(worker);
             match server.state.worker_lock.take(&mut self.conn).await {
-                Err(error) if error.is_unavailable() => self.reconnect().await?,
+                Err(error) if error.is_unavailable() && self.may_repeat(repeats, &error).await => {
+                    self.reconnect().await?;
+                    repeats += 1;
+                }
                 outcome => return outcome,
             }
         }
@@ -182,11 +195,13 @@ impl WriteConnection {
     ) -> Result<T> {
         self.check_log().await?;
         self.reconnect_if_broken().await?;
+        let mut repeats = 0;
         loop {
             let (conn, path, _) = self.parts();
             match retry_while_busy!(path, begin(conn).await) {
-                Err(error) if error.is_unavailable() && self.is_on_server() => {
+                Err(error) if error.is_unavailable() && self.may_repeat(repeats, &error).await => {
                     self.reconnect().await?;
+                    repeats += 1;
                     tracing::debug!(%error, "the transaction begins again");
                 }
                 begun => break begun?,

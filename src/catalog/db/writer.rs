@@ -100,6 +100,7 @@ async fn commit(writer: &mut WriteConnection, batch: Batch) {
 async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply> {
     writer.check_log().await?;
     writer.reconnect_if_broken().await?;
+    let mut repeats = 0;
     let reply = loop {
         let (conn, path, mut server) = writer.parts();
         let reply = retry_while_busy!(path, {
@@ -114,8 +115,9 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
         });
         match reply {
             // What was stored before the connection broke is found when the batch is applied again.
-            Err(error) if error.is_unavailable() && writer.is_on_server() => {
+            Err(error) if error.is_unavailable() && writer.may_repeat(repeats, &error).await => {
                 writer.reconnect().await?;
+                repeats += 1;
                 tracing::debug!(%error, "the commit is tried again");
             }
             reply => break reply,

@@ -154,7 +154,7 @@ pub struct StageCheckpoint {
     pub next_deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
-    /// When its files were written.
+    /// When the write of its files began.
     #[serde(skip)]
     pub written: Instant,
 }

@@ -47,7 +47,7 @@ pub struct Recovered {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeadWorker {
     /// These workers, with the heartbeats and connections observed. One that has sent a heartbeat or connected since is
-    /// left out. After `valid_until`, nobody is: the server may have been unavailable meanwhile, for the others too.
+    /// left out. After `valid_until`, no worker is marked as dead, because an outage may have delayed all heartbeats.
     Observed {
         /// The workers.
         workers: Vec<LeaseHolder>,

@@ -260,7 +260,8 @@ async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis)
 }
 
 /// Returns whether a verdict is stored already: one with the same values and time among the rows up to `newest`, or, if it
-/// has no time, the reviewer's newest one on the result. Without a time, a verdict with a context, such as an angle, is always new.
+/// has no time, the reviewer's newest one on the result. Without a time, a verdict with a context, such as an angle, is
+/// always new.
 async fn is_stored(
     conn: &mut Conn,
     new: &NewVerdict,

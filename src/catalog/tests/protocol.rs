@@ -3,7 +3,7 @@
 use super::{World, done, name, observed, register, row};
 use crate::catalog::{
     Catalog, CatalogError, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction,
-    RetrySelection, StageFailure,
+    RetrySelection, StageCheckpoint, StageFailure,
 };
 use crate::domain::{
     CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage,
@@ -156,6 +156,30 @@ async fn the_third_crash_quarantines_the_pair_with_a_message() {
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
     let text = &failures[0].failure.failure.message;
     assert!(text.contains("3 workers died"), "{text}");
+}
+
+/// The files may have been removed, because no row named them for so long.
+#[tokio::test]
+async fn a_server_does_not_store_a_stage_whose_files_are_old() {
+    let world = World::new(1).await;
+    let half_an_hour = std::time::Duration::from_mins(31);
+    let long_ago = std::time::Instant::now().checked_sub(half_an_hour);
+    let [lease] = world.claim(1).await.try_into().expect("a lease");
+    let late = StageCheckpoint {
+        written: long_ago.expect("the clock began before"),
+        ..world.done(Stage::Fit)
+    };
+    let stored = world.catalog.checkpoint(lease, vec![late]).await;
+    let stored = stored.expect("a reply");
+    if !world.catalog.is_shared() {
+        assert!(matches!(stored, CheckpointOutcome::Lease(_)));
+        return;
+    }
+    assert!(matches!(stored, CheckpointOutcome::LeaseLost));
+    assert_eq!(status(&world, "p0").await, JobStatus::Leased);
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    assert!(detail.expect("the pair").results.stages.is_empty());
+    world.assert_counters().await;
 }
 
 #[tokio::test]
