@@ -8,7 +8,7 @@ pub enum StopLevel {
     /// Not at all.
     #[default]
     Go,
-    /// Finish the stages in progress, except those that read a file or write to an object store for too long. Start no new
+    /// Finish the stages in progress, except if one reads a file or writes to an object store for too long. Start no new
     /// ones.
     Drain,
     /// Stop at once: stages in progress are lost, stored results stay.

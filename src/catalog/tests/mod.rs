@@ -12,6 +12,7 @@ mod import;
 mod model;
 mod place;
 mod protocol;
+mod recovery;
 mod schema;
 mod server_plans;
 mod staleness;
