@@ -3,7 +3,7 @@
 import { translate } from "./config.js";
 import { alignmentImages } from "./image-cache.js";
 import { bits, edges, overlap, warpMask, RELIEF } from "./masks.js";
-import { fixed } from "./ui.js";
+import { localNumber } from "./scan-messages.js";
 import { imagePoint } from "./viewport.js";
 
 /** Composes two maps, n first. As in canvases, [a, b, c, d, e, f] maps (x, y) to (a x + c y + e, b x + d y + f). */
@@ -188,9 +188,9 @@ export class AlignmentEditor {
   summary() {
     const { iou, dice } = this.scores;
     return [
-      `${translate("iou")} ${fixed(iou, 3)}`,
-      `${translate("dice")} ${fixed(dice, 3)}`,
-      translate("rotated_by", { deg: fixed(this.rotation, 2) }),
+      `${translate("iou")} ${localNumber(iou, 3)}`,
+      `${translate("dice")} ${localNumber(dice, 3)}`,
+      translate("rotated_by", { deg: localNumber(this.rotation, 2) }),
     ].join(" · ");
   }
 }

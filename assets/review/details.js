@@ -1,6 +1,7 @@
 // Pair, metrics and scores of an answered item.
 
 import { translate } from "./config.js";
+import { localNumber } from "./scan-messages.js";
 import * as ui from "./ui.js";
 
 /** Announces the details of an item. They are on the server until the item is answered. */
@@ -9,7 +10,7 @@ export async function showDetails(item) {
   const response = await fetch(`/api/details/${item.id}`);
   if (!response.ok) return ui.announce(translate("answer_first"));
   const { pair, metrics, iou, dice, others } = await response.json();
-  const number = (value) => ui.fixed(value, 3);
+  const number = (value) => localNumber(value, 3);
   const verdicts = others.map((other) => `${other.reviewer}: ${ui.answerText(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
     pair,

@@ -11,6 +11,7 @@ import { Practice } from "./practice.js";
 import { ReviewQueue } from "./queue.js";
 import { RetryQueue } from "./retry-queue.js";
 import { isScanOpen, openScan } from "./scan-dialog.js";
+import { localNumber } from "./scan-messages.js";
 import * as ui from "./ui.js";
 import { Viewer } from "./viewer.js";
 
@@ -134,7 +135,7 @@ function refresh() {
 /** Returns the text below the image, apart from the legend. */
 function caption() {
   if (editor) return editor.summary();
-  if (viewer.rotation) return translate("rotated_by", { deg: ui.fixed(viewer.rotation, 2) });
+  if (viewer.rotation) return translate("rotated_by", { deg: localNumber(viewer.rotation, 2) });
   const alignment = viewer.layers && queue.current?.manual_alignment;
   return alignment ? ui.alignmentText(alignment) : "";
 }
@@ -246,7 +247,7 @@ async function saveAlignment() {
   if (!editor || editor.item !== item) return;
   const stored = await requests.push("/api/align", editor.body(crypto.randomUUID(), note));
   item.manual_alignment = { ...stored, map };
-  ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${ui.fixed(stored.iou, 3)}, ${translate("dice")} ${ui.fixed(stored.dice, 3)}`);
+  ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${localNumber(stored.iou, 3)}, ${translate("dice")} ${localNumber(stored.dice, 3)}`);
   closeEditor();
 }
 

@@ -1,6 +1,7 @@
 // Everything on the page around the viewer: heading, counts, history, announcements, dialogs.
 
-import { language, reviewOrder, translate } from "./config.js";
+import { reviewOrder, translate } from "./config.js";
+import { localNumber } from "./scan-messages.js";
 
 const byId = (id) => document.getElementById(id);
 const SIGNS = { pass: "✓", fail: "✗", unsure: "?" };
@@ -45,9 +46,7 @@ export function median(values) {
 }
 
 /** Formats milliseconds as seconds with one decimal. */
-export function seconds(ms) {
-  return (ms / 1000).toLocaleString(language, { maximumFractionDigits: 1, minimumFractionDigits: 1 });
-}
+export const seconds = (ms) => localNumber(ms / 1000, 1);
 
 /** Shows the median time per answer. */
 export function pace(times) {
@@ -73,17 +72,11 @@ export function answerText(answer) {
   return `${translate(answer.verdict)}${reason}`;
 }
 
-/** Formats a number with a fixed number of digits, without a sign on zero, in the language of the page. */
-export const fixed = (value, digits) =>
-  value
-    .toLocaleString(language, { minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: false })
-    .replace(/^-(0([.,]0*)?)$/, "$1");
-
 /** Returns a manual alignment as text. */
 export function alignmentText({ reviewer, rotation_deg: deg, shift_px: [x, y], scale, mirrored, iou }) {
   return translate("aligned_by", {
-    reviewer, deg: fixed(deg, 1), px: fixed(Math.hypot(x, y), 1), scale: fixed(scale, 3),
-    mirrored: mirrored ? translate("and_mirrored") : "", iou: fixed(iou, 3),
+    reviewer, deg: localNumber(deg, 1), px: localNumber(Math.hypot(x, y), 1), scale: localNumber(scale, 3),
+    mirrored: mirrored ? translate("and_mirrored") : "", iou: localNumber(iou, 3),
   });
 }
 
@@ -184,7 +177,7 @@ export function askPair(names, go) {
 /** Asks whether an alignment that agrees less with the print is saved; resolves with the answer. */
 export function confirmWorse(before, after) {
   const dialog = byId("confirm");
-  const values = { before: fixed(before, 3), after: fixed(after, 3) };
+  const values = { before: localNumber(before, 3), after: localNumber(after, 3) };
   byId("confirm-text").textContent = translate("worse_alignment", values);
   dialog.returnValue = "";
   dialog.showModal();

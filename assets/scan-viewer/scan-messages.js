@@ -39,10 +39,11 @@ export function preferredLanguage() {
   return navigator.languages?.find((language) => /^(vi|en)\b/.test(language))?.slice(0, 2) ?? "en";
 }
 
-/** Formats a number with a fixed number of digits in the language of the page. */
+/** Formats a number with a fixed number of digits, without a sign on zero, in the language of the page. */
 export function localNumber(value, digits = 0) {
   const format = { minimumFractionDigits: digits, maximumFractionDigits: digits };
-  return value.toLocaleString(document.documentElement.lang || "en", format);
+  const text = value.toLocaleString(document.documentElement.lang || "en", format);
+  return text.replace(/^-(0([.,]0*)?)$/, "$1");
 }
 
 /** Returns a text with `{name}` replaced by the values. */

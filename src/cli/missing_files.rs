@@ -22,8 +22,7 @@ impl MissingFiles {
     /// Adds the message of a file. Only the first hint on paths of Windows is kept.
     pub(super) fn add(&mut self, mut line: String) {
         self.count += 1;
-        if let Some(end) = line.len().checked_sub(WINDOWS_HINT.len())
-            && line.ends_with(WINDOWS_HINT)
+        if let Some(end) = line.strip_suffix(WINDOWS_HINT).map(str::len)
             && self.lines.iter().any(|line| line.ends_with(WINDOWS_HINT))
         {
             line.truncate(end);

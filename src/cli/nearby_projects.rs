@@ -28,8 +28,7 @@ pub(super) fn nearby_projects(dir: &Path) -> Vec<PathBuf> {
     let name = |path: &Path| plain_letters(&path.file_name().unwrap_or_default().to_string_lossy());
     let names: Vec<String> = beside.iter().map(|path| name(path)).collect();
     let typed = plain_letters(&typed.to_string_lossy());
-    let mut similar = nearest(&typed, names.iter().map(String::as_str), MAX_SUGGESTED);
-    similar.dedup();
+    let similar = nearest(&typed, names.iter().map(String::as_str), MAX_SUGGESTED);
     // Two names may have the same plain letters.
     let found = similar.iter().flat_map(|similar| {
         let named = names.iter().zip(&beside);

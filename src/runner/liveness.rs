@@ -32,8 +32,7 @@ struct SeenWorker {
     heartbeat: UnixMillis,
     /// When the heartbeat was first seen.
     since: UnixMillis,
-    /// Whether it had a connection since the last gap, or appeared when there was none for long, so that it must have had
-    /// one.
+    /// Whether it had a connection since the last gap. True for a worker that appeared later, which connects when it starts.
     was_connected: bool,
     /// Since when it has no connection.
     unconnected_since: Option<UnixMillis>,
@@ -148,6 +147,9 @@ mod tests {
         assert_eq!(dead_at(&mut liveness, every(0, 47_500), 5, true), None);
         let found = dead_at(&mut liveness, every(50_000, 200_000), 6, true);
         assert_eq!(found, Some(100_000));
+        assert_eq!(liveness.steady_for(100_000), 100_000);
+        assert_eq!(dead_at(&mut liveness, [300_000], 6, true), None);
+        assert_eq!(liveness.steady_for(300_000), 0);
     }
 
     #[test]

@@ -64,27 +64,24 @@ impl Fleet {
         worker.expect("the binary starts")
     }
 
-    /// Runs SQL statements on the server.
-    fn sql(&self, text: &str) {
+    /// Calls a function with a connection to the server.
+    fn on_server<T>(
+        &self,
+        work: impl AsyncFnOnce(&mut sqlx::PgConnection) -> sqlx::Result<T>,
+    ) -> T {
         let runtime = tokio::runtime::Runtime::new().expect("a runtime");
         runtime.block_on(async {
             let conn = <sqlx::PgConnection as sqlx::Connection>::connect(self.server.url()).await;
-            let text = sqlx::AssertSqlSafe(text.to_owned());
-            let mut conn = conn.expect("a connection");
-            let done = sqlx::raw_sql(text).execute(&mut conn).await;
-            done.expect("valid SQL");
-        });
+            work(&mut conn.expect("a connection"))
+                .await
+                .expect("valid SQL")
+        })
     }
 
-    /// Runs a query that returns a number.
-    fn number(&self, text: &str) -> i64 {
-        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-        runtime.block_on(async {
-            let conn = <sqlx::PgConnection as sqlx::Connection>::connect(self.server.url()).await;
-            let query = sqlx::query_scalar(sqlx::AssertSqlSafe(text.to_owned()));
-            let number = query.fetch_one(&mut conn.expect("a connection")).await;
-            number.expect("a number")
-        })
+    /// Runs SQL statements on the server.
+    fn sql(&self, text: &str) {
+        let text = sqlx::AssertSqlSafe(text.to_owned());
+        self.on_server(async |conn| sqlx::raw_sql(text).execute(conn).await);
     }
 
     /// Waits until at least one pair is done, and more are leased. Asserts that the workers are at work.
@@ -103,8 +100,12 @@ impl Fleet {
         }
     }
 
-    /// Asserts that the shared project is whole, and that its export and report are those of the project in a file.
+    /// Asserts that the shared project is whole, without leases and quarantined pairs, and that its export and report are
+    /// those of the project in a file.
     fn assert_same(&self) {
+        let status = self.shared(&["status", "--json"]).expect(0).json();
+        assert_eq!(status["jobs"]["leased"], 0, "{status}");
+        assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
         self.shared(&["check"]).expect(0);
         mocban(self.path(), &["-C", "file", "export", "-o", "file-export"]).expect(0);
         self.shared(&["export", "-o", "shared-export"]).expect(0);
@@ -120,13 +121,6 @@ impl Fleet {
         let report = mocban(self.path(), &["-C", "file", "report"]).expect(0);
         assert_eq!(self.shared(&["report"]).expect(0).out, report.out);
     }
-
-    /// Asserts that no lease is left and no pair was quarantined.
-    fn assert_no_pair_is_left_or_quarantined(&self) {
-        let status = self.shared(&["status", "--json"]).expect(0).json();
-        assert_eq!(status["jobs"]["leased"], 0, "{status}");
-        assert_eq!(status["jobs"]["quarantined"], 0, "{status}");
-    }
 }
 
 #[test]
@@ -140,7 +134,6 @@ fn workers_on_postgres_give_the_results_of_one_run_on_a_file() {
         assert!(worker.wait().expect("an exit code").success());
     }
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
     // Back to a file, with the verdicts.
     fleet
         .shared(&[
@@ -201,7 +194,6 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
         assert!(worker.wait().expect("an exit code").success());
     }
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
 }
 
 /// While the server is away for longer than a lease, no worker can send a heartbeat. None of them is dead.
@@ -230,10 +222,10 @@ fn after_an_outage_longer_than_a_lease_no_worker_is_taken_for_dead() {
     for mut worker in workers {
         assert!(worker.wait().expect("an exit code").success());
     }
-    let taken = fleet.number("SELECT count(*) FROM public.taken");
+    let count = "SELECT count(*) FROM public.taken";
+    let taken: i64 = fleet.on_server(async |conn| sqlx::query_scalar(count).fetch_one(conn).await);
     assert_eq!(taken, 0, "living workers were taken for dead");
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
 }
 
 /// A commit that waited for long may name files that were removed meanwhile as unreferenced.
@@ -272,7 +264,6 @@ fn no_result_names_files_that_were_removed_while_its_commit_waited() {
     std::fs::remove_file(&held).expect("removed");
     assert!(worker.wait().expect("an exit code").success());
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
 }
 
 /// Waiting does not help if the server refuses the user from now on.
@@ -301,7 +292,6 @@ fn a_worker_that_may_not_connect_again_says_why_and_ends() {
     assert!(text.contains("not permitted to log in"), "{text}");
     assert!(fleet.worker().wait().expect("an exit code").success());
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
 }
 
 /// The connection of a killed process is gone at once, so others need not wait for the end of its leases.
@@ -331,7 +321,6 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
     assert!(other.wait().expect("an exit code").success());
     assert!(killed.elapsed() < END_OF_LEASES, "{:?}", killed.elapsed());
     fleet.assert_same();
-    fleet.assert_no_pair_is_left_or_quarantined();
 }
 
 #[test]

@@ -194,7 +194,7 @@ pub struct BlockCheckpoint {
     pub next_deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
-    /// When the write of its files began, or later.
+    /// When its files were written.
     pub written: Instant,
 }
 

@@ -11,7 +11,7 @@ use crate::catalog::db::write_connection::CatalogServerState;
 use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::claim::ClaimRequest;
 use crate::catalog::queue::counters::{self, DONE, cursor};
-use crate::catalog::queue::lease::{Lease, StageCheckpoint, was_written_long_ago};
+use crate::catalog::queue::lease::{Lease, was_written_long_ago};
 use crate::catalog::queue::{server_checkpoint, server_claim};
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
@@ -68,10 +68,15 @@ async fn commit_parts(
 }
 
 /// Returns whether files of a checkpoint may have been removed.
-fn is_late(stages: &[StageCheckpoint]) -> bool {
-    stages
-        .iter()
-        .any(|stage| was_written_long_ago(stage.written))
+fn is_late((_, stages): &LeasedCheckpoints) -> bool {
+    let mut stages = stages.iter();
+    stages.any(|stage| was_written_long_ago(stage.written))
+}
+
+/// Returns whether stages that were computed again end where their lease began. The position of the job then does not show
+/// whether they are stored.
+fn ends_at_its_start((lease, stages): &LeasedCheckpoints) -> bool {
+    position_after(stages).is_some_and(|(end, _)| end == cursor(lease.cursor))
 }
 
 /// Stores checkpoints. Returns for each whether it is stored.
@@ -83,24 +88,19 @@ async fn store(
     let Conn::Postgres(server) = conn else {
         unreachable!("a server is PostgreSQL");
     };
-    let timely = checkpoints.iter().copied().filter(|item| !is_late(&item.1));
-    let stored = server_checkpoint::store(server, timely).await?;
-    if checkpoints.iter().any(|item| is_late(&item.1)) {
+    let (late, timely): (Vec<&LeasedCheckpoints>, Vec<_>) =
+        checkpoints.iter().partition(|item| is_late(item));
+    let stored = server_checkpoint::store(server, timely.iter().copied()).await?;
+    if !late.is_empty() {
         // The next claim gets these leases back, and computes the stages again.
         state.leases.replies_may_be_lost();
     }
     let mut earlier = Vec::new();
     // Otherwise, a refused checkpoint of an earlier stage, computed again, would look as if it were stored.
     if state.leases.is_searching() {
-        // A late checkpoint of stages that were computed again may end where its lease began, stored or not.
-        let is_unclear = |(lease, stages): &LeasedCheckpoints| {
-            let end = position_after(stages);
-            is_late(stages) && end.is_some_and(|(at, _)| at == cursor(lease.cursor))
-        };
-        let others = checkpoints
-            .iter()
-            .filter(|item| !item.0.is_in(&stored) && !is_unclear(item));
-        earlier = stored_before(conn, others.copied(), [].into_iter()).await?;
+        let refused = timely.iter().filter(|(lease, _)| !lease.is_in(&stored));
+        let late = late.iter().filter(|item| !ends_at_its_start(item));
+        earlier = stored_before(conn, refused.chain(late).copied(), [].into_iter()).await?;
     }
     let is_kept = |lease: &Lease| lease.is_in(&stored) || lease.is_in(&earlier);
     let kept: Vec<bool> = checkpoints

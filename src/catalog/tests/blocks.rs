@@ -47,7 +47,7 @@ fn inputs(texts: [&str; 3]) -> BlockInputVersions {
     }
 }
 
-fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
+pub(super) fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
     let inputs = inputs(["mesh", "page", "labels"]);
     let settings = settings([1; 4]);
     BlockCheckpoint {
@@ -429,21 +429,4 @@ async fn a_block_that_kills_its_workers_is_quarantined() {
     let message = "3 workers died or hung over it at face";
     assert_eq!(failure.failure.message, message);
     assert_eq!(world.requeue_blocks([9; 4]).await, []);
-}
-
-#[tokio::test]
-async fn a_worker_without_heartbeats_stores_nothing() {
-    let world = world().await;
-    let (lease, work) = world.leased_block().await;
-    let late = BlockCheckpoint {
-        alive_since: 50,
-        ..done(&work, BlockStage::Face)
-    };
-    let stored = world.catalog.checkpoint_block(lease.clone(), late).await;
-    assert_eq!(stored.expect("a reply"), None);
-    let ended = world.catalog.end_worker(world.worker, 60, None).await;
-    ended.expect("ended");
-    let stage = done(&work, BlockStage::Face);
-    let stored = world.catalog.checkpoint_block(lease, stage).await;
-    assert_eq!(stored.expect("a reply"), None);
 }

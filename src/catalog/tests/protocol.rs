@@ -1,12 +1,14 @@
 //! Leases, checkpoints, failures, recovery and counters.
 
-use super::{World, done, name, register, row};
+use std::time::{Duration, Instant};
+
+use super::{World, blocks, done, name, register, row};
 use crate::catalog::{
-    Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction, RetrySelection,
-    StageCheckpoint, StageFailure,
+    BlockCheckpoint, Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction,
+    RetrySelection, StageCheckpoint, StageFailure,
 };
 use crate::domain::{
-    Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
+    BlockStage, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
 };
 
 fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
@@ -136,8 +138,7 @@ async fn a_late_failure_and_a_late_release_change_nothing() {
 #[tokio::test]
 async fn a_server_does_not_store_a_stage_whose_files_are_old() {
     let world = World::new(1).await;
-    let half_an_hour = std::time::Duration::from_mins(31);
-    let long_ago = std::time::Instant::now().checked_sub(half_an_hour);
+    let long_ago = Instant::now().checked_sub(Duration::from_mins(31));
     let [lease] = world.claim(1).await.try_into().expect("a lease");
     let late = StageCheckpoint {
         written: long_ago.expect("the clock began before"),
@@ -318,4 +319,26 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let again = world.place.open().await.expect("a catalog");
     let detail = again.pair(&name("p0")).await.expect("a read");
     assert_eq!(detail.expect("the pair").results.stages.len(), 1);
+}
+
+#[tokio::test]
+async fn a_worker_without_heartbeats_or_with_old_files_stores_no_stage_of_a_block() {
+    let world = blocks::world().await;
+    let (lease, work) = world.leased_block().await;
+    // Files without a row for 31 minutes may have been removed.
+    for (alive_since, minutes) in [(50, 0), (0, 31)] {
+        let written = Instant::now().checked_sub(Duration::from_mins(minutes));
+        let refused = BlockCheckpoint {
+            alive_since,
+            written: written.expect("the clock began before"),
+            ..blocks::done(&work, BlockStage::Face)
+        };
+        let stored = world.catalog.checkpoint_block(lease.clone(), refused).await;
+        assert_eq!(stored.expect("a reply"), None);
+    }
+    let ended = world.catalog.end_worker(world.worker, 60, None).await;
+    ended.expect("ended");
+    let stage = blocks::done(&work, BlockStage::Face);
+    let stored = world.catalog.checkpoint_block(lease, stage).await;
+    assert_eq!(stored.expect("a reply"), None);
 }
