@@ -57,22 +57,19 @@ fn line(table: &Table, row: &[Option<String>]) -> Markup {
 /// Returns a cell. Hyphens of negative numbers become minus signs.
 fn cell_text(cell: Option<&str>, format: ColumnFormat) -> Markup {
     match (cell, format) {
-        (Some(text), ColumnFormat::Number(_) | ColumnFormat::Interval) => {
+        // Two bounds that are negative stand in a text, such as `-0.017, -0.007`. Dates and ids keep their hyphens.
+        (Some(text), format) if format != ColumnFormat::Text || are_numbers(text) => {
             html! { (text.replace('-', "\u{2212}")) }
         }
-        // Two bounds that are negative stand in a text, such as `-0.017, -0.007`.
-        (Some(text), ColumnFormat::Text) if is_numeric(text) => {
-            html! { (text.replace('-', "\u{2212}")) }
-        }
-        (Some(text), ColumnFormat::Text) => html! { (text) },
+        (Some(text), _) => html! { (text) },
         (None, _) => html! { span.none title="does not exist" { "\u{2013}" } },
     }
 }
 
-/// Returns whether a text has only numbers and separators.
-fn is_numeric(text: &str) -> bool {
-    let is_part = |c: char| c.is_ascii_digit() || "-., ".contains(c);
-    text.contains(|c: char| c.is_ascii_digit()) && text.chars().all(is_part)
+/// Returns whether a text is a list of numbers.
+fn are_numbers(text: &str) -> bool {
+    let mut parts = text.split(", ");
+    parts.all(|part| part.parse::<f64>().is_ok())
 }
 
 const fn class(column: &TableColumn) -> &'static str {
