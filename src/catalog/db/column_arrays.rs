@@ -29,29 +29,25 @@ impl ArrayParameters {
         self.first + self.columns.len()
     }
 
-    /// Returns the names of all columns, separated by commas.
-    pub(crate) fn names(self) -> String {
-        let names: Vec<_> = self.columns.iter().map(|(name, _)| *name).collect();
-        names.join(", ")
+    /// Returns a query whose rows have all columns.
+    pub(crate) fn rows(self) -> String {
+        self.rows_where(|_| true)
     }
 
-    /// Returns a call of `unnest` whose rows have all columns.
-    pub(crate) fn unnest(self) -> String {
-        self.unnest_where(|_| true)
+    /// Returns a query whose rows have the columns with these names, in the order of the parameters.
+    pub(crate) fn rows_of(self, names: &[&str]) -> String {
+        self.rows_where(|name| names.contains(&name))
     }
 
-    /// Returns a call of `unnest` whose rows have the columns with these names, in the order of the parameters.
-    pub(crate) fn unnest_of(self, names: &[&str]) -> String {
-        self.unnest_where(|name| names.contains(&name))
-    }
-
-    fn unnest_where(self, is_wanted: impl Fn(&str) -> bool) -> String {
+    /// The server reads one `unnest` per column in half the time of one with all columns in `FROM`, which stores each
+    /// column before it is read.
+    fn rows_where(self, is_wanted: impl Fn(&str) -> bool) -> String {
         let numbered = (self.first..).zip(self.columns);
         let wanted = numbered.filter(|(_, (name, _))| is_wanted(name));
-        let arrays: Vec<_> = wanted
-            .map(|(number, (_, sql_type))| format!("${number}::{sql_type}[]"))
+        let columns: Vec<_> = wanted
+            .map(|(number, (name, sql_type))| format!("unnest(${number}::{sql_type}[]) AS {name}"))
             .collect();
-        format!("unnest({})", arrays.join(", "))
+        format!("(SELECT {})", columns.join(", "))
     }
 }
 
@@ -99,14 +95,13 @@ mod tests {
             columns: &[("a", "bigint"), ("b", "text"), ("c", "bytea")],
             first: 4,
         };
-        assert_eq!(parameters.names(), "a, b, c");
         assert_eq!(
-            parameters.unnest(),
-            "unnest($4::bigint[], $5::text[], $6::bytea[])"
+            parameters.rows(),
+            "(SELECT unnest($4::bigint[]) AS a, unnest($5::text[]) AS b, unnest($6::bytea[]) AS c)"
         );
         assert_eq!(
-            parameters.unnest_of(&["c", "a"]),
-            "unnest($4::bigint[], $6::bytea[])"
+            parameters.rows_of(&["c", "a"]),
+            "(SELECT unnest($4::bigint[]) AS a, unnest($6::bytea[]) AS c)"
         );
         assert_eq!(parameters.end(), 7);
     }

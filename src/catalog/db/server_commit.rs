@@ -90,7 +90,7 @@ async fn store(
     };
     let (late, timely): (Vec<&LeasedCheckpoints>, Vec<_>) =
         checkpoints.iter().partition(|item| is_late(item));
-    let stored = server_checkpoint::store(server, timely.iter().copied()).await?;
+    let stored = server_checkpoint::store(server, &timely).await?;
     if !late.is_empty() {
         // The next claim gets these leases back, and computes the stages again.
         state.leases.replies_may_be_lost();

@@ -8,6 +8,7 @@ use sqlx::{AssertSqlSafe, PgConnection};
 
 use crate::catalog::db::column_arrays::{ArrayParameters, column_arrays};
 use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::query::limited;
 use crate::catalog::db::row::{FromRow as _, Row};
 use crate::catalog::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
@@ -19,6 +20,8 @@ column_arrays! {
     JobRow,
     /// Jobs to advance.
     JobRows<'i>:
+    // From 1.
+    position: "bigint" = i64,
     pair: "bigint" = i64,
     worker: "bigint" = i64,
     token: "bigint" = i64,
@@ -46,7 +49,7 @@ column_arrays! {
     ResultRow,
     /// Results of stages.
     ResultRows<'i>:
-    // Position of the job among the jobs, from 1.
+    // Position of the job.
     position: "bigint" = i64,
     pair: "bigint" = i64,
     stage: "bigint" = i64,
@@ -98,10 +101,16 @@ column_arrays! {
 /// Columns of an attempt.
 const ATTEMPT: [&str; 6] = ["position", "pair", "stage", "worker", "ms", "at"];
 
-/// Advances jobs whose lease is valid, and stores their results, metrics, attempts, input versions and counters. Returns
-/// the advanced jobs. `job.status + 0` keeps the planner from the index of leases, which contains all leases that ended
-/// while a snapshot is held.
-static STORE: LazyLock<String> = LazyLock::new(|| {
+/// Stores checkpoints of jobs that may have earlier results.
+static STORE: LazyLock<String> = LazyLock::new(|| statement(false));
+
+/// Stores checkpoints of jobs without earlier results, in less time. The server refuses it if there are earlier results.
+static STORE_FIRST: LazyLock<String> = LazyLock::new(|| statement(true));
+
+/// Returns a statement that advances jobs whose lease is valid, and stores their results, metrics, attempts, input versions
+/// and counters. It returns the advanced jobs. `job.status + 0` keeps the planner from the index of leases, which contains
+/// all leases that ended while a snapshot is held.
+fn statement(is_first: bool) -> String {
     let jobs = ArrayParameters {
         columns: JobRows::COLUMNS,
         first: 1,
@@ -114,11 +123,22 @@ static STORE: LazyLock<String> = LazyLock::new(|| {
         columns: MetricRows::COLUMNS,
         first: results.end(),
     };
+    let result_columns = stored_columns(results);
+    let metric_columns = stored_columns(metrics);
     let is_advanced = "row.position = ANY (ARRAY(SELECT position FROM advanced))";
+    let [replace_result, replace_metric, remove_metrics] = if is_first {
+        [const { String::new() }; 3]
+    } else {
+        [
+            replace("pair, stage", &result_columns),
+            replace("pair, metric", &metric_columns),
+            REMOVE_METRICS.to_owned(),
+        ]
+    };
     format!(
         "
 WITH item AS (
-    SELECT * FROM {jobs} WITH ORDINALITY AS item ({job_names}, position)),
+    SELECT * FROM {jobs} AS item),
 advanced AS (
     UPDATE job SET stage = item.next, status = item.status,
         worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
@@ -132,24 +152,15 @@ advanced AS (
             WHERE w.id = item.worker AND w.ended IS NULL AND w.heartbeat >= item.alive_since)
     RETURNING item.*),
 result AS (
-    INSERT INTO stage_result (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files,
-        result_hash, ms, at)
-    SELECT pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at
-    FROM {results} AS row ({result_names}) WHERE is_last AND {is_advanced}
-    ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
-        print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome,
-        files = excluded.files, result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker,
-        at = excluded.at),
+    INSERT INTO stage_result ({result_columns})
+    SELECT {result_columns}
+    FROM {results} AS row WHERE is_last AND {is_advanced}{replace_result}),
 attempted AS (
     INSERT INTO attempt (pair, stage, worker, ms, at)
-    SELECT pair, stage, worker, ms, at FROM {attempts} AS row ({attempt_names}) WHERE {is_advanced}),
-removed AS (
-    DELETE FROM metric_result AS old USING advanced
-    WHERE old.pair = advanced.pair AND old.metric <> ALL (string_to_array(advanced.metrics, ','))),
+    SELECT pair, stage, worker, ms, at FROM {attempts} AS row WHERE {is_advanced}),
 metric AS (
     INSERT INTO metric_result ({metric_columns})
-    SELECT {metric_columns} FROM {metrics} AS row ({metric_names}) WHERE {is_advanced}
-    ON CONFLICT (pair, metric) DO UPDATE SET {set_metrics}),
+    SELECT {metric_columns} FROM {metrics} AS row WHERE {is_advanced}{replace_metric}),{remove_metrics}
 unfailed AS (
     DELETE FROM failure USING advanced WHERE failure.pair = advanced.pair AND advanced.has_failure),
 input AS (
@@ -167,33 +178,42 @@ counted AS (
     GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
     ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
 SELECT pair, token FROM advanced",
-        jobs = jobs.unnest(),
-        job_names = jobs.names(),
-        results = results.unnest(),
-        result_names = results.names(),
-        attempts = results.unnest_of(&ATTEMPT),
-        attempt_names = ATTEMPT.join(", "),
-        metrics = metrics.unnest(),
-        metric_names = metrics.names(),
-        metric_columns = metric_columns().join(", "),
-        set_metrics = metric_columns()
-            .iter()
-            .map(|column| format!("{column} = excluded.{column}"))
-            .collect::<Vec<_>>()
-            .join(", "),
+        jobs = jobs.rows(),
+        results = results.rows(),
+        result_columns = result_columns.join(", "),
+        attempts = results.rows_of(&ATTEMPT),
+        metrics = metrics.rows(),
+        metric_columns = metric_columns.join(", "),
     )
-});
-
-/// Returns the statement that stores checkpoints.
-#[cfg(test)]
-pub(crate) fn text() -> String {
-    STORE.clone()
 }
 
-/// Returns the columns of the table `metric_result`.
-fn metric_columns() -> Vec<&'static str> {
-    let names = MetricRows::COLUMNS.iter().map(|(name, _)| *name);
-    names.filter(|name| *name != "position").collect()
+/// Returns the columns of a table among those of its rows.
+fn stored_columns(rows: ArrayParameters) -> Vec<&'static str> {
+    let names = rows.columns.iter().map(|(name, _)| *name);
+    names
+        .filter(|name| !["position", "is_last"].contains(name))
+        .collect()
+}
+
+/// Removes metrics that the new method does not compute.
+const REMOVE_METRICS: &str = "
+removed AS (
+    DELETE FROM metric_result AS old USING advanced
+    WHERE old.pair = advanced.pair AND old.metric <> ALL (string_to_array(advanced.metrics, ','))),";
+
+/// Returns the end of an `INSERT` that replaces rows with the same key.
+fn replace(key: &str, columns: &[&str]) -> String {
+    let set: Vec<_> = columns
+        .iter()
+        .map(|column| format!("{column} = excluded.{column}"))
+        .collect();
+    format!("\n    ON CONFLICT ({key}) DO UPDATE SET {}", set.join(", "))
+}
+
+/// Returns the statements that store checkpoints.
+#[cfg(test)]
+pub(crate) fn texts() -> [String; 2] {
+    [false, true].map(statement)
 }
 
 /// Stores finished stages of several jobs. Jobs without a valid lease are skipped, with all their results. Returns the
@@ -201,9 +221,33 @@ fn metric_columns() -> Vec<&'static str> {
 ///
 /// # Errors
 /// Returns an error if a database operation fails. Then nothing is stored.
-pub(crate) async fn store<'i>(
+pub(crate) async fn store(
     conn: &mut PgConnection,
-    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
+    checkpoints: &[&LeasedCheckpoints],
+) -> Result<Vec<FencedRow>> {
+    if checkpoints.iter().all(|checkpoint| is_first(checkpoint)) {
+        match store_with(conn, &STORE_FIRST, checkpoints).await {
+            Err(error) if error.kind() == Some(CatalogErrorKind::Contradiction) => {}
+            stored => return stored,
+        }
+    }
+    store_with(conn, &STORE, checkpoints).await
+}
+
+/// Returns whether the pair has no results of these stages: this is its first lease, under which a stage is stored twice
+/// only if it was computed again.
+fn is_first((lease, stages): &LeasedCheckpoints) -> bool {
+    lease.token == 1
+        && stages
+            .first()
+            .is_none_or(|first| first.stage >= lease.cursor)
+        && stages.windows(2).all(|two| two[0].stage < two[1].stage)
+}
+
+async fn store_with(
+    conn: &mut PgConnection,
+    statement: &'static str,
+    checkpoints: &[&LeasedCheckpoints],
 ) -> Result<Vec<FencedRow>> {
     let (mut jobs, mut results, mut metrics) = (
         JobRows::default(),
@@ -216,7 +260,7 @@ pub(crate) async fn store<'i>(
         };
         let position = jobs.pair.len() as i64 + 1;
         let (lease, stages) = checkpoint;
-        jobs.push(job_row(job, checkpoint));
+        jobs.push(job_row(position, job, checkpoint));
         for (at, one) in stages.iter().enumerate() {
             failpoint::hit(one.stage, Point::Recorded, None);
             let is_last = !stages[at + 1..]
@@ -233,14 +277,17 @@ pub(crate) async fn store<'i>(
     jobs.bind(&mut arguments)?;
     results.bind(&mut arguments)?;
     metrics.bind(&mut arguments)?;
-    // Constants only.
-    let query = sqlx::query_with(AssertSqlSafe(STORE.as_str()), arguments);
+    let query = sqlx::query_with(AssertSqlSafe(statement), arguments);
     let rows = limited(query.fetch_all(conn)).await?.into_iter();
     rows.map(|row| FencedRow::from_row(&Row::Postgres(row)))
         .collect()
 }
 
-fn job_row<'i>(job: AdvancedJob, (lease, stages): &'i LeasedCheckpoints) -> JobRow<'i> {
+fn job_row<'i>(
+    position: i64,
+    job: AdvancedJob,
+    (lease, stages): &'i LeasedCheckpoints,
+) -> JobRow<'i> {
     let mut metrics = stages.iter().rev().map(|one| &one.metrics);
     let metrics = metrics.find(|metrics| !metrics.is_empty());
     let names = |metrics: &Vec<MetricResult>| {
@@ -254,6 +301,7 @@ fn job_row<'i>(job: AdvancedJob, (lease, stages): &'i LeasedCheckpoints) -> JobR
     let print = inputs.and_then(|inputs| inputs.print.as_ref());
     let hash = |version: &'i InputVersion| version.hash.as_bytes().as_slice();
     JobRow {
+        position,
         pair: job.pair,
         worker: job.worker,
         token: job.token,

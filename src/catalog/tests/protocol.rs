@@ -3,9 +3,10 @@
 use std::time::{Duration, Instant};
 
 use super::{World, blocks, done, name, register, row};
+use crate::catalog::db::query::query;
 use crate::catalog::{
     BlockCheckpoint, Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction,
-    RetrySelection, StageCheckpoint, StageFailure,
+    RerunPolicy, RetrySelection, StageCheckpoint, StageFailure,
 };
 use crate::domain::{
     BlockStage, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
@@ -42,6 +43,26 @@ async fn a_pair_passes_four_checkpoints_and_is_read_back() {
     assert_eq!(metrics, ThresholdMetric::ALL.map(super::metric));
     assert_eq!(detail.attempts.len(), 4);
     assert!(detail.mesh_hash.is_some() && detail.print_hash.is_some());
+    world.assert_counters().await;
+}
+
+/// A server takes the first lease of a pair as a sign that the pair has no results.
+#[tokio::test]
+async fn results_before_the_first_lease_of_a_pair_are_replaced() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let fingerprints = super::fingerprints([1; 4]);
+    let again = RerunPolicy::All(Stage::Fit);
+    let sent = world.catalog.requeue_stale(&fingerprints, None, again);
+    assert_eq!(sent.await.expect("requeued"), 1);
+    let mut conn = world.place.conn().await;
+    let first = query("UPDATE job SET token = 0").execute(&mut conn);
+    first.await.expect("changed");
+    world.finish_one().await;
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let detail = detail.expect("the pair");
+    assert_eq!(detail.results.status, JobStatus::Done);
+    assert_eq!((detail.results.stages.len(), detail.attempts.len()), (4, 8));
     world.assert_counters().await;
 }
 

@@ -18,7 +18,7 @@ async fn claims_and_checkpoints_read_no_large_table() {
         return;
     };
     let claims = server_claim::TEXTS.map(|text| text.replace('?', "$"));
-    let texts = claims.into_iter().chain([server_checkpoint::text()]);
+    let texts = claims.into_iter().chain(server_checkpoint::texts());
     for (number, text) in texts.enumerate() {
         let prepare = AssertSqlSafe(format!("PREPARE statement{number} AS {text}"));
         sqlx::raw_sql(prepare)
