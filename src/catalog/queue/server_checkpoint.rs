@@ -101,10 +101,10 @@ column_arrays! {
 /// Columns of an attempt.
 const ATTEMPT: [&str; 6] = ["position", "pair", "stage", "worker", "ms", "at"];
 
-/// Stores checkpoints of jobs that may have earlier results.
+/// Stores checkpoints of jobs that may have earlier results or a failure.
 static STORE: LazyLock<String> = LazyLock::new(|| statement(false));
 
-/// Stores checkpoints of jobs without earlier results, in less time. The server refuses it if there are earlier results.
+/// Stores checkpoints of jobs without them, in less time. The server refuses it if there are earlier results.
 static STORE_FIRST: LazyLock<String> = LazyLock::new(|| statement(true));
 
 /// Returns a statement that advances jobs whose lease is valid, and stores their results, metrics, attempts, input versions
@@ -126,13 +126,13 @@ fn statement(is_first: bool) -> String {
     let result_columns = stored_columns(results);
     let metric_columns = stored_columns(metrics);
     let is_advanced = "row.position = ANY (ARRAY(SELECT position FROM advanced))";
-    let [replace_result, replace_metric, remove_metrics] = if is_first {
+    let [replace_result, replace_metric, remove_earlier] = if is_first {
         [const { String::new() }; 3]
     } else {
         [
             replace("pair, stage", &result_columns),
             replace("pair, metric", &metric_columns),
-            REMOVE_METRICS.to_owned(),
+            REMOVE_EARLIER.to_owned(),
         ]
     };
     format!(
@@ -160,9 +160,7 @@ attempted AS (
     SELECT pair, stage, worker, ms, at FROM {attempts} AS row WHERE {is_advanced}),
 metric AS (
     INSERT INTO metric_result ({metric_columns})
-    SELECT {metric_columns} FROM {metrics} AS row WHERE {is_advanced}{replace_metric}),{remove_metrics}
-unfailed AS (
-    DELETE FROM failure USING advanced WHERE failure.pair = advanced.pair AND advanced.has_failure),
+    SELECT {metric_columns} FROM {metrics} AS row WHERE {is_advanced}{replace_metric}),{remove_earlier}
 input AS (
     UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash),
         mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat), print_hash = coalesce(new.print_hash, pair.print_hash),
@@ -195,11 +193,13 @@ fn stored_columns(rows: ArrayParameters) -> Vec<&'static str> {
         .collect()
 }
 
-/// Removes metrics that the new method does not compute.
-const REMOVE_METRICS: &str = "
+/// Removes metrics that the new method does not compute, and the last failure.
+const REMOVE_EARLIER: &str = "
 removed AS (
     DELETE FROM metric_result AS old USING advanced
-    WHERE old.pair = advanced.pair AND old.metric <> ALL (string_to_array(advanced.metrics, ','))),";
+    WHERE old.pair = advanced.pair AND old.metric <> ALL (string_to_array(advanced.metrics, ','))),
+unfailed AS (
+    DELETE FROM failure USING advanced WHERE failure.pair = advanced.pair AND advanced.has_failure),";
 
 /// Returns the end of an `INSERT` that replaces rows with the same key.
 fn replace(key: &str, columns: &[&str]) -> String {
@@ -234,8 +234,8 @@ pub(crate) async fn store(
     store_with(conn, &STORE, checkpoints).await
 }
 
-/// Returns whether the pair has no results of these stages: this is its first lease, under which a stage is stored twice
-/// only if it was computed again.
+/// Returns whether the pair has no results of these stages and no failure: this is its first lease, under which a stage is
+/// stored twice only if it was computed again. A failure ends a lease.
 fn is_first((lease, stages): &LeasedCheckpoints) -> bool {
     lease.token == 1
         && stages
