@@ -40,7 +40,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     match cause.downcast_ref() {
         Some(RunError::InUse(_)) => return Some(ExitCode::InUse),
-        Some(RunError::OtherSettings(_)) => return Some(ExitCode::Usage),
+        Some(RunError::OtherSettings(_) | RunError::OtherPlan(_)) => return Some(ExitCode::Usage),
         Some(RunError::NoSuchPair(_) | RunError::NoSuchBlock(_)) => {
             return Some(ExitCode::NothingSelected);
         }

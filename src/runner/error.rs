@@ -19,6 +19,9 @@ pub enum RunError {
         list(.0)
     )]
     OtherSettings(Vec<FieldChange>),
+    /// The last plan has other settings than this worker.
+    #[error("the last plan has other settings{}; use the same settings, or run `plan` with these once no worker is at work", list(.0))]
+    OtherPlan(Vec<FieldChange>),
     /// Pairs were named that do not exist.
     #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
     NoSuchPair(Vec<PairName>),

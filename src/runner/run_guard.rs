@@ -51,6 +51,9 @@ impl RunGuard {
                 };
                 return match compared {
                     SharedSettings::Same => Ok(()),
+                    SharedSettings::Other(changes) if part == RunPart::Work => {
+                        Err(RunError::OtherPlan(changes))
+                    }
                     SharedSettings::Other(changes) => Err(RunError::OtherSettings(changes)),
                 };
             }

@@ -350,7 +350,7 @@ impl Scheduler {
             HeartbeatOutcome::Alive => {}
             HeartbeatOutcome::Expired => {
                 tracing::warn!(
-                    "suspended past the end of its leases: the stages in progress run again"
+                    "this process could not reach the catalog until its leases ended: the stages in progress run again"
                 );
                 self.prefetch.release_all().await?;
                 self.session.register_again(&self.context).await?;

@@ -280,7 +280,7 @@ fn a_process_suspended_past_its_leases_drops_its_work_and_continues() {
     let (code, json, stderr) = suspended.end();
     assert_eq!(code, Some(0), "{stderr}");
     assert!(
-        stderr.contains("suspended past the end of its leases"),
+        stderr.contains("could not reach the catalog until its leases ended"),
         "{stderr}"
     );
     assert_eq!(json["stages"], 8);

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use sqlx::postgres::PgDatabaseError;
+
 use crate::domain::{PairName, ThresholdMetric, UnixMillis};
 
 /// An error of the catalog.
@@ -185,8 +187,8 @@ pub enum CatalogError {
     /// The writer task has ended.
     #[error("the catalog is closed")]
     Closed,
-    /// An error of SQLite.
-    #[error("catalog: {0}")]
+    /// An error of the database.
+    #[error("catalog: {}", database_message(.0))]
     Database(sqlx::Error),
     /// The schema could not be created.
     #[error("catalog schema: {0}")]
@@ -211,6 +213,14 @@ pub enum LogLoss {
     Nothing,
     /// Commits after this time.
     Since(UnixMillis),
+}
+
+/// Returns the text of an error. That of PostgreSQL is without the line of its own source file.
+pub(crate) fn database_message(error: &sqlx::Error) -> String {
+    let server = error
+        .as_database_error()
+        .and_then(|error| error.try_downcast_ref::<PgDatabaseError>());
+    server.map_or_else(|| error.to_string(), |error| error.message().to_owned())
 }
 
 impl From<sqlx::Error> for CatalogError {
