@@ -140,7 +140,15 @@ impl Catalog {
         // ReaderPool first: an open reader prevents a complete checkpoint.
         match self.readers {
             ReaderPool::Sqlite(pool) => pool.close().await,
-            ReaderPool::Postgres(pool) => pool.close().await,
+            ReaderPool::Postgres(pool) => {
+                let close = async {
+                    pool.close().await;
+                    Ok(())
+                };
+                if let Err(error) = self.retry_wait.limit(close).await {
+                    tracing::debug!(%error, "the connections did not close");
+                }
+            }
         }
         if let Some(inbox) = self.inbox {
             let (sender, receiver) = oneshot::channel();

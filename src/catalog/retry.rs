@@ -7,15 +7,20 @@ impl Catalog {
     /// earlier call may have been stored although its reply was lost.
     ///
     /// # Errors
-    /// Returns the error of the operation. After [`Catalog::stop_waiting`], also returns the error of an unavailable
-    /// server.
+    /// Returns the error of the operation. After [`Catalog::stop_waiting`], also returns the error of a server that is
+    /// unavailable or does not reply.
     pub async fn retry_while_unavailable<T>(
         &self,
         operation: impl AsyncFn() -> Result<T>,
     ) -> Result<T> {
         let mut attempt = 0;
         loop {
-            match operation().await {
+            let outcome = if self.is_shared() {
+                self.retry_wait.limit(operation()).await
+            } else {
+                operation().await
+            };
+            match outcome {
                 Err(error)
                     if error.is_unavailable() && self.retry_wait.wait(attempt, &error).await =>
                 {
@@ -32,7 +37,8 @@ impl Catalog {
         error.is_unavailable() && self.retry_wait.wait(attempt, error).await
     }
 
-    /// Ends all waits for an unavailable database server. Operations then fail while it is unavailable.
+    /// Ends all waits for an unavailable database server. Operations then fail while it is unavailable, or after a few
+    /// seconds without a reply.
     pub fn stop_waiting(&self) {
         self.retry_wait.stop();
     }

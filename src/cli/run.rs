@@ -186,9 +186,16 @@ pub(super) async fn drive(
     .await;
     progress.end();
     watch.abort();
-    let failures = Failures::read(&catalog, false).await;
+    // After an error, the catalog may not reply any more.
+    let ended = match ended {
+        Ok(summary) => {
+            let failures = Failures::read(&catalog, false).await;
+            failures.map(|failures| (summary, failures))
+        }
+        Err(error) => Err(error.into()),
+    };
     catalog.close().await;
-    Ok((ended?, failures?))
+    ended
 }
 
 /// Returns the exit code of a run.

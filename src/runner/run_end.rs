@@ -57,11 +57,12 @@ pub(super) async fn compute(
     Ok((counts, computed))
 }
 
-/// After a stop request, waits for [`UNAVAILABLE_AFTER_STOP`] and then ends all waits for an unavailable database
-/// server.
+/// Ends all waits for an unavailable database server, [`UNAVAILABLE_AFTER_STOP`] after a first stop request or at once
+/// after a second.
 async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
     stop.reached(StopLevel::Drain).await;
-    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
+    let second = stop.reached(StopLevel::Now);
+    let _ = tokio::time::timeout(UNAVAILABLE_AFTER_STOP, second).await;
     catalog.stop_waiting();
 }
 

@@ -103,6 +103,8 @@ mod scan_viewer;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
+#[cfg(unix)]
+mod silent_server;
 mod small_block;
 mod snapshots;
 mod source_text;

@@ -9,6 +9,7 @@ use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::{CatalogErrorKind, connection_error};
 use crate::catalog::db::open::SCHEMA_VERSION;
 use crate::catalog::db::postgres_address::PostgresAddress;
+use crate::catalog::db::query::limited;
 
 /// Oldest supported major version of the server.
 const OLDEST_SERVER: u32 = 15;
@@ -160,6 +161,15 @@ impl PostgresAddress {
         Ok(conn)
     }
 
+    /// Returns the error of a server that cannot be reached now.
+    pub(crate) fn unavailable(&self, reason: &str) -> CatalogError {
+        CatalogError::NotConnected {
+            address: self.text(),
+            reason: reason.to_owned(),
+            is_unavailable: true,
+        }
+    }
+
     fn not_connected(&self, error: &sqlx::Error) -> CatalogError {
         CatalogError::NotConnected {
             address: self.text(),
@@ -171,15 +181,15 @@ impl PostgresAddress {
     /// Returns the version of the schema, or `None` if there is no catalog.
     async fn version(&self, conn: &mut PgConnection) -> Result<Option<i64>> {
         let exists = "SELECT to_regclass($1 || '.catalog_version') IS NOT NULL";
-        let exists: bool = sqlx::query_scalar(exists)
+        let exists = sqlx::query_scalar(exists)
             .bind(&self.schema)
-            .fetch_one(&mut *conn)
-            .await?;
+            .fetch_one(&mut *conn);
+        let exists: bool = limited(exists).await?;
         if !exists {
             return Ok(None);
         }
         let version = sqlx::query_scalar("SELECT version FROM catalog_version");
-        Ok(version.fetch_optional(conn).await?)
+        Ok(limited(version.fetch_optional(conn)).await?)
     }
 
     /// # Errors

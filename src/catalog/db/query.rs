@@ -196,9 +196,11 @@ pub(crate) async fn limited<T>(
     statement: impl Future<Output = sqlx::Result<T>>,
 ) -> sqlx::Result<T> {
     let limited = tokio::time::timeout(STATEMENT_LIMIT, statement).await;
-    limited.unwrap_or_else(|_| {
-        let text = format!("no reply for {} s", STATEMENT_LIMIT.as_secs());
-        let error = io::Error::new(io::ErrorKind::TimedOut, text);
-        Err(sqlx::Error::Io(error))
-    })
+    limited.unwrap_or_else(|_| Err(no_reply(STATEMENT_LIMIT)))
+}
+
+/// Returns the error of a server that did not reply for so long.
+pub(crate) fn no_reply(time: Duration) -> sqlx::Error {
+    let text = format!("no reply for {} s", time.as_secs());
+    sqlx::Error::Io(io::Error::new(io::ErrorKind::TimedOut, text))
 }

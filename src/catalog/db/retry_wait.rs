@@ -1,4 +1,4 @@
-//! Waits between attempts to reach a database server that is unavailable.
+//! Waits between attempts to reach a database server that is unavailable, and for its replies.
 
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use tokio::sync::Notify;
 
-use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::query::no_reply;
 use crate::failpoint;
 
 /// First wait before another attempt.
@@ -14,12 +15,18 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 /// Longest wait. A random factor of at most 1.5 spreads the attempts of many processes. A worker that waits must not be
 /// taken for dead: see `runner/liveness.rs`.
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
+/// Time without a reply after which an operation is given up once waits have ended.
+const REPLY_AFTER_STOP: Duration = Duration::from_secs(5);
+/// The same for operations after the first one that was given up.
+const REPLY_AFTER_SILENCE: Duration = Duration::from_secs(1);
 
 /// Whether this process retries while its database server is unavailable.
 #[derive(Debug, Default)]
 pub(crate) struct RetryWait {
     is_stopped: AtomicBool,
     stopped: Notify,
+    /// Whether an operation was given up.
+    is_silent: AtomicBool,
 }
 
 impl RetryWait {
@@ -29,9 +36,51 @@ impl RetryWait {
         self.stopped.notify_waiters();
     }
 
+    /// Returns whether waits have ended.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.is_stopped.load(Ordering::Acquire)
+    }
+
+    /// Runs an operation on the server. After [`Self::stop`], gives it up if it takes longer than 5 s, and later ones if
+    /// they take longer than 1 s. The connection of such an operation cannot be used again. A server that cannot be reached may
+    /// not refuse but drop all packets.
+    ///
+    /// # Errors
+    /// Returns the error of the operation, or that there was no reply.
+    pub(crate) async fn limit<T>(&self, operation: impl Future<Output = Result<T>>) -> Result<T> {
+        let limit = if self.is_silent.load(Ordering::Acquire) {
+            REPLY_AFTER_SILENCE
+        } else {
+            REPLY_AFTER_STOP
+        };
+        let silence = async {
+            tokio::time::sleep(limit).await;
+            self.stopped().await;
+        };
+        tokio::select! {
+            biased;
+            outcome = operation => outcome,
+            () = silence => {
+                self.is_silent.store(true, Ordering::Release);
+                Err(no_reply(limit).into())
+            }
+        }
+    }
+
+    /// Waits until waits have ended.
+    async fn stopped(&self) {
+        let stopped = self.stopped.notified();
+        if !self.is_stopped() {
+            stopped.await;
+        }
+    }
+
     /// Waits after the failed attempt `attempt`, counted from 0, and logs the first error. Returns `false` at once after
     /// [`Self::stop`].
     pub(crate) async fn wait(&self, attempt: u32, error: &CatalogError) -> bool {
+        if self.is_stopped() {
+            return false;
+        }
         if attempt == 0 {
             tracing::warn!(%error, "the database server is unavailable; waiting");
         }
@@ -41,13 +90,9 @@ impl RetryWait {
         let factor = 0.5 + random as f64 / f64::from(u32::MAX);
         let longest = LONGEST_WAIT / failpoint::time_scale("MOCBAN_TIME_SCALE");
         let wait = tokio::time::sleep(doubled.min(longest).mul_f64(factor));
-        let stopped = self.stopped.notified();
-        if self.is_stopped.load(Ordering::Acquire) {
-            return false;
-        }
         tokio::select! {
             () = wait => true,
-            () = stopped => false,
+            () = self.stopped() => false,
         }
     }
 }

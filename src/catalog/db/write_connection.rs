@@ -42,8 +42,9 @@ pub(crate) struct WriteConnection {
 /// The server of a catalog in PostgreSQL.
 struct Server {
     address: PostgresAddress,
-    retry_wait: Arc<RetryWait>,
     state: CatalogServerState,
+    /// Whether a connection failed after waits were ended.
+    is_given_up: bool,
 }
 
 /// What this process remembers of its requests to a server.
@@ -54,6 +55,7 @@ pub(crate) struct CatalogServerState {
     /// Whether the counters of all earlier slots were added up over this connection.
     pub(crate) has_folded_all: bool,
     pub(crate) worker_lock: WorkerLock,
+    pub(crate) retry_wait: Arc<RetryWait>,
 }
 
 impl WriteConnection {
@@ -80,8 +82,11 @@ impl WriteConnection {
             log: None,
             server: Some(Server {
                 address,
-                retry_wait,
-                state: CatalogServerState::default(),
+                state: CatalogServerState {
+                    retry_wait,
+                    ..CatalogServerState::default()
+                },
+                is_given_up: false,
             }),
             is_broken: false,
         }
@@ -113,7 +118,7 @@ impl WriteConnection {
     /// its first statement. Returns `false` if waits were ended.
     pub(crate) async fn may_repeat(&self, repeats: u32, error: &CatalogError) -> bool {
         match &self.server {
-            Some(server) if repeats > 0 => server.retry_wait.wait(repeats, error).await,
+            Some(server) if repeats > 0 => server.state.retry_wait.wait(repeats, error).await,
             _ => self.is_on_server(),
         }
     }
@@ -123,34 +128,40 @@ impl WriteConnection {
     ///
     /// # Errors
     /// Returns an error if waits were ended, or if the server refuses the connection for a reason that waiting does not
-    /// remove, such as a changed password.
+    /// remove, such as a changed password. After waits were ended, only one call tries to connect.
     pub(crate) async fn reconnect(&mut self) -> Result<()> {
         let Some(server) = &mut self.server else {
             return Ok(());
         };
         self.is_broken = true;
+        if server.is_given_up {
+            return Err(server.address.unavailable("no reply"));
+        }
+        let retry_wait = Arc::clone(&server.state.retry_wait);
         let mut attempt = 0;
         loop {
-            match server.address.reconnect().await {
+            match retry_wait.limit(server.address.reconnect()).await {
                 Ok(conn) => {
                     self.conn = Conn::Postgres(Held::Owned(conn));
                     self.is_broken = false;
                     server.state.leases.replies_may_be_lost();
                     server.state.has_folded_all = false;
                     server.state.worker_lock.session_ended();
-                    if let Err(error) = server.state.worker_lock.take(&mut self.conn).await {
+                    let lock = server.state.worker_lock.take(&mut self.conn);
+                    if let Err(error) = retry_wait.limit(lock).await {
                         // A broken connection shows at the next statement.
                         tracing::debug!(%error, "the worker's lock is taken later");
                     }
                     tracing::info!("connected to the database server again");
                     return Ok(());
                 }
-                Err(error)
-                    if error.is_unavailable() && server.retry_wait.wait(attempt, &error).await =>
-                {
+                Err(error) if error.is_unavailable() && retry_wait.wait(attempt, &error).await => {
                     attempt += 1;
                 }
-                Err(error) => return Err(error),
+                Err(error) => {
+                    server.is_given_up = retry_wait.is_stopped();
+                    return Err(error);
+                }
             }
         }
     }
@@ -167,7 +178,9 @@ impl WriteConnection {
                 return Ok(());
             };
             server.state.worker_lock.set_worker(worker);
-            match server.state.worker_lock.take(&mut self.conn).await {
+            let retry_wait = Arc::clone(&server.state.retry_wait);
+            let lock = server.state.worker_lock.take(&mut self.conn);
+            match retry_wait.limit(lock).await {
                 Err(error) if error.is_unavailable() && self.may_repeat(repeats, &error).await => {
                     self.reconnect().await?;
                     repeats += 1;
@@ -197,8 +210,8 @@ impl WriteConnection {
         self.reconnect_if_broken().await?;
         let mut repeats = 0;
         loop {
-            let (conn, path, _) = self.parts();
-            match retry_while_busy!(path, begin(conn).await) {
+            let (conn, path, state) = self.parts();
+            match retry_while_busy!(path, limit(state.as_deref(), begin(conn)).await) {
                 Err(error) if error.is_unavailable() && self.may_repeat(repeats, &error).await => {
                     self.reconnect().await?;
                     repeats += 1;
@@ -207,18 +220,16 @@ impl WriteConnection {
                 begun => break begun?,
             }
         }
-        let Self {
-            conn, is_broken, ..
-        } = self;
-        let mut outcome = work(&mut *conn).await;
-        if outcome.is_ok()
-            && let Err(error) = execute(conn, "COMMIT").await
-        {
-            outcome = Err(error);
-        }
-        *is_broken = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
-        if outcome.is_err() && !*is_broken {
-            rollback(conn).await;
+        let (conn, _, state) = self.parts();
+        let work = async {
+            let done = work(&mut *conn).await?;
+            execute(conn, "COMMIT").await?;
+            Ok(done)
+        };
+        let outcome = limit(state.as_deref(), work).await;
+        self.is_broken = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
+        if outcome.is_err() && !self.is_broken {
+            rollback(&mut self.conn).await;
         }
         if let Some(server) = &mut self.server {
             server.state.claim_start.begin_again();
@@ -252,6 +263,17 @@ impl WriteConnection {
         if let Err(error) = closed {
             tracing::warn!(%error, "the catalog did not close cleanly");
         }
+    }
+}
+
+/// Runs an operation. On a server, gives it up if there is no reply after waits were ended.
+async fn limit<T>(
+    server: Option<&CatalogServerState>,
+    operation: impl Future<Output = Result<T>>,
+) -> Result<T> {
+    match server {
+        Some(server) => server.retry_wait.limit(operation).await,
+        None => operation.await,
     }
 }
 

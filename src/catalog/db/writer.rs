@@ -105,7 +105,11 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
         let (conn, path, mut server) = writer.parts();
         let reply = retry_while_busy!(path, {
             let outcome = match server.as_deref_mut() {
-                Some(state) => server_commit::commit(batch, conn, state).await,
+                Some(state) => {
+                    let retry_wait = Arc::clone(&state.retry_wait);
+                    let commit = server_commit::commit(batch, conn, state);
+                    retry_wait.limit(commit).await
+                }
                 None => batch.apply(conn, false).await,
             };
             if outcome.as_ref().is_err_and(|error| !error.is_unavailable()) {
