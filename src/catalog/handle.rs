@@ -141,11 +141,11 @@ impl Catalog {
         match self.readers {
             ReaderPool::Sqlite(pool) => pool.close().await,
             ReaderPool::Postgres(pool) => {
-                let close = async {
+                let closed = self.retry_wait.limit(async {
                     pool.close().await;
                     Ok(())
-                };
-                if let Err(error) = self.retry_wait.limit(close).await {
+                });
+                if let Err(error) = closed.await {
                     tracing::debug!(%error, "the connections did not close");
                 }
             }

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
+use tokio::task::JoinSet;
 
 use super::block_pipeline::BlockPipeline;
 use super::block_plan;
@@ -17,7 +18,7 @@ use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
-use super::run_end::{RunEnd, block_limits, compute};
+use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
@@ -113,6 +114,9 @@ pub(super) async fn run_with(
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
+    // The task ends with this function.
+    let mut waiting = JoinSet::new();
+    waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counted = if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
         (RunCounts::default(), Duration::ZERO)

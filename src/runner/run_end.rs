@@ -34,8 +34,7 @@ pub(super) async fn compute(
     mut events: mpsc::UnboundedReceiver<RunEvent>,
     on_event: &mut (impl FnMut(RunEvent) + Send),
 ) -> Result<(RunCounts, Duration), RunError> {
-    let (catalog, stop) = (&context.catalog, context.stop.clone());
-    let stop_waiting = tokio::spawn(stop_waiting_after_stop(catalog.clone(), stop));
+    let catalog = &context.catalog;
     let counts = scheduler.run(&mut events, on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let (worker, now) = (scheduler.worker(), context.clock.now());
@@ -45,7 +44,6 @@ pub(super) async fn compute(
         ended.await
     });
     let ended = ended.await;
-    stop_waiting.abort();
     // A lost log explains other errors.
     let ended = match ended {
         Err(error) if error.log_loss().is_some() => return Err(error.into()),
@@ -59,7 +57,7 @@ pub(super) async fn compute(
 
 /// Ends all waits for an unavailable database server, [`UNAVAILABLE_AFTER_STOP`] after a first stop request or at once
 /// after a second.
-async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
+pub(super) async fn stop_waiting_after_stop(catalog: Catalog, stop: Stop) {
     stop.reached(StopLevel::Drain).await;
     let second = stop.reached(StopLevel::Now);
     let _ = tokio::time::timeout(UNAVAILABLE_AFTER_STOP, second).await;

@@ -39,8 +39,8 @@ impl ArrayParameters {
         self.rows_where(|name| names.contains(&name))
     }
 
-    /// The server reads one `unnest` per column in half the time of one with all columns in `FROM`, which stores each
-    /// column before it is read.
+    /// Returns a query with one `unnest` per column. The server reads it in half the time of one `unnest` in `FROM`, which
+    /// stores each column before it is read.
     fn rows_where(self, is_wanted: impl Fn(&str) -> bool) -> String {
         let numbered = (self.first..).zip(self.columns);
         let wanted = numbered.filter(|(_, (name, _))| is_wanted(name));

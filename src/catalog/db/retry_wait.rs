@@ -17,15 +17,15 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
 /// Time without a reply after which an operation is given up once waits have ended.
 const REPLY_AFTER_STOP: Duration = Duration::from_secs(5);
-/// The same for operations after the first one that was given up.
-const REPLY_AFTER_SILENCE: Duration = Duration::from_secs(1);
+/// The same after an operation was given up, until the server replies again.
+const REPLY_AFTER_SILENCE: Duration = Duration::from_secs(2);
 
 /// Whether this process retries while its database server is unavailable.
 #[derive(Debug, Default)]
 pub(crate) struct RetryWait {
     is_stopped: AtomicBool,
     stopped: Notify,
-    /// Whether an operation was given up.
+    /// Whether the last operation was given up.
     is_silent: AtomicBool,
 }
 
@@ -36,19 +36,23 @@ impl RetryWait {
         self.stopped.notify_waiters();
     }
 
-    /// Returns whether waits have ended.
-    pub(crate) fn is_stopped(&self) -> bool {
+    fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Acquire)
     }
 
-    /// Runs an operation on the server. After [`Self::stop`], gives it up if it takes longer than 5 s, and later ones if
-    /// they take longer than 1 s. The connection of such an operation cannot be used again. A server that cannot be reached may
-    /// not refuse but drop all packets.
+    /// Returns whether the last operation was given up.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.is_silent.load(Ordering::Acquire)
+    }
+
+    /// Runs an operation on the server, which may drop packets instead of refusing a connection. After [`Self::stop`], gives
+    /// it up 5 s after it began, or 2 s if the operation before was given up. A write connection must not be used again
+    /// then.
     ///
     /// # Errors
     /// Returns the error of the operation, or that there was no reply.
     pub(crate) async fn limit<T>(&self, operation: impl Future<Output = Result<T>>) -> Result<T> {
-        let limit = if self.is_silent.load(Ordering::Acquire) {
+        let limit = if self.is_silent() {
             REPLY_AFTER_SILENCE
         } else {
             REPLY_AFTER_STOP
@@ -57,14 +61,13 @@ impl RetryWait {
             tokio::time::sleep(limit).await;
             self.stopped().await;
         };
-        tokio::select! {
+        let outcome = tokio::select! {
             biased;
-            outcome = operation => outcome,
-            () = silence => {
-                self.is_silent.store(true, Ordering::Release);
-                Err(no_reply(limit).into())
-            }
-        }
+            outcome = operation => Some(outcome),
+            () = silence => None,
+        };
+        self.is_silent.store(outcome.is_none(), Ordering::Release);
+        outcome.unwrap_or_else(|| Err(no_reply(limit).into()))
     }
 
     /// Waits until waits have ended.

@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use sqlx::{Connection as _, PgConnection};
 
@@ -20,6 +21,9 @@ use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::queue::claim_start::ClaimStart;
 use crate::catalog::queue::worker_lock::WorkerLock;
 use crate::domain::WorkerId;
+
+/// Time after a connection was given up in which no other is tried.
+const PAUSE_AFTER_GIVING_UP: Duration = Duration::from_secs(10);
 
 /// Begins a transaction.
 pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
@@ -43,8 +47,8 @@ pub(crate) struct WriteConnection {
 struct Server {
     address: PostgresAddress,
     state: CatalogServerState,
-    /// Whether a connection failed after waits were ended.
-    is_given_up: bool,
+    /// When a connection was last given up, because the server did not reply.
+    given_up: Option<Instant>,
 }
 
 /// What this process remembers of its requests to a server.
@@ -86,7 +90,7 @@ impl WriteConnection {
                     retry_wait,
                     ..CatalogServerState::default()
                 },
-                is_given_up: false,
+                given_up: None,
             }),
             is_broken: false,
         }
@@ -128,13 +132,16 @@ impl WriteConnection {
     ///
     /// # Errors
     /// Returns an error if waits were ended, or if the server refuses the connection for a reason that waiting does not
-    /// remove, such as a changed password. After waits were ended, only one call tries to connect.
+    /// remove, such as a changed password. Does not try again soon after it gave up.
     pub(crate) async fn reconnect(&mut self) -> Result<()> {
         let Some(server) = &mut self.server else {
             return Ok(());
         };
         self.is_broken = true;
-        if server.is_given_up {
+        if server
+            .given_up
+            .is_some_and(|at| at.elapsed() < PAUSE_AFTER_GIVING_UP)
+        {
             return Err(server.address.unavailable("no reply"));
         }
         let retry_wait = Arc::clone(&server.state.retry_wait);
@@ -149,7 +156,7 @@ impl WriteConnection {
                     server.state.worker_lock.session_ended();
                     let lock = server.state.worker_lock.take(&mut self.conn);
                     if let Err(error) = retry_wait.limit(lock).await {
-                        // A broken connection shows at the next statement.
+                        self.is_broken = error.is_unavailable();
                         tracing::debug!(%error, "the worker's lock is taken later");
                     }
                     tracing::info!("connected to the database server again");
@@ -159,7 +166,7 @@ impl WriteConnection {
                     attempt += 1;
                 }
                 Err(error) => {
-                    server.is_given_up = retry_wait.is_stopped();
+                    server.given_up = retry_wait.is_silent().then(Instant::now);
                     return Err(error);
                 }
             }
@@ -185,9 +192,18 @@ impl WriteConnection {
                     self.reconnect().await?;
                     repeats += 1;
                 }
-                outcome => return outcome,
+                outcome => {
+                    self.note(&outcome);
+                    return outcome;
+                }
             }
         }
+    }
+
+    /// Records whether the outcome of the last statements leaves the connection in an unknown state.
+    pub(crate) fn note<T>(&mut self, outcome: &Result<T>) {
+        let is_unknown = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
+        self.is_broken |= self.is_on_server() && is_unknown;
     }
 
     /// Checks the log. Must be called before and after each commit, so that a reply is sent only for what is stored.
@@ -217,7 +233,10 @@ impl WriteConnection {
                     repeats += 1;
                     tracing::debug!(%error, "the transaction begins again");
                 }
-                begun => break begun?,
+                begun => {
+                    self.note(&begun);
+                    break begun?;
+                }
             }
         }
         let (conn, _, state) = self.parts();
@@ -227,7 +246,7 @@ impl WriteConnection {
             Ok(done)
         };
         let outcome = limit(state.as_deref(), work).await;
-        self.is_broken = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
+        self.note(&outcome);
         if outcome.is_err() && !self.is_broken {
             rollback(&mut self.conn).await;
         }

@@ -124,7 +124,10 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
                 repeats += 1;
                 tracing::debug!(%error, "the commit is tried again");
             }
-            reply => break reply,
+            reply => {
+                writer.note(&reply);
+                break reply;
+            }
         }
     };
     writer.check_log().await?;

@@ -130,8 +130,8 @@ fn statement(is_first: bool) -> String {
         [const { String::new() }; 3]
     } else {
         [
-            replace("pair, stage", &result_columns),
-            replace("pair, metric", &metric_columns),
+            replace(["pair", "stage"], &result_columns),
+            replace(["pair", "metric"], &metric_columns),
             REMOVE_EARLIER.to_owned(),
         ]
     };
@@ -202,12 +202,13 @@ unfailed AS (
     DELETE FROM failure USING advanced WHERE failure.pair = advanced.pair AND advanced.has_failure),";
 
 /// Returns the end of an `INSERT` that replaces rows with the same key.
-fn replace(key: &str, columns: &[&str]) -> String {
-    let set: Vec<_> = columns
-        .iter()
+fn replace(key: [&str; 2], columns: &[&str]) -> String {
+    let others = columns.iter().filter(|column| !key.contains(column));
+    let set: Vec<_> = others
         .map(|column| format!("{column} = excluded.{column}"))
         .collect();
-    format!("\n    ON CONFLICT ({key}) DO UPDATE SET {}", set.join(", "))
+    let (key, set) = (key.join(", "), set.join(", "));
+    format!("\n    ON CONFLICT ({key}) DO UPDATE SET {set}")
 }
 
 /// Returns the statements that store checkpoints.
@@ -234,8 +235,8 @@ pub(crate) async fn store(
     store_with(conn, &STORE, checkpoints).await
 }
 
-/// Returns whether the pair has no results of these stages and no failure: this is its first lease, under which a stage is
-/// stored twice only if it was computed again. A failure ends a lease.
+/// Returns whether the pair should have no results of these stages and no failure. This is its first lease, under which a
+/// stage is stored twice only if it was computed again, and a failure ends a lease.
 fn is_first((lease, stages): &LeasedCheckpoints) -> bool {
     lease.token == 1
         && stages
