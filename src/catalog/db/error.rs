@@ -216,7 +216,7 @@ pub enum LogLoss {
 }
 
 /// Returns the text of an error. That of PostgreSQL is without the line of its own source file.
-pub(crate) fn database_message(error: &sqlx::Error) -> String {
+fn database_message(error: &sqlx::Error) -> String {
     let server = error
         .as_database_error()
         .and_then(|error| error.try_downcast_ref::<PgDatabaseError>());

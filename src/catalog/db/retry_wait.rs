@@ -36,6 +36,7 @@ impl RetryWait {
         self.stopped.notify_waiters();
     }
 
+    /// Returns whether waits have ended.
     fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Acquire)
     }
