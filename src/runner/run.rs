@@ -114,7 +114,7 @@ pub(super) async fn run_with(
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
-    // The task ends with this function.
+    // The task is aborted when this function returns.
     let mut waiting = JoinSet::new();
     waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counted = if options.part == RunPart::Plan {

@@ -12,7 +12,7 @@ use crate::fleet::Fleet;
 struct Suspended(Vec<Pid>);
 
 impl Suspended {
-    /// Suspends the server: first the process that accepts connections, then those that serve them.
+    /// Suspends the process that accepts connections, and then the processes that serve the workers.
     fn server(fleet: &Fleet) -> Self {
         const FIRST: &str =
             "SELECT CAST(split_part(pg_read_file('postmaster.pid'), chr(10), 1) AS integer)";

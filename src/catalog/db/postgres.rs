@@ -161,11 +161,11 @@ impl PostgresAddress {
         Ok(conn)
     }
 
-    /// Returns the error of a server that cannot be reached now.
-    pub(crate) fn unavailable(&self, reason: &str) -> CatalogError {
+    /// Returns the error of a server that does not reply.
+    pub(crate) fn no_reply(&self) -> CatalogError {
         CatalogError::NotConnected {
             address: self.text(),
-            reason: reason.to_owned(),
+            reason: "no reply".to_owned(),
             is_unavailable: true,
         }
     }

@@ -20,7 +20,7 @@ const REPLY_AFTER_STOP: Duration = Duration::from_secs(5);
 /// The same after an operation was given up, until the server replies again.
 const REPLY_AFTER_SILENCE: Duration = Duration::from_secs(2);
 
-/// Whether this process retries while its database server is unavailable.
+/// Whether this process waits while its database server is unavailable, and whether the server replies.
 #[derive(Debug, Default)]
 pub(crate) struct RetryWait {
     is_stopped: AtomicBool,
@@ -46,9 +46,9 @@ impl RetryWait {
         self.is_silent.load(Ordering::Acquire)
     }
 
-    /// Runs an operation on the server, which may drop packets instead of refusing a connection. After [`Self::stop`], gives
-    /// it up 5 s after it began, or 2 s if the operation before was given up. A write connection must not be used again
-    /// then.
+    /// Runs an operation on the server. After [`Self::stop`], gives up an operation that has run for 5 s, or for 2 s if the
+    /// last one was given up: the network may drop all packets, so that no connection is ever refused. The state of its
+    /// connection is then unknown.
     ///
     /// # Errors
     /// Returns the error of the operation, or that there was no reply.

@@ -142,7 +142,7 @@ impl WriteConnection {
             .given_up
             .is_some_and(|at| at.elapsed() < PAUSE_AFTER_GIVING_UP)
         {
-            return Err(server.address.unavailable("no reply"));
+            return Err(server.address.no_reply());
         }
         let retry_wait = Arc::clone(&server.state.retry_wait);
         let mut attempt = 0;
@@ -193,7 +193,7 @@ impl WriteConnection {
                     repeats += 1;
                 }
                 outcome => {
-                    self.note(&outcome);
+                    self.note_outcome(&outcome);
                     return outcome;
                 }
             }
@@ -201,7 +201,7 @@ impl WriteConnection {
     }
 
     /// Records whether the outcome of the last statements leaves the connection in an unknown state.
-    pub(crate) fn note<T>(&mut self, outcome: &Result<T>) {
+    pub(crate) fn note_outcome<T>(&mut self, outcome: &Result<T>) {
         let is_unknown = outcome.as_ref().is_err_and(CatalogError::is_unavailable);
         self.is_broken |= self.is_on_server() && is_unknown;
     }
@@ -234,7 +234,7 @@ impl WriteConnection {
                     tracing::debug!(%error, "the transaction begins again");
                 }
                 begun => {
-                    self.note(&begun);
+                    self.note_outcome(&begun);
                     break begun?;
                 }
             }
@@ -246,7 +246,7 @@ impl WriteConnection {
             Ok(done)
         };
         let outcome = limit(state.as_deref(), work).await;
-        self.note(&outcome);
+        self.note_outcome(&outcome);
         if outcome.is_err() && !self.is_broken {
             rollback(&mut self.conn).await;
         }

@@ -125,7 +125,7 @@ async fn apply(writer: &mut WriteConnection, batch: &Batch) -> Result<BatchReply
                 tracing::debug!(%error, "the commit is tried again");
             }
             reply => {
-                writer.note(&reply);
+                writer.note_outcome(&reply);
                 break reply;
             }
         }

@@ -137,8 +137,7 @@ fn statement(is_first: bool) -> String {
     };
     format!(
         "
-WITH item AS (
-    SELECT * FROM {jobs} AS item),
+WITH item AS {jobs},
 advanced AS (
     UPDATE job SET stage = item.next, status = item.status,
         worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
