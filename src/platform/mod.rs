@@ -2,6 +2,7 @@
 //!
 //! `unix.rs` and `windows.rs` have the same functions.
 
+mod active_time;
 #[cfg(unix)]
 mod unix;
 #[cfg(windows)]
@@ -12,6 +13,7 @@ mod unix;
 )]
 mod windows;
 
+pub(crate) use active_time::{ActiveClock, sleep_active, timeout_active};
 #[cfg(unix)]
 pub(crate) use unix::*;
 #[cfg(windows)]

@@ -21,6 +21,7 @@ use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
 use crate::domain::{BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
+use crate::platform::sleep_active;
 use crate::store::ArtifactError;
 
 /// Times that a stage may find the result of an earlier stage unusable before the block fails.
@@ -224,7 +225,7 @@ async fn on_thread<T: Send + 'static>(
             Err(_) => Err(failed(FailureClass::Bug, "the block's thread ended without a result".to_owned())),
         },
         () = context.stop.reached(StopLevel::Now) => Interruption::Stopped,
-        () = tokio::time::sleep(context.stage_timeout) => {
+        () = sleep_active(context.stage_timeout) => {
             let seconds = context.stage_timeout.as_secs_f64();
             failed(FailureClass::Resource, format!("the stage took longer than {seconds} s (run.stage_timeout_s)"))
         }

@@ -19,6 +19,7 @@ use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, StageCheckpoint};
 use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
+use crate::platform::sleep_active;
 use crate::store::{ArtifactError, NewArtifact};
 
 /// A computed stage: its catalog row, and the files that must be on the disk before the row is stored.
@@ -71,7 +72,8 @@ impl ComputeThread {
         Ok(Self(receiver))
     }
 
-    /// Waits for the next event, for at most as long as one stage may take.
+    /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not
+    /// count.
     pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
         tokio::select! {
             biased;
@@ -79,7 +81,7 @@ impl ComputeThread {
                 ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
             }),
             () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
-            () = tokio::time::sleep(timeout) => ComputeEvent::TimedOut,
+            () = sleep_active(timeout) => ComputeEvent::TimedOut,
         }
     }
 }

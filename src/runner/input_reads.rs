@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::time::{Instant, sleep_until};
+use tokio::time::sleep;
 
 use super::options::RunOptions;
 use super::stop::{Stop, StopLevel};
+use crate::platform::ActiveClock;
 
 /// Reads in progress at the same time, not counting overdue reads.
 pub(super) const THREADS: usize = 8;
@@ -18,6 +19,8 @@ pub(super) const THREADS: usize = 8;
 pub(super) const MAX_HANGING: usize = 64;
 /// A file that takes longer than this is named to the user.
 const SLOW: Duration = Duration::from_secs(10);
+/// Longest time between two readings of the clock.
+const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
 /// Conditions under which a read is abandoned. Its thread stays until the system call returns.
 #[derive(Debug, Clone)]
@@ -85,7 +88,7 @@ pub(super) async fn read_each<T: ReadItem>(
                 }
             },
             () = &mut stopped => break,
-            () = sleep_until(pending.next_check()) => {
+            () = sleep(pending.until_check().min(LONGEST_SLEEP)) => {
                 let path_of = |at: usize| readers.queue.items[at].path();
                 for _ in 0..pending.check(path_of) {
                     readers.start_thread();
@@ -145,10 +148,11 @@ impl<T> ReadQueue<T> {
 /// The reads in progress.
 struct PendingReads {
     timeout: Duration,
-    /// When each read started, by position.
-    started: BTreeMap<usize, Instant>,
+    clock: ActiveClock,
+    /// When each read started by the clock, by position.
+    started: BTreeMap<usize, Duration>,
     /// When a read last started or ended, or was found overdue.
-    last_event: Instant,
+    last_event: Duration,
     /// Items whose read has returned or is overdue.
     ended: usize,
     /// Items whose read is overdue.
@@ -160,8 +164,9 @@ impl PendingReads {
     fn new(timeout: Duration) -> Self {
         Self {
             timeout,
+            clock: ActiveClock::start(2 * LONGEST_SLEEP),
             started: BTreeMap::new(),
-            last_event: Instant::now(),
+            last_event: Duration::ZERO,
             ended: 0,
             hanging: 0,
             is_slow_reported: false,
@@ -169,12 +174,12 @@ impl PendingReads {
     }
 
     fn start(&mut self, at: usize) {
-        self.last_event = Instant::now();
+        self.last_event = self.clock.now();
         self.started.insert(at, self.last_event);
     }
 
     fn end(&mut self, at: usize) {
-        self.last_event = Instant::now();
+        self.last_event = self.clock.now();
         // An overdue read may still return; it was counted before.
         if self.started.remove(&at).is_some() {
             self.ended += 1;
@@ -182,30 +187,33 @@ impl PendingReads {
     }
 
     /// Returns the start of the longest read in progress.
-    fn oldest(&self) -> Instant {
+    fn oldest(&self) -> Duration {
         let oldest = self.started.values().min();
         oldest.copied().unwrap_or(self.last_event)
     }
 
-    /// Returns when to look for slow and overdue reads.
-    fn next_check(&self) -> Instant {
+    /// Returns the time until slow and overdue reads are looked for.
+    fn until_check(&mut self) -> Duration {
         let wait = if self.is_slow_reported {
             self.timeout
         } else {
             self.timeout.min(SLOW)
         };
-        self.oldest() + wait
+        (self.oldest() + wait).saturating_sub(self.clock.now())
     }
 
     /// Reports the first slow read and every overdue one. Returns how many became overdue since the last call.
     fn check(&mut self, path_of: impl Fn(usize) -> PathBuf) -> usize {
-        let (now, timeout) = (Instant::now(), self.timeout);
+        if !self.until_check().is_zero() {
+            return 0;
+        }
+        let (now, timeout) = (self.clock.now(), self.timeout);
         if self.started.is_empty() {
             // No thread has reported anything for so long: none could be started.
             self.hanging = MAX_HANGING;
             return 0;
         }
-        let is_overdue = |_: &usize, since: &mut Instant| now - *since >= timeout;
+        let is_overdue = |_: &usize, since: &mut Duration| now - *since >= timeout;
         let overdue: BTreeMap<_, _> = self.started.extract_if(.., is_overdue).collect();
         for at in overdue.keys() {
             report_overdue(&path_of(*at), timeout);
@@ -245,7 +253,8 @@ mod tests {
     use std::sync::{Arc, Condvar, Mutex};
     use std::time::Duration;
 
-    use super::{Instant, PendingReads, ReadItem, ReadLimits, THREADS, read_each};
+    use super::{LONGEST_SLEEP, PendingReads, ReadItem, ReadLimits, SLOW, THREADS, read_each};
+    use crate::platform::ActiveClock;
     use crate::runner::stop::{Stop, StopLevel};
 
     /// Opened when hanging reads may return.
@@ -310,13 +319,20 @@ mod tests {
     fn threads_that_replace_hanging_ones_have_time_to_start() {
         let timeout = Duration::from_secs(5);
         let mut pending = PendingReads::new(timeout);
-        let begun = Instant::now()
-            .checked_sub(timeout)
-            .expect("an earlier time");
-        pending.started.insert(0, begun);
-        pending.last_event = begun;
+        pending.start(0);
+        pending.clock = ActiveClock::continued(2 * LONGEST_SLEEP, timeout + SLOW);
         assert_eq!(pending.check(|_| PathBuf::new()), 1);
-        assert!(pending.next_check() > Instant::now());
+        assert!(!pending.until_check().is_zero());
+    }
+
+    #[test]
+    fn reads_are_not_overdue_because_the_process_was_suspended() {
+        let mut pending = PendingReads::new(Duration::from_secs(5));
+        pending.start(0);
+        pending.clock = ActiveClock::continued(Duration::ZERO, Duration::from_secs(4));
+        assert_eq!(pending.check(|_| PathBuf::new()), 0);
+        assert!(pending.until_check() <= Duration::from_secs(1));
+        assert_eq!(pending.ended, 0);
     }
 
     #[tokio::test]

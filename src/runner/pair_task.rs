@@ -19,6 +19,7 @@ use super::stop::{Stop, StopLevel};
 use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
 use crate::domain::{Failure, FailureClass, Stage, WaitReason};
 use crate::failpoint::{self, Point};
+use crate::platform::ActiveClock;
 use crate::store::ArtifactError;
 
 /// What is left to do for a pair when its stages are computed.
@@ -126,13 +127,14 @@ const LOOK_EVERY: Duration = Duration::from_millis(250);
 /// unavailable.
 async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
     stop.reached(StopLevel::Drain).await;
-    let (mut path, mut since) = (file.get(), Instant::now());
+    let mut clock = ActiveClock::start(2 * LOOK_EVERY);
+    let (mut path, mut since) = (file.get(), clock.now());
     loop {
         tokio::time::sleep(LOOK_EVERY).await;
-        let now = file.get();
-        if now != path {
-            (path, since) = (now, Instant::now());
-        } else if path.is_some() && since.elapsed() >= LONGEST_READ_AFTER_STOP {
+        let (found, now) = (file.get(), clock.now());
+        if found != path {
+            (path, since) = (found, now);
+        } else if path.is_some() && now - since >= LONGEST_READ_AFTER_STOP {
             return;
         }
     }

@@ -15,6 +15,7 @@ use super::stop::StopLevel;
 use crate::catalog::StageCheckpoint;
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
+use crate::platform::sleep_active;
 use crate::store::{ArtifactError, NewArtifact};
 
 /// A pack waits this long for the next stages of its pair, so that a pair is usually one object.
@@ -172,7 +173,7 @@ async fn stored_in_bucket<T: Send + 'static>(
         outcome = storing => outcome,
         () = context.stop.reached(StopLevel::Now) => Ok(None),
         () = gave_up => Ok(None),
-        () = tokio::time::sleep(longest) => {
+        () = sleep_active(longest) => {
             let seconds = longest.as_secs();
             tracing::warn!(
                 "the results of a pair were not stored within {seconds} s; the pair is released and computed again. \
@@ -197,7 +198,7 @@ async fn finished<T: Send + 'static>(
         biased;
         written = run_blocking(writing) => written.map(Some),
         () = context.stop.reached(StopLevel::Now) => Ok(None),
-        () = tokio::time::sleep(timeout) => {
+        () = sleep_active(timeout) => {
             let text = format!("writing took longer than {} s", timeout.as_secs_f64());
             Err(ArtifactError::Io {
                 path: context.project.artifacts_place(),

@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::Duration;
 
-use tokio::time::{Instant, Sleep, sleep};
+use tokio::time::{Sleep, sleep};
 
 use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::lock_owner;
+use crate::platform::ActiveClock;
 
 /// Longest wait.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);
@@ -16,10 +17,13 @@ const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
+/// Longest time of one attempt: SQLite's busy timeout and a margin. If more time passes, the process was suspended.
+const LONGEST_ATTEMPT: Duration = Duration::from_secs(15);
+
 /// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
-    begun: Instant,
+    clock: ActiveClock,
     is_logged: bool,
 }
 
@@ -28,7 +32,7 @@ impl<'p> BusyRetry<'p> {
     pub(crate) fn begin(catalog: &'p Path) -> Self {
         Self {
             catalog,
-            begun: Instant::now(),
+            clock: ActiveClock::start(LONGEST_ATTEMPT),
             is_logged: false,
         }
     }
@@ -37,7 +41,7 @@ impl<'p> BusyRetry<'p> {
     /// `LONGEST_WAIT` has passed.
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
-        let waited = self.begun.elapsed();
+        let waited = self.clock.now();
         if error.kind() != Some(CatalogErrorKind::Busy) || waited >= LONGEST_WAIT {
             return None;
         }
@@ -81,7 +85,7 @@ mod tests {
     use tracing::span::{Attributes, Id, Record};
     use tracing::{Event, Level, Metadata, Subscriber, subscriber};
 
-    use super::{BusyRetry, LONGEST_WAIT, QUIET_WAIT};
+    use super::{ActiveClock, BusyRetry, LONGEST_ATTEMPT, LONGEST_WAIT, QUIET_WAIT};
     use crate::catalog::{CatalogError, Result};
 
     async fn connect(path: &Path) -> SqliteConnection {
@@ -105,7 +109,7 @@ mod tests {
     /// Returns a retry that has waited this long already.
     fn after(waited: Duration) -> BusyRetry<'static> {
         let mut retry = BusyRetry::begin(Path::new("catalog.sqlite"));
-        retry.begun -= waited;
+        retry.clock = ActiveClock::continued(LONGEST_ATTEMPT, waited);
         retry
     }
 

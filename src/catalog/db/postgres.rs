@@ -10,6 +10,7 @@ use crate::catalog::db::error_kind::{CatalogErrorKind, connection_error};
 use crate::catalog::db::open::SCHEMA_VERSION;
 use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::db::query::limited;
+use crate::platform::timeout_active;
 
 /// Oldest supported major version of the server.
 const OLDEST_SERVER: u32 = 15;
@@ -106,10 +107,10 @@ impl PostgresAddress {
         let mut conn = self.connect_unconfigured().await?;
         let mut other = self.connect_unconfigured().await?;
         // A pooler without a free connection to the server answers late.
-        let checking = tokio::time::timeout(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other));
+        let checking = timeout_active(CONNECT_TIMEOUT, keep_processes(&mut conn, &mut other));
         let is_kept = checking
             .await
-            .unwrap_or_else(|_| Err(timed_out()))
+            .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))?;
         other.close().await?;
         if is_kept {
@@ -138,17 +139,17 @@ impl PostgresAddress {
     /// Sets the settings of every connection, and these.
     async fn configure(&self, conn: &mut PgConnection, settings: &str) -> Result<()> {
         let configuring = run_settings(conn, self.settings(settings));
-        let configured = tokio::time::timeout(CONNECT_TIMEOUT, configuring).await;
+        let configured = timeout_active(CONNECT_TIMEOUT, configuring).await;
         configured
-            .unwrap_or_else(|_| Err(timed_out()))
+            .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))
     }
 
     /// Opens a connection with the settings of the server.
     async fn connect_unconfigured(&self) -> Result<PgConnection> {
-        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.options.connect()).await;
+        let connected = timeout_active(CONNECT_TIMEOUT, self.options.connect()).await;
         let conn = connected
-            .unwrap_or_else(|_| Err(timed_out()))
+            .unwrap_or_else(|| Err(timed_out()))
             .map_err(|error| self.not_connected(&error))?;
         let version = conn.server_version_num().unwrap_or(0) / 10_000;
         if version < OLDEST_SERVER {

@@ -13,6 +13,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::{Argument, FromValue};
+use crate::platform::timeout_active;
 
 /// Longest time for one statement on a server. Without a limit, a statement on a connection that broke silently would
 /// wait forever.
@@ -195,8 +196,8 @@ where
 pub(crate) async fn limited<T>(
     statement: impl Future<Output = sqlx::Result<T>>,
 ) -> sqlx::Result<T> {
-    let limited = tokio::time::timeout(STATEMENT_LIMIT, statement).await;
-    limited.unwrap_or_else(|_| Err(no_reply(STATEMENT_LIMIT)))
+    let limited = timeout_active(STATEMENT_LIMIT, statement).await;
+    limited.unwrap_or_else(|| Err(no_reply(STATEMENT_LIMIT)))
 }
 
 /// Returns the error of a server that did not reply for so long.

@@ -9,6 +9,7 @@ use tokio::sync::Notify;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::query::no_reply;
 use crate::failpoint;
+use crate::platform::sleep_active;
 
 /// First wait before another attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);
@@ -59,7 +60,7 @@ impl RetryWait {
             REPLY_AFTER_STOP
         };
         let silence = async {
-            tokio::time::sleep(limit).await;
+            sleep_active(limit).await;
             self.stopped().await;
         };
         let outcome = tokio::select! {
