@@ -6,6 +6,11 @@ use super::page_map::PageMap;
 use super::relief::surface_height;
 use crate::domain::{Affine2, PrintFromMesh};
 
+/// Step of the rounded pixels, as a part of the longer edge of the character's box.
+const ROUNDED_PART: f64 = 0.002;
+/// Step of the point at which a rounded map is linearized, mm.
+const ROUNDED_MM: f64 = 1.0;
+
 /// The affine map at the middle of a character.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CharacterMap {
@@ -17,10 +22,40 @@ pub struct CharacterMap {
 impl CharacterMap {
     /// Linearizes the map of a face to its page at the middle of a character.
     pub fn of(face: &CarvedFace, map: &PageMap, character: &PlacedCharacter) -> Self {
-        let [u0, v0, u1, v1] = character.face_box;
-        let middle = [f64::midpoint(u0, u1), f64::midpoint(v0, v1)];
+        let middle = middle_mm(character);
         let page = map.page_from_face(middle);
+        Self::linear(face, middle, page, map.derivative(middle))
+    }
+
+    /// Like [`Self::of`], but rounded, so that the map changes an edge of the box by at most 0.3 % of its length. When other
+    /// boxes of the page change, the map of the face changes everywhere by a small part of a pixel, and the rounded map of
+    /// a character usually stays equal. `px_per_mm` is the resolution of the page.
+    pub fn rounded(
+        face: &CarvedFace,
+        map: &PageMap,
+        character: &PlacedCharacter,
+        px_per_mm: f64,
+    ) -> Self {
+        let [left, top, right, bottom] = character.label.page_box;
+        let longer = (right - left).max(bottom - top);
+        let round = |value: f64, step: f64| (value / step).round() * step;
+        let middle = middle_mm(character).map(|at| round(at, ROUNDED_MM));
+        let page = map.page_from_face(middle);
+        let page = page.map(|at| round(at, ROUNDED_PART * longer));
+        // Over half an edge, such a step of the slope moves a pixel by a step of the position.
+        let slope_step = 2.0 * ROUNDED_PART * px_per_mm;
         let derivative = map.derivative(middle);
+        let derivative = derivative.map(|row| row.map(|slope| round(slope, slope_step)));
+        Self::linear(face, middle, page, derivative)
+    }
+
+    /// Returns the map with these page pixels at a point of the face in mm, and with these slopes in pixels per mm.
+    fn linear(
+        face: &CarvedFace,
+        middle: [f64; 2],
+        page: [f64; 2],
+        derivative: [[f64; 2]; 2],
+    ) -> Self {
         let frame = &face.map.frame;
         let mut rows = [[0.0; 4]; 3];
         // face = axes (point - centre) mm; page = page(middle) + derivative (face - middle).
@@ -59,6 +94,12 @@ impl CharacterMap {
         }
         Some(PrintFromMesh(rows))
     }
+}
+
+/// Returns the middle of a character on the face, mm.
+fn middle_mm(character: &PlacedCharacter) -> [f64; 2] {
+    let [u0, v0, u1, v1] = character.face_box;
+    [f64::midpoint(u0, u1), f64::midpoint(v0, v1)]
 }
 
 #[cfg(test)]
@@ -103,5 +144,48 @@ mod tests {
         let [cx, cy, _] = in_crop.apply([70.0, 42.0, 0.0]);
         let [bx, by] = crop.apply([cx, cy]);
         assert!((bx - px).abs() < 1e-6 && (by - py).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_rounded_map_is_near_and_hardly_ever_changes_with_the_map_of_the_face() {
+        let world = TestWorld::new(21);
+        let face = world.face();
+        let px_per_mm = 8.0;
+        let support = Support {
+            origin_mm: [0.0; 2],
+            columns: 16,
+            percent: vec![100; 16 * 11],
+        };
+        let label = CharacterBox {
+            name: "a".to_owned(),
+            text: None,
+            page_box: [550.0, 350.0, 640.0, 450.0],
+        };
+        let [mut changed, mut unlike] = [0, 0];
+        for k in 0..40 {
+            let maps = [0.0, 0.003].map(|shift| {
+                let turn = 0.03 + 0.002 * f64::from(k);
+                let affine = Affine2::similarity(px_per_mm, turn, [60.0 + shift, 30.0 - shift]);
+                PageMap::affine(&affine, [0.0; 2], SIDES_MM)
+            });
+            let page =
+                world.affine_page([1300, 900], &Affine2::similarity(8.0, 0.03, [60.0, 30.0]));
+            let placed = place_characters(&face, &page, (&maps[0], &support), &[label.clone()]);
+            let character = &placed.characters[0];
+            let [here, there] = [&maps[0], &maps[1]]
+                .map(|map| CharacterMap::rounded(&face, map, character, px_per_mm));
+            changed += u32::from(here != there);
+            let exact = CharacterMap::of(&face, &maps[0], character);
+            unlike += u32::from(here != exact);
+            let [u0, v0, u1, v1] = character.face_box;
+            for point in [[u0, v0], [u0, v1], [u1, v0], [u1, v1]] {
+                let [x, y, _] = exact.page_from_mesh.apply([point[0], point[1], 0.0]);
+                let [near_x, near_y, _] = here.page_from_mesh.apply([point[0], point[1], 0.0]);
+                let error = (near_x - x).abs().max((near_y - y).abs());
+                // 0.3 % of 100 px, and the rotation of the box.
+                assert!(error <= 0.33, "{error}");
+            }
+        }
+        assert!(changed <= 8 && unlike == 40, "{changed} {unlike}");
     }
 }

@@ -3,7 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use serde_json::Value;
+
 use crate::cli::{Call, mocban};
+use crate::small_block::{CHARACTERS, demo_block, few_labels, few_labels_with};
 
 /// A file that is a mesh of one triangle, which no page belongs to.
 const TRIANGLE: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 300 0 0\nvertex 0 200 0\nendloop\nendfacet\nendsolid a\n";
@@ -167,4 +170,60 @@ fn a_backup_holds_blocks_and_finds_their_files_again() {
     // Artifacts are not in a backup, so the next run computes the stages again.
     mocban(dir.path(), &["-C", "restored", "check", "--repair"]).expect(0);
     mocban(dir.path(), &["-C", "restored", "check"]).expect(0);
+}
+
+/// Runs a project, and returns the exported lines of its pairs without the times.
+fn exported(dir: &Path, project: &str) -> Vec<Value> {
+    mocban(dir, &["-C", project, "run", "-j", "2"]).expect(0);
+    let folder = format!("{project}-export");
+    mocban(
+        dir,
+        &["-C", project, "export", "--to", "jsonl", "-o", &folder],
+    )
+    .expect(0);
+    let lines = fs::read_to_string(dir.join(folder).join("pairs.jsonl")).expect("the lines");
+    let lines = lines.lines().map(|line| {
+        let mut line: Value = serde_json::from_str(line).expect("JSON");
+        line["seconds"] = Value::Null;
+        line
+    });
+    lines.collect()
+}
+
+#[test]
+fn replaced_labels_give_the_results_of_a_new_import() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    demo_block(dir);
+    let moved = |few: &mut [Value]| {
+        let x = &mut few[0]["shape_attributes"]["x"];
+        *x = (x.as_i64().expect("pixels") + 4).into();
+    };
+    few_labels(dir, &dir.join("first.json"));
+    few_labels_with(dir, &dir.join("moved.json"), moved);
+    let import = |project: &str, labels: &str| {
+        let files = ["--block", "d/data/block.ply", "--page", "d/data/page.jpg"];
+        let labels = ["--labels", labels, "--name", "b", "--unit", "mm"];
+        mocban(
+            dir,
+            &[&["-C", project, "import"], &files[..], &labels].concat(),
+        )
+        .expect(0)
+    };
+    import("p", "first.json");
+    let first = exported(dir, "p");
+    import("p", "moved.json");
+    let replaced = exported(dir, "p");
+    import("new", "moved.json");
+    assert!(replaced == exported(dir, "new"));
+    import("p", "first.json");
+    assert!(first == exported(dir, "p"));
+    let lines = first.iter().zip(&replaced);
+    let kept = lines.filter(|(first, replaced)| first == replaced).count();
+    assert!(
+        kept >= first.len() / CHARACTERS,
+        "{kept} of {}",
+        first.len()
+    );
+    assert!(kept < first.len());
 }

@@ -70,7 +70,7 @@ impl Fixture {
     fn suspended(count: &str) -> (Self, Running) {
         loop {
             let fixture = Self::new(count);
-            let suspended = fixture.suspended_at("fit:synced", &[TIME_SCALE]);
+            let suspended = fixture.suspended_at("fit:synced", &[TIME_SCALE], &[]);
             if lock_owner(&fixture.project.catalog_path()).is_none() {
                 return (fixture, suspended);
             }
@@ -78,8 +78,8 @@ impl Fixture {
     }
 
     /// Starts `run --json` with one worker and waits until it is suspended at a failpoint.
-    fn suspended_at(&self, point: &str, time_scale: &[(&str, &str)]) -> Running {
-        let mut command = run(&self.project, &["-j", "1", "--json"]);
+    fn suspended_at(&self, point: &str, time_scale: &[(&str, &str)], args: &[&str]) -> Running {
+        let mut command = run(&self.project, &[&["-j", "1", "--json"], args].concat());
         command
             .env("MOCBAN_STOP_AT", point)
             .envs(time_scale.iter().copied());
@@ -250,7 +250,7 @@ fn a_late_checkpoint_of_a_suspended_process_changes_nothing() {
 #[test]
 fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     let fixture = Fixture::new("2");
-    let mut suspended = fixture.suspended_at("fit:claiming", &[]);
+    let mut suspended = fixture.suspended_at("fit:claiming", &[], &[]);
     let pid = suspended.pid();
     let found = lock_owner(&fixture.project.catalog_path()).expect("a lock_owner");
     assert_eq!((found.pid, found.is_stopped), (pid, true));
@@ -286,6 +286,21 @@ fn a_process_suspended_past_its_leases_drops_its_work_and_continues() {
     assert_eq!(json["stages"], 8);
     fixture.assert_uninterrupted_results();
     assert!(pairs(&fixture.project).iter().all(|pair| pair.crashes == 0));
+}
+
+/// Reads, stages and writes in progress have taken longer than the limit when the process continues.
+#[test]
+fn a_process_suspended_for_longer_than_a_stage_may_take_continues() {
+    let limit = ["--set", "run.stage_timeout_s=2"];
+    for point in ["fit:synced", "register:written"] {
+        let fixture = Fixture::new("2");
+        let mut suspended = fixture.suspended_at(point, &[], &limit);
+        std::thread::sleep(Duration::from_millis(2300));
+        suspended.send(Signal::CONT);
+        let (code, json, stderr) = suspended.end();
+        assert_eq!((code, &json["stages"]), (Some(0), &8.into()), "{stderr}");
+        fixture.assert_uninterrupted_results();
+    }
 }
 
 #[test]

@@ -39,13 +39,19 @@ pub(crate) fn demo_block(dir: &Path) {
 
 /// Writes labels of a few characters of the block that [`demo_block`] has created.
 pub(crate) fn few_labels(dir: &Path, file: &Path) {
+    few_labels_with(dir, file, |_| ());
+}
+
+/// Like [`few_labels`], with changed regions.
+pub(crate) fn few_labels_with(dir: &Path, file: &Path, change: impl FnOnce(&mut [Value])) {
     let labels = fs::read_to_string(dir.join("d/data/labels.json")).expect("the labels");
     let mut labels: Value = serde_json::from_str(&labels).expect("JSON");
     let files = labels["_via_img_metadata"].as_object_mut().expect("files");
     let of_page = files.values_mut().next().expect("a file");
     let regions = of_page["regions"].as_array().expect("regions").iter();
-    let few: Vec<Value> = regions.step_by(30).take(CHARACTERS).cloned().collect();
+    let mut few: Vec<Value> = regions.step_by(30).take(CHARACTERS).cloned().collect();
     assert_eq!(few.len(), CHARACTERS);
+    change(&mut few);
     of_page["regions"] = json!(few);
     fs::write(file, labels.to_string()).expect("written");
 }

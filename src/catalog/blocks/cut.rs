@@ -1,22 +1,20 @@
 //! Stores the last stage of a block: its result, its characters, and the pairs that were cut, in one transaction.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::catalog::blocks::checkpoint::{self, Stored};
 use crate::catalog::blocks::model::{BlockCheckpoint, BlockLease, CutPair, NewCharacter};
 use crate::catalog::blocks::{characters, retired};
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query, query_as, query_scalar};
-use crate::catalog::db::row::FromRow as _;
+use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::db::rows::names_json;
 use crate::catalog::db::script::Script;
 use crate::catalog::queue::checkpoint::add_inputs;
 use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::lease::InputVersions;
-use crate::catalog::records::import::{ImportRow, ImportSummary, SELECT, import_chunk};
-use crate::catalog::records::model::PairAttributes;
+use crate::catalog::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{AlignmentPrior, BlockName, PairId, PairName};
+use crate::domain::{BlockName, PairId, PairName};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -83,7 +81,7 @@ async fn finish(
 ) -> Result<CutReply> {
     let name = query_scalar(NAME).bind(lease.block.0);
     let name: BlockName = name.fetch_one(&mut *conn).await?;
-    let mut rows = pair_rows(&name, found)?;
+    let rows = pair_rows(&name, found)?;
     let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
     let taken = query_scalar(TAKEN).bind(lease.block.0);
     let taken: Option<PairName> = taken
@@ -93,7 +91,6 @@ async fn finish(
     if let Some(taken) = taken {
         return Ok(CutReply::NameTaken(taken));
     }
-    keep_near_priors(conn, &mut rows, &names).await?;
     match checkpoint::store(conn, lease, stage).await? {
         Stored::LeaseLost => return Ok(CutReply::LeaseLost),
         Stored::Before => return Ok(CutReply::Stored(CutSummary::default())),
@@ -111,43 +108,6 @@ async fn finish(
 struct CutRow<'c> {
     row: ImportRow,
     cut: &'c CutPair,
-    /// About the size of the print in pixels: width and height.
-    size: [f64; 2],
-}
-
-/// Keeps the stored priors of pairs with the same files, if the new ones are near. When one box changes, the positions
-/// of all other characters change by a small fraction of a pixel, which is no reason to align them again.
-async fn keep_near_priors(
-    conn: &mut Conn,
-    rows: &mut [CutRow<'_>],
-    names: &[PairName],
-) -> Result<()> {
-    let stored = query(SELECT).bind(names_json(names));
-    let mut by_name = BTreeMap::new();
-    for row in &stored.fetch_all(conn).await? {
-        // The import replaces a row with an invalid value.
-        if let Ok(pair) = PairAttributes::from_row(row) {
-            by_name.insert(pair.name.clone(), pair);
-        }
-    }
-    for CutRow { row, size, .. } in rows {
-        let Some(old) = by_name.remove(&row.name) else {
-            continue;
-        };
-        let is_same = old.mesh_path == row.mesh_path
-            && old.print_path == row.print_path
-            && old.unit == row.unit
-            && old.scanned_face_down == row.scanned_face_down;
-        let parse = |prior: &Option<String>| -> Option<AlignmentPrior> {
-            serde_json::from_str(prior.as_deref()?).ok()
-        };
-        if let (true, Some(before), Some(now)) = (is_same, parse(&old.prior), parse(&row.prior))
-            && before.is_near(&now, *size)
-        {
-            row.prior = old.prior;
-        }
-    }
-    Ok(())
 }
 
 /// Returns the pairs to import, each with its files.
@@ -166,12 +126,7 @@ fn pair_rows<'c>(block: &BlockName, found: &'c [NewCharacter]) -> Result<Vec<Cut
             meta: serde_json::Map::new(),
             prior: cut.prior.clone(),
         };
-        let [left, top, right, bottom] = one.bounds;
-        Ok(CutRow {
-            row,
-            cut,
-            size: [right - left, bottom - top],
-        })
+        Ok(CutRow { row, cut })
     })
     .collect()
 }

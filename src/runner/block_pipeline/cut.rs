@@ -66,6 +66,7 @@ pub(super) fn cut(
     let characters: Vec<CharacterOutput> = (boxes.characters.iter().zip(prints).zip(meshes))
         .map(|((character, print), mesh)| {
             let local = CharacterMap::of(face, &map, character);
+            let rounded = CharacterMap::rounded(face, &map, character, aligned.px_per_mm);
             let cut = print.and_then(|(print, crop)| {
                 let mesh = mesh?;
                 Ok((print, crop, mesh))
@@ -83,7 +84,7 @@ pub(super) fn cut(
                     unit: Some(scan.unit),
                     scanned_face_down: (normal_z.abs() >= MIN_NORMAL_Z).then_some(normal_z < 0.0),
                     prior: (character.confidence >= MIN_PRIOR)
-                        .then(|| prior(&local, &crop, character))
+                        .then(|| prior(&rounded, &crop))
                         .flatten(),
                 }),
             }
@@ -151,10 +152,9 @@ fn maps(local: &CharacterMap, crop: &PrintCrop) -> Value {
 }
 
 /// Returns the alignment that `register` may expect, as JSON.
-fn prior(local: &CharacterMap, crop: &PrintCrop, character: &PlacedCharacter) -> Option<Value> {
+fn prior(rounded: &CharacterMap, crop: &PrintCrop) -> Option<Value> {
     let prior = AlignmentPrior {
-        print_from_mesh: local.print_from_mesh(&crop.page_from_crop)?,
-        confidence: character.confidence,
+        print_from_mesh: rounded.print_from_mesh(&crop.page_from_crop)?,
     };
     serde_json::to_value(prior).ok()
 }
