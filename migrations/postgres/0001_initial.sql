@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (11);
+INSERT INTO catalog_version (version) VALUES (12);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (

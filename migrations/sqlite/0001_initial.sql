@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
--- `domain::job`.
+-- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 11;
+PRAGMA user_version = 12;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -14,10 +14,10 @@ CREATE TABLE worker (
     started INTEGER NOT NULL,
     heartbeat INTEGER NOT NULL,
     ended INTEGER,
-    fingerprints TEXT CHECK (json_valid(fingerprints)),
-    block_settings TEXT CHECK (json_valid(block_settings)),
+    fingerprints TEXT CHECK (fingerprints IS NULL OR json_valid(fingerprints)),
+    block_settings TEXT CHECK (block_settings IS NULL OR json_valid(block_settings)),
     died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1)),
-    metrics TEXT CHECK (json_valid(metrics))
+    metrics TEXT CHECK (metrics IS NULL OR json_valid(metrics))
 ) STRICT;
 
 -- What a stage's result depends on besides the inputs: its settings and revision, and the fingerprint of the stage
@@ -42,7 +42,7 @@ CREATE TABLE pair (
     character TEXT,
     block TEXT,
     meta TEXT NOT NULL CHECK (json_valid(meta)),
-    prior TEXT CHECK (json_valid(prior)),
+    prior TEXT CHECK (prior IS NULL OR json_valid(prior)),
     attributes TEXT NOT NULL CHECK (json_valid(attributes)),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     mesh_stat TEXT,
@@ -296,8 +296,8 @@ CREATE TABLE block (
     labels_hash BLOB CHECK (length(labels_hash) = 32),
     labels_stat TEXT,
     imported INTEGER NOT NULL,
-    true_boxes TEXT CHECK (json_valid(true_boxes)),
-    control_points TEXT CHECK (json_valid(control_points))
+    true_boxes TEXT CHECK (true_boxes IS NULL OR json_valid(true_boxes)),
+    control_points TEXT CHECK (control_points IS NULL OR json_valid(control_points))
 ) STRICT;
 
 -- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`. The failure is stored
@@ -316,7 +316,7 @@ CREATE TABLE block_job (
     message TEXT,
     failed_stage INTEGER CHECK (failed_stage BETWEEN 0 AND 3),
     failed_at INTEGER,
-    failed_with TEXT CHECK (json_valid(failed_with)),
+    failed_with TEXT CHECK (failed_with IS NULL OR json_valid(failed_with)),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
     CHECK ((status = 1) = (deadline IS NOT NULL)),
@@ -367,7 +367,7 @@ CREATE TABLE block_character (
     confidence REAL CHECK (confidence BETWEEN 0 AND 1),
     state TEXT NOT NULL CHECK (state IN ('cut', 'left', 'retired')),
     reason TEXT,
-    maps TEXT CHECK (json_valid(maps)),
+    maps TEXT CHECK (maps IS NULL OR json_valid(maps)),
     pair INTEGER UNIQUE REFERENCES pair (id),
     PRIMARY KEY (block, label)
 ) STRICT;

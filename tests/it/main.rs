@@ -108,6 +108,7 @@ mod silent_server;
 mod small_block;
 mod snapshots;
 mod source_text;
+mod stock_sqlite;
 mod stroke_map;
 mod style;
 mod terminal;
