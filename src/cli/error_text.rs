@@ -62,7 +62,9 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         error if error.is_of_server() && error.kind() == Some(CatalogErrorKind::ReadOnly) => {
             Some(ExitCode::Usage)
         }
-        CatalogError::Corrupt(_) | CatalogError::Json(_) => Some(ExitCode::Damaged),
+        CatalogError::Corrupt(_) | CatalogError::Json(_) | CatalogError::ForeignSchema { .. } => {
+            Some(ExitCode::Damaged)
+        }
         error if error.log_loss().is_some() => Some(ExitCode::Damaged),
         CatalogError::UnknownPair(_)
         | CatalogError::NoResult(_)
@@ -175,8 +177,11 @@ pub(super) fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
 
 /// Returns whether the catalog's content is damaged, empty or not a catalog.
 pub(super) fn is_damage(error: &CatalogError) -> bool {
-    use CatalogError::{Corrupt, Empty, Foreign, Json};
-    matches!(error, Empty(_) | Foreign { .. } | Corrupt(_) | Json(_)) || is_damaged_file(error)
+    use CatalogError::{Corrupt, Empty, Foreign, ForeignSchema, Json};
+    matches!(
+        error,
+        Empty(_) | Foreign { .. } | ForeignSchema { .. } | Corrupt(_) | Json(_)
+    ) || is_damaged_file(error)
 }
 
 /// Returns whether the pages of the catalog's file are inconsistent.

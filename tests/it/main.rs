@@ -43,6 +43,7 @@ mod faults;
 #[cfg(unix)]
 mod fleet;
 #[cfg(target_os = "linux")]
+mod foreign_schema;
 mod grid_print;
 mod hanging;
 mod hostile;

@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error_kind::CatalogErrorKind;
-use crate::catalog::db::open;
 use crate::catalog::db::query::{query_as, query_scalar};
+use crate::catalog::db::schema;
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
@@ -64,11 +63,6 @@ SELECT what FROM (
     UNION ALL SELECT 'job row ' || j.pair || ' names a worker that is not there' FROM job AS j
     WHERE j.worker IS NOT NULL AND NOT EXISTS (SELECT 1 FROM worker AS w WHERE w.id = j.worker)) AS broken LIMIT ?1",
 );
-
-const OBJECTS: &str = "
-SELECT type || ' ' || name, sql FROM sqlite_schema
-WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name NOT IN ('_sqlx_migrations', 'backup_settings')
-ORDER BY 1";
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
@@ -132,20 +126,9 @@ impl Catalog {
         let Conn::Sqlite(mut conn) = self.read_conn().await? else {
             return Ok(Vec::new());
         };
-        let found = objects(&mut conn).await?;
-        let wanted = wanted_objects().await?;
-        let gone = wanted.keys().filter(|name| !found.contains_key(*name));
-        let gone = gone.map(|name| format!("{name} is missing"));
-        let other = found
-            .iter()
-            .filter_map(|(name, sql)| match wanted.get(name) {
-                None => Some(format!("{name} does not belong to this program")),
-                Some(wanted) if wanted != sql => {
-                    Some(format!("{name} differs from its definition"))
-                }
-                Some(_) => None,
-            });
-        Ok(gone.chain(other).collect())
+        let wanted = schema::wanted_objects().await?;
+        let found = schema::differences(&mut conn, wanted).await?;
+        Ok(found.iter().map(ToString::to_string).collect())
     }
 
     /// Compares the counters, and the fingerprint and dirty mark of each job, with the rows they are derived from. With
@@ -218,20 +201,6 @@ fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());
     code.and_then(CatalogErrorKind::of_code) == Some(CatalogErrorKind::Disk)
-}
-
-/// Returns tables, indexes and triggers by kind and name, with their SQL.
-pub(crate) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
-    let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
-    Ok(found.into_iter().collect())
-}
-
-/// Returns the [`objects`] of a new catalog.
-pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
-    let options = SqliteConnectOptions::new().in_memory(true);
-    let mut conn = options.connect().await?;
-    open::MIGRATOR.run(&mut conn).await?;
-    objects(&mut conn).await
 }
 
 #[cfg(test)]
