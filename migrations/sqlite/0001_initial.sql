@@ -154,7 +154,14 @@ CREATE TABLE metric_result (
     PRIMARY KEY (pair, metric)
 ) STRICT;
 
--- Verdicts of people. Append-only; one is undone by a row in verdict_undo. `event` is the client's id of the action, so
+-- Actions of reviewers. Each belongs to one reviewer, and so does all that refers to it.
+CREATE TABLE review_act (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    reviewer TEXT NOT NULL CHECK (reviewer <> ''),
+    UNIQUE (id, reviewer)
+) STRICT;
+
+-- Verdicts of people. Append-only; the verdicts of an action are undone by a row in verdict_undo. `event` is the client's id of the action, so
 -- that a request sent twice is stored once; `seen` is the hash of what was on the screen, `shown_ms` how long it was
 -- there, `angle_read_deg` the rotation that the reviewer found missing, `review_order` the order in which results came.
 CREATE TABLE verdict (
@@ -172,15 +179,20 @@ CREATE TABLE verdict (
     seen BLOB CHECK (length(seen) = 32),
     shown_ms INTEGER CHECK (shown_ms >= 0),
     angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180),
-    review_order TEXT CHECK (review_order IN ('random', 'least_confident', 'adjudicate'))
+    review_order TEXT CHECK (review_order IN ('random', 'least_confident', 'adjudicate')),
+    FOREIGN KEY (act, reviewer) REFERENCES review_act (id, reviewer)
 ) STRICT;
 CREATE INDEX verdict_pair ON verdict (pair, metric, reviewer, id);
 CREATE INDEX verdict_act ON verdict (act);
 CREATE UNIQUE INDEX verdict_event ON verdict (event, metric) WHERE event IS NOT NULL;
 CREATE TABLE verdict_undo (
     act INTEGER PRIMARY KEY,
-    at INTEGER NOT NULL
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (act, reviewer) REFERENCES review_act (id, reviewer)
 ) STRICT;
+CREATE TRIGGER review_act_no_update BEFORE UPDATE ON review_act BEGIN SELECT RAISE (ABORT, 'actions are append-only'); END;
+CREATE TRIGGER review_act_no_delete BEFORE DELETE ON review_act BEGIN SELECT RAISE (ABORT, 'actions are append-only'); END;
 CREATE TRIGGER verdict_no_update BEFORE UPDATE ON verdict BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 CREATE TRIGGER verdict_no_delete BEFORE DELETE ON verdict BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 CREATE TRIGGER verdict_undo_no_update BEFORE UPDATE ON verdict_undo BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
@@ -224,12 +236,15 @@ CREATE TABLE attention_check_answer (
     reviewer TEXT NOT NULL CHECK (reviewer <> ''),
     reason TEXT CHECK (reason IN ('angle', 'strokes_lost', 'background_in', 'shift_or_scale', 'mirrored', 'wrong_pair')),
     note TEXT,
-    at INTEGER NOT NULL
+    at INTEGER NOT NULL,
+    UNIQUE (id, reviewer)
 ) STRICT;
 CREATE INDEX attention_check_answer_reviewer ON attention_check_answer (reviewer, id);
 CREATE TABLE attention_check_undo (
-    answer INTEGER PRIMARY KEY REFERENCES attention_check_answer (id),
-    at INTEGER NOT NULL
+    answer INTEGER PRIMARY KEY,
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (answer, reviewer) REFERENCES attention_check_answer (id, reviewer)
 ) STRICT;
 
 -- Manual alignments of these contents of mesh and print, made on this result of the depth stage.
@@ -247,12 +262,15 @@ CREATE TABLE manual_alignment (
     dice REAL NOT NULL CHECK (dice BETWEEN 0 AND 1),
     reviewer TEXT NOT NULL CHECK (reviewer <> ''),
     note TEXT,
-    at INTEGER NOT NULL
+    at INTEGER NOT NULL,
+    UNIQUE (id, reviewer)
 ) STRICT;
 CREATE INDEX manual_alignment_pair ON manual_alignment (pair, id);
 CREATE TABLE manual_alignment_undo (
-    alignment INTEGER PRIMARY KEY REFERENCES manual_alignment (id),
-    at INTEGER NOT NULL
+    alignment INTEGER PRIMARY KEY,
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (alignment, reviewer) REFERENCES manual_alignment (id, reviewer)
 ) STRICT;
 
 CREATE TRIGGER attention_check_answer_no_update BEFORE UPDATE ON attention_check_answer BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;

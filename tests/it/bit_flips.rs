@@ -136,7 +136,7 @@ fn changed_added_and_removed_rows_are_named_with_their_pair() {
             "row 1 of the table truth is missing",
         ),
         (
-            "INSERT INTO verdict_undo (act, at) VALUES (1, 7)",
+            "INSERT INTO verdict_undo (act, reviewer, at) VALUES (1, 'lan', 7)",
             "row 1 of the table verdict_undo (pair upright-0000) has no checksum",
         ),
         (

@@ -68,6 +68,8 @@ mod names;
 mod object_store;
 mod object_store_blocks;
 mod odd;
+#[cfg(unix)]
+mod old_snapshots;
 mod one_pair;
 mod page;
 mod parsers;

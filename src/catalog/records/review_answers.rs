@@ -135,17 +135,17 @@ WHERE c.id > ?1 ORDER BY c.id LIMIT ?2"#;
 const UNDO: [(ChecksummedTable, &str); 3] = [
     (
         ChecksummedTable::VerdictUndo,
-        "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
+        "INSERT INTO verdict_undo (act, reviewer, at) SELECT DISTINCT act, reviewer, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING act",
     ),
     (
         ChecksummedTable::AnswerUndo,
-        "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
+        "INSERT INTO attention_check_undo (answer, reviewer, at) SELECT id, reviewer, ?3 FROM attention_check_answer
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING answer",
     ),
     (
         ChecksummedTable::ManualAlignmentUndo,
-        "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
+        "INSERT INTO manual_alignment_undo (alignment, reviewer, at) SELECT id, reviewer, ?3 FROM manual_alignment
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING alignment",
     ),
 ];

@@ -42,8 +42,7 @@ pub struct NewVerdict {
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
-    /// Number of the reviewer's action, which is the id of its first row. One action can judge several metrics of a
-    /// pair.
+    /// Number of the reviewer's action. One action can judge several metrics of a pair.
     pub act: i64,
     /// The pair.
     pub pair: PairName,
@@ -104,12 +103,18 @@ SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
     JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name = ?1 ORDER BY m.metric";
 
+/// Begins an action, unless a verdict with the same event and metric exists.
+const NEW_ACT: &str = "
+INSERT INTO review_act (reviewer) SELECT ?1
+WHERE ?2 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?2 AND metric = ?3)
+RETURNING id";
+
 const INSERT: &str = "
 INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, note, at,
     event, seen, shown_ms, angle_read_deg, review_order)
-SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
+SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
-RETURNING id, act";
+RETURNING id";
 
 /// Returns whether a verdict with an id up to `?9` has the same values and was not undone.
 const IS_STORED: &str = "
@@ -136,6 +141,9 @@ FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
 WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0)
 ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)";
+
+const UNDO: &str = "
+INSERT INTO verdict_undo (act, reviewer, at) SELECT id, reviewer, ?2 FROM review_act WHERE id = ?1";
 
 pub(crate) const COUNTED: &str = "
 SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
@@ -190,11 +198,7 @@ impl Catalog {
                 let Some(act) = act else {
                     return Err(CatalogError::NothingToUndo(reviewer));
                 };
-                query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
-                    .bind(act)
-                    .bind(now)
-                    .execute(&mut *conn)
-                    .await?;
+                query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
                 checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
                 let query = query_as(LOG)
                     .bind(act)
@@ -298,7 +302,17 @@ pub(crate) async fn insert(
     now: UnixMillis,
 ) -> Result<Option<i64>> {
     let look = &new.look;
-    let inserted: Option<(i64, i64)> = query_as(INSERT)
+    let act = if let Some(act) = act {
+        act
+    } else {
+        let begun = query_scalar(NEW_ACT).bind(&new.reviewer);
+        let begun = begun.bind(&look.event).bind(metric.name());
+        let Some(act) = begun.fetch_optional(&mut *conn).await? else {
+            return Ok(None);
+        };
+        act
+    };
+    let inserted: Option<i64> = query_scalar(INSERT)
         .bind(act)
         .bind(pair)
         .bind(metric.name())
@@ -315,7 +329,7 @@ pub(crate) async fn insert(
         .bind(look.review_order.map(ReviewOrder::name))
         .fetch_optional(&mut *conn)
         .await?;
-    let Some((row, act)) = inserted else {
+    let Some(row) = inserted else {
         return Ok(None);
     };
     checksums::store(conn, ChecksummedTable::Verdict, &[row]).await?;
