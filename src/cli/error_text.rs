@@ -209,7 +209,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
     if let Some(loss) = error.log_loss() {
         return Some(log_lost(&path, loss));
     }
-    if let Some(reason) = error.refused_user() {
+    if let Some(reason) = error.refused_connection() {
         return Some(format!(
             "the database server of the catalog refused the connection: {reason}"
         ));

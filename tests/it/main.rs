@@ -118,6 +118,8 @@ mod terminal;
 mod test_size;
 mod tiff_file;
 mod tiff_kinds;
+#[cfg(unix)]
+mod tls_to_server;
 mod uninterrupted;
 #[cfg(unix)]
 mod watch_workers;
