@@ -384,6 +384,17 @@ CREATE TABLE checksum (
     record bigint NOT NULL,
     row bigint NOT NULL,
     value bigint NOT NULL,
+    previous bigint,
+    PRIMARY KEY (record, row),
+    FOREIGN KEY (record, previous) REFERENCES checksum (record, row)
+);
+
+CREATE TABLE set_apart (
+    record bigint NOT NULL,
+    row bigint NOT NULL,
+    value bigint NOT NULL,
+    fault text NOT NULL,
+    at bigint NOT NULL,
     PRIMARY KEY (record, row)
 );
 

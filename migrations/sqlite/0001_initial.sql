@@ -390,11 +390,25 @@ CREATE TABLE block_character (
     PRIMARY KEY (block, label)
 ) STRICT;
 
--- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`.
+-- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`. In a
+-- log, `previous` is the row before.
 CREATE TABLE checksum (
     record INTEGER NOT NULL,
     row INTEGER NOT NULL,
     value INTEGER NOT NULL,
+    previous INTEGER,
+    PRIMARY KEY (record, row),
+    FOREIGN KEY (record, previous) REFERENCES checksum (record, row)
+) STRICT, WITHOUT ROWID;
+
+-- Damaged rows that the owner has set apart: they are not counted, and no longer reported as damage. A row stays in its
+-- table. `value` is the checksum that it would have, so that a later change is damage again.
+CREATE TABLE set_apart (
+    record INTEGER NOT NULL,
+    row INTEGER NOT NULL,
+    value INTEGER NOT NULL,
+    fault TEXT NOT NULL,
+    at INTEGER NOT NULL,
     PRIMARY KEY (record, row)
 ) STRICT, WITHOUT ROWID;
 

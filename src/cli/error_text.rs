@@ -255,6 +255,9 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         ),
         Some(CatalogErrorKind::Statement) | None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
+                // Without this file, the catalog is on a server.
+                let is_file = project.join(CATALOG_FILE).exists();
+                let path = if is_file { &*path } else { "the catalog" };
                 format!("{path} contains an invalid value: {error}; `check` gives details")
             }
             _ => return None,
@@ -356,9 +359,13 @@ mod tests {
         let found = catalog_error(&error).expect("the catalog's error");
         assert_eq!(join_causes(&error), found.to_string());
         assert!(is_damage(found));
-        let text = explain_catalog(found, Path::new("nowhere")).expect("a sentence");
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let text = explain_catalog(found, dir.path()).expect("a sentence");
+        assert!(text.starts_with("the catalog contains"), "{text}");
+        std::fs::write(dir.path().join("catalog.sqlite"), "").expect("written");
+        let text = explain_catalog(found, dir.path()).expect("a sentence");
         assert!(
-            text.replace('\\', "/").contains("nowhere/catalog.sqlite") && text.contains("`check`"),
+            text.contains("catalog.sqlite contains") && text.contains("`check`"),
             "{text}"
         );
         let plain = CatalogError::Missing("p/catalog.sqlite".into());

@@ -117,10 +117,72 @@ fn a_reviewer_adds_only_the_own_verdicts_and_changes_none() {
         lab.assert_database_refuses("mai", &sql, code);
     }
     lab.assert_whole();
-    // A row that was not stored by the program is found.
-    lab.sql("mai", &new_verdict("mai")).expect("the own name");
-    let checked = lab.call("guest", "check").expect(12);
-    assert!(checked.out.contains("has no checksum"), "{}", checked.out);
+}
+
+/// Rows that a reviewer's login can store, but the program does not: without a checksum, with a wrong one, and with values
+/// that cannot be read.
+#[test]
+fn rows_that_a_reviewer_forges_are_set_apart_and_stop_nobody() {
+    let Some((lab, act)) = with_verdicts() else {
+        return;
+    };
+    let report = |user| lab.call(user, "--json report").expect(0).json();
+    let sound = report("guest");
+    let wrong =
+        "INSERT INTO checksum (record, row, value, previous) SELECT 2, max(id), 7, 1 FROM verdict";
+    let answer = "INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
+        SELECT 'e', pair, metric, result_hash, 'turned', '[]', result_hash, 'pass', 'mai', 1 FROM verdict LIMIT 1";
+    for sql in [&*new_verdict("mai"), &new_verdict("mai"), wrong, answer] {
+        lab.sql("mai", sql).expect("the own rows");
+    }
+    // A later verdict of another reviewer is not affected.
+    let set = "verdict set upright-0001 fail --reason angle --reviewer lan";
+    lab.call("lan", set).expect(0);
+    for words in ["report", "verdict log", "agreement", "export -o x"] {
+        let call = lab.call("guest", words).expect(0);
+        assert!(
+            call.err.contains("set apart and not counted"),
+            "{}",
+            call.err
+        );
+    }
+    let log = lab.call("guest", "verdict log").expect(0).out;
+    assert!(
+        log.contains("reviewer=\"mai\"") && !log.contains("lan  mai"),
+        "{log}"
+    );
+    let found = lab.call("guest", "check").expect(12);
+    for text in [
+        "has no checksum",
+        "differs from its checksum",
+        "the owner of the catalog can",
+    ] {
+        assert!(found.out.contains(text), "{text}: {}", found.out);
+    }
+    assert_eq!(
+        found.next(),
+        Vec::<String>::new(),
+        "a viewer cannot repair it"
+    );
+    lab.call("grid", "check --repair").expect(12);
+    let repaired = lab.call("chief", "check --repair").expect(0);
+    assert!(
+        repaired.out.contains("3 damaged rows set apart"),
+        "{}",
+        repaired.out
+    );
+    let checked = lab.call("guest", "check").expect(0);
+    assert!(checked.out.contains("set apart earlier"), "{}", checked.out);
+    let now = report("guest");
+    assert_eq!(now["set_apart"]["count"], 3);
+    assert_eq!(now["rows"][0]["judged"], 2);
+    assert_eq!(sound["rows"][0]["judged"], 1);
+    // The owner decides to count a verdict after all.
+    let set = "verdict set upright-0000 pass --metric density --reviewer mai";
+    lab.call("chief", set).expect(0);
+    let log = lab.call("guest", "--json verdict log").expect(0).out;
+    let counted = |line: &&str| line.starts_with("{\"id\"") && line.contains("\"mai\"");
+    assert_eq!(log.lines().filter(counted).count(), 1, "{act}: {log}");
 }
 
 #[test]

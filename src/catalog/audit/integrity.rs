@@ -43,7 +43,7 @@ pub struct CounterDrift {
 const REFERENCES: Sql = Sql::pair(
     "
 SELECT \"table\" || coalesce(' row ' || rowid, '') || ' names a ' || parent || ' that is not there'
-FROM pragma_foreign_key_check LIMIT ?1",
+FROM pragma_foreign_key_check WHERE \"table\" <> 'checksum' LIMIT ?1",
     "
 SELECT what FROM (
     SELECT 'stage_result of pair ' || r.pair || ' names a pair that is not there' AS what
@@ -63,6 +63,29 @@ SELECT what FROM (
     UNION ALL SELECT 'job row ' || j.pair || ' names a worker that is not there' FROM job AS j
     WHERE j.worker IS NOT NULL AND NOT EXISTS (SELECT 1 FROM worker AS w WHERE w.id = j.worker)) AS broken LIMIT ?1",
 );
+
+/// Selects triggers and rules of PostgreSQL that could change rows besides those of this program, and triggers that are
+/// missing or switched off.
+const SERVER_OBJECTS: &str = "
+WITH wanted AS (
+    SELECT name, name || '_append_only' AS trigger FROM (VALUES ('review_act'), ('verdict'), ('verdict_undo'),
+        ('attention_check_answer'), ('attention_check_undo'), ('manual_alignment'), ('manual_alignment_undo')) AS log (name)
+    UNION ALL SELECT 'pair', 'pair_changed'),
+found AS (
+    SELECT CAST(c.relname AS text) AS name, CAST(t.tgname AS text) AS trigger, t.tgenabled <> 'D' AS is_on
+    FROM pg_trigger AS t JOIN pg_class AS c ON c.oid = t.tgrelid
+    WHERE c.relnamespace = CAST(current_schema() AS regnamespace) AND NOT t.tgisinternal)
+SELECT what FROM (
+    SELECT 'trigger ' || f.trigger || ' on ' || f.name || ' does not belong to this program' AS what
+    FROM found AS f WHERE NOT EXISTS (SELECT 1 FROM wanted AS w WHERE w.name = f.name AND w.trigger = f.trigger)
+    UNION ALL
+    SELECT 'trigger ' || w.trigger || ' is missing or switched off'
+    FROM wanted AS w WHERE NOT EXISTS (
+        SELECT 1 FROM found AS f WHERE w.name = f.name AND w.trigger = f.trigger AND f.is_on)
+    UNION ALL
+    SELECT 'rule ' || r.rulename || ' on ' || c.relname || ' does not belong to this program'
+    FROM pg_rewrite AS r JOIN pg_class AS c ON c.oid = r.ev_class
+    WHERE c.relnamespace = CAST(current_schema() AS regnamespace) AND c.relkind = 'r') AS difference ORDER BY what";
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
@@ -118,13 +141,17 @@ impl Catalog {
         lines.fetch_all(&mut conn).await
     }
 
-    /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.
+    /// Compares the tables, indexes and triggers with the schema of this program, in PostgreSQL only the triggers and rules.
+    /// Returns one line for each difference.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
-        let Conn::Sqlite(mut conn) = self.read_conn().await? else {
-            return Ok(Vec::new());
+        let mut conn = match self.read_conn().await? {
+            Conn::Sqlite(conn) => conn,
+            mut conn @ Conn::Postgres(_) => {
+                return query_scalar(SERVER_OBJECTS).fetch_all(&mut conn).await;
+            }
         };
         let wanted = schema::wanted_objects().await?;
         let found = schema::differences(&mut conn, wanted).await?;

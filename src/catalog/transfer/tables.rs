@@ -80,7 +80,7 @@ macro_rules! table_by_two {
 
 /// Every table, in an order in which no row refers to a later table. The counters are counted anew, and the settings of
 /// the last plan are not copied.
-pub(super) const TABLES: [CopyTable; 24] = [
+pub(super) const TABLES: [CopyTable; 25] = [
     table!("review_key", 2, "id", "key"),
     table!("worker", 11, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "block_settings",
         "died", "metrics"; numbered),
@@ -209,7 +209,8 @@ pub(super) const TABLES: [CopyTable; 24] = [
     table!("block_attempt", 8, "id", "block", "stage", "worker", "class", "message", "ms", "at"; numbered),
     table_by_two!("block_character", 10, "block", "label", "place", "character", "box", "confidence", "state", "reason", "maps",
         "pair"; true),
-    table_by_two!("checksum", 3, "record", "row", "value"; false),
+    table_by_two!("checksum", 4, "record", "row", "value", "previous"; false),
+    table_by_two!("set_apart", 5, "record", "row", "value", "fault", "at"; false),
 ];
 
 #[cfg(test)]
