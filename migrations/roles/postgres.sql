@@ -58,7 +58,8 @@ GRANT INSERT, UPDATE, DELETE ON job, retired_pair, failure, attempt, stage_resul
 GRANT INSERT, UPDATE (value) ON checksum TO mocban_worker;
 
 -- Workers append verdicts with `verdict import`. Reviewers append all that the review page stores. Nobody else may, and
--- nobody may choose the number of a row. Triggers of the schema refuse to change or delete these rows, for the owner too.
+-- nobody may choose the number of a row or of an action. Triggers of the schema refuse to change or delete these rows, for the owner too.
+GRANT INSERT (reviewer) ON review_act TO mocban_worker, mocban_reviewer;
 GRANT INSERT (act, pair, metric, result_hash, verdict, reviewer, reason, note, at, event, seen, shown_ms, angle_read_deg,
     review_order) ON verdict TO mocban_worker, mocban_reviewer;
 GRANT INSERT (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg, verdict, reviewer,
@@ -76,48 +77,41 @@ BEGIN
     FOR policy IN SELECT policyname, tablename FROM pg_policies WHERE schemaname = '{schema}' LOOP
         EXECUTE format('DROP POLICY %I ON %I', policy.policyname, policy.tablename);
     END LOOP;
-    FOREACH name IN ARRAY ARRAY['verdict', 'verdict_undo', 'attention_check_answer', 'attention_check_undo',
+    FOREACH name IN ARRAY ARRAY['review_act', 'verdict', 'verdict_undo', 'attention_check_answer', 'attention_check_undo',
         'manual_alignment', 'manual_alignment_undo', 'checksum'] LOOP
         EXECUTE format('ALTER TABLE %I ENABLE ROW LEVEL SECURITY', name);
         EXECUTE format('CREATE POLICY anyone_reads ON %I FOR SELECT USING (true)', name);
     END LOOP;
 END $$;
 
+CREATE POLICY worker_adds ON review_act FOR INSERT TO mocban_worker WITH CHECK (true);
 CREATE POLICY worker_adds ON verdict FOR INSERT TO mocban_worker WITH CHECK (true);
 
--- A reviewer's name is the name of the login user. An action has verdicts of one reviewer only, and its number is not
--- above the number of its rows, because it would then be the number of a later action of another reviewer.
-CREATE POLICY reviewer_adds_own ON verdict FOR INSERT TO mocban_reviewer WITH CHECK (
-    reviewer = CAST(session_user AS text) AND act <= id
-    AND NOT EXISTS (SELECT 1 FROM verdict AS other WHERE other.act = verdict.act AND other.reviewer <> verdict.reviewer));
-CREATE POLICY reviewer_adds_own ON attention_check_answer FOR INSERT TO mocban_reviewer
-WITH CHECK (reviewer = CAST(session_user AS text));
-CREATE POLICY reviewer_adds_own ON manual_alignment FOR INSERT TO mocban_reviewer
-WITH CHECK (reviewer = CAST(session_user AS text));
-
--- Reviewers undo only what they stored.
-CREATE POLICY reviewer_adds_own ON verdict_undo FOR INSERT TO mocban_reviewer WITH CHECK (
-    (SELECT bool_and(v.reviewer = CAST(session_user AS text)) FROM verdict AS v WHERE v.act = verdict_undo.act));
-CREATE POLICY reviewer_adds_own ON attention_check_undo FOR INSERT TO mocban_reviewer WITH CHECK (
-    (SELECT a.reviewer = CAST(session_user AS text) FROM attention_check_answer AS a WHERE a.id = attention_check_undo.answer));
-CREATE POLICY reviewer_adds_own ON manual_alignment_undo FOR INSERT TO mocban_reviewer WITH CHECK (
-    (SELECT a.reviewer = CAST(session_user AS text) FROM manual_alignment AS a WHERE a.id = manual_alignment_undo.alignment));
+-- A reviewer's name is the name of the login user, in every row. A policy compares only columns of its own row, because a
+-- transaction may see an old state of other tables. Foreign keys on a number and a reviewer do the rest: a verdict or an
+-- undo belongs to an action of its reviewer, and reviewers undo only what they stored.
+DO $$
+DECLARE
+    name text;
+BEGIN
+    FOREACH name IN ARRAY ARRAY['review_act', 'verdict', 'verdict_undo', 'attention_check_answer', 'attention_check_undo',
+        'manual_alignment', 'manual_alignment_undo'] LOOP
+        EXECUTE format('CREATE POLICY reviewer_adds_own ON %I FOR INSERT TO mocban_reviewer
+            WITH CHECK (reviewer = CAST(session_user AS text))', name);
+    END LOOP;
+END $$;
 
 -- Checksums, by the number of their table (`ChecksummedTable` in `src/catalog/records/checksums.rs`): workers store those
 -- of pairs (0), true alignments (1), verdicts (2) and blocks (8), and change those of all but verdicts. Reviewers add those
--- of the rows that they stored.
+-- of the rows that they stored: a number belongs to one row, which never changes, so that an old state of its table can lack the
+-- row, but not show another reviewer.
 CREATE POLICY worker_adds ON checksum FOR INSERT TO mocban_worker WITH CHECK (record IN (0, 1, 2, 8));
 CREATE POLICY worker_changes ON checksum FOR UPDATE TO mocban_worker USING (record IN (0, 1, 8)) WITH CHECK (record IN (0, 1, 8));
 CREATE POLICY reviewer_adds_own ON checksum FOR INSERT TO mocban_reviewer WITH CHECK (CASE record
-    WHEN 2 THEN EXISTS (SELECT 1 FROM verdict AS v WHERE v.id = checksum.row AND v.reviewer = CAST(session_user AS text))
-    WHEN 3 THEN EXISTS (SELECT 1 FROM verdict_undo AS u JOIN verdict AS v ON v.act = u.act
-        WHERE u.act = checksum.row AND v.reviewer = CAST(session_user AS text))
-    WHEN 4 THEN EXISTS (SELECT 1 FROM attention_check_answer AS a
-        WHERE a.id = checksum.row AND a.reviewer = CAST(session_user AS text))
-    WHEN 5 THEN EXISTS (SELECT 1 FROM attention_check_undo AS u JOIN attention_check_answer AS a ON a.id = u.answer
-        WHERE u.answer = checksum.row AND a.reviewer = CAST(session_user AS text))
-    WHEN 6 THEN EXISTS (SELECT 1 FROM manual_alignment AS a
-        WHERE a.id = checksum.row AND a.reviewer = CAST(session_user AS text))
-    WHEN 7 THEN EXISTS (SELECT 1 FROM manual_alignment_undo AS u JOIN manual_alignment AS a ON a.id = u.alignment
-        WHERE u.alignment = checksum.row AND a.reviewer = CAST(session_user AS text))
+    WHEN 2 THEN EXISTS (SELECT 1 FROM verdict AS r WHERE r.id = checksum.row AND r.reviewer = CAST(session_user AS text))
+    WHEN 3 THEN EXISTS (SELECT 1 FROM verdict_undo AS r WHERE r.act = checksum.row AND r.reviewer = CAST(session_user AS text))
+    WHEN 4 THEN EXISTS (SELECT 1 FROM attention_check_answer AS r WHERE r.id = checksum.row AND r.reviewer = CAST(session_user AS text))
+    WHEN 5 THEN EXISTS (SELECT 1 FROM attention_check_undo AS r WHERE r.answer = checksum.row AND r.reviewer = CAST(session_user AS text))
+    WHEN 6 THEN EXISTS (SELECT 1 FROM manual_alignment AS r WHERE r.id = checksum.row AND r.reviewer = CAST(session_user AS text))
+    WHEN 7 THEN EXISTS (SELECT 1 FROM manual_alignment_undo AS r WHERE r.alignment = checksum.row AND r.reviewer = CAST(session_user AS text))
     ELSE false END);

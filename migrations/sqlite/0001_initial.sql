@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
--- `domain::job`.
+-- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 11;
+PRAGMA user_version = 12;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -14,10 +14,10 @@ CREATE TABLE worker (
     started INTEGER NOT NULL,
     heartbeat INTEGER NOT NULL,
     ended INTEGER,
-    fingerprints TEXT CHECK (json_valid(fingerprints)),
-    block_settings TEXT CHECK (json_valid(block_settings)),
+    fingerprints TEXT CHECK (fingerprints IS NULL OR json_valid(fingerprints)),
+    block_settings TEXT CHECK (block_settings IS NULL OR json_valid(block_settings)),
     died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1)),
-    metrics TEXT CHECK (json_valid(metrics))
+    metrics TEXT CHECK (metrics IS NULL OR json_valid(metrics))
 ) STRICT;
 
 -- What a stage's result depends on besides the inputs: its settings and revision, and the fingerprint of the stage
@@ -42,7 +42,7 @@ CREATE TABLE pair (
     character TEXT,
     block TEXT,
     meta TEXT NOT NULL CHECK (json_valid(meta)),
-    prior TEXT CHECK (json_valid(prior)),
+    prior TEXT CHECK (prior IS NULL OR json_valid(prior)),
     attributes TEXT NOT NULL CHECK (json_valid(attributes)),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     mesh_stat TEXT,
@@ -154,7 +154,14 @@ CREATE TABLE metric_result (
     PRIMARY KEY (pair, metric)
 ) STRICT;
 
--- Verdicts of people. Append-only; one is undone by a row in verdict_undo. `event` is the client's id of the action, so
+-- Actions of reviewers. Each belongs to one reviewer, and so does all that refers to it.
+CREATE TABLE review_act (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    reviewer TEXT NOT NULL CHECK (reviewer <> ''),
+    UNIQUE (id, reviewer)
+) STRICT;
+
+-- Verdicts of people. Append-only; the verdicts of an action are undone by a row in verdict_undo. `event` is the client's id of the action, so
 -- that a request sent twice is stored once; `seen` is the hash of what was on the screen, `shown_ms` how long it was
 -- there, `angle_read_deg` the rotation that the reviewer found missing, `review_order` the order in which results came.
 CREATE TABLE verdict (
@@ -172,15 +179,20 @@ CREATE TABLE verdict (
     seen BLOB CHECK (length(seen) = 32),
     shown_ms INTEGER CHECK (shown_ms >= 0),
     angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180),
-    review_order TEXT CHECK (review_order IN ('random', 'least_confident', 'adjudicate'))
+    review_order TEXT CHECK (review_order IN ('random', 'least_confident', 'adjudicate')),
+    FOREIGN KEY (act, reviewer) REFERENCES review_act (id, reviewer)
 ) STRICT;
 CREATE INDEX verdict_pair ON verdict (pair, metric, reviewer, id);
 CREATE INDEX verdict_act ON verdict (act);
 CREATE UNIQUE INDEX verdict_event ON verdict (event, metric) WHERE event IS NOT NULL;
 CREATE TABLE verdict_undo (
     act INTEGER PRIMARY KEY,
-    at INTEGER NOT NULL
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (act, reviewer) REFERENCES review_act (id, reviewer)
 ) STRICT;
+CREATE TRIGGER review_act_no_update BEFORE UPDATE ON review_act BEGIN SELECT RAISE (ABORT, 'actions are append-only'); END;
+CREATE TRIGGER review_act_no_delete BEFORE DELETE ON review_act BEGIN SELECT RAISE (ABORT, 'actions are append-only'); END;
 CREATE TRIGGER verdict_no_update BEFORE UPDATE ON verdict BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 CREATE TRIGGER verdict_no_delete BEFORE DELETE ON verdict BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 CREATE TRIGGER verdict_undo_no_update BEFORE UPDATE ON verdict_undo BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
@@ -224,12 +236,15 @@ CREATE TABLE attention_check_answer (
     reviewer TEXT NOT NULL CHECK (reviewer <> ''),
     reason TEXT CHECK (reason IN ('angle', 'strokes_lost', 'background_in', 'shift_or_scale', 'mirrored', 'wrong_pair')),
     note TEXT,
-    at INTEGER NOT NULL
+    at INTEGER NOT NULL,
+    UNIQUE (id, reviewer)
 ) STRICT;
 CREATE INDEX attention_check_answer_reviewer ON attention_check_answer (reviewer, id);
 CREATE TABLE attention_check_undo (
-    answer INTEGER PRIMARY KEY REFERENCES attention_check_answer (id),
-    at INTEGER NOT NULL
+    answer INTEGER PRIMARY KEY,
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (answer, reviewer) REFERENCES attention_check_answer (id, reviewer)
 ) STRICT;
 
 -- Manual alignments of these contents of mesh and print, made on this result of the depth stage.
@@ -247,12 +262,15 @@ CREATE TABLE manual_alignment (
     dice REAL NOT NULL CHECK (dice BETWEEN 0 AND 1),
     reviewer TEXT NOT NULL CHECK (reviewer <> ''),
     note TEXT,
-    at INTEGER NOT NULL
+    at INTEGER NOT NULL,
+    UNIQUE (id, reviewer)
 ) STRICT;
 CREATE INDEX manual_alignment_pair ON manual_alignment (pair, id);
 CREATE TABLE manual_alignment_undo (
-    alignment INTEGER PRIMARY KEY REFERENCES manual_alignment (id),
-    at INTEGER NOT NULL
+    alignment INTEGER PRIMARY KEY,
+    reviewer TEXT NOT NULL,
+    at INTEGER NOT NULL,
+    FOREIGN KEY (alignment, reviewer) REFERENCES manual_alignment (id, reviewer)
 ) STRICT;
 
 CREATE TRIGGER attention_check_answer_no_update BEFORE UPDATE ON attention_check_answer BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;
@@ -296,8 +314,8 @@ CREATE TABLE block (
     labels_hash BLOB CHECK (length(labels_hash) = 32),
     labels_stat TEXT,
     imported INTEGER NOT NULL,
-    true_boxes TEXT CHECK (json_valid(true_boxes)),
-    control_points TEXT CHECK (json_valid(control_points))
+    true_boxes TEXT CHECK (true_boxes IS NULL OR json_valid(true_boxes)),
+    control_points TEXT CHECK (control_points IS NULL OR json_valid(control_points))
 ) STRICT;
 
 -- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`. The failure is stored
@@ -316,7 +334,7 @@ CREATE TABLE block_job (
     message TEXT,
     failed_stage INTEGER CHECK (failed_stage BETWEEN 0 AND 3),
     failed_at INTEGER,
-    failed_with TEXT CHECK (json_valid(failed_with)),
+    failed_with TEXT CHECK (failed_with IS NULL OR json_valid(failed_with)),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
     CHECK ((status = 1) = (deadline IS NOT NULL)),
@@ -367,16 +385,30 @@ CREATE TABLE block_character (
     confidence REAL CHECK (confidence BETWEEN 0 AND 1),
     state TEXT NOT NULL CHECK (state IN ('cut', 'left', 'retired')),
     reason TEXT,
-    maps TEXT CHECK (json_valid(maps)),
+    maps TEXT CHECK (maps IS NULL OR json_valid(maps)),
     pair INTEGER UNIQUE REFERENCES pair (id),
     PRIMARY KEY (block, label)
 ) STRICT;
 
--- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`.
+-- Checksums of rows. `record` is the number of a table: see `ChecksummedTable` in `src/catalog/records/checksums.rs`. In a
+-- log, `previous` is the row before.
 CREATE TABLE checksum (
     record INTEGER NOT NULL,
     row INTEGER NOT NULL,
     value INTEGER NOT NULL,
+    previous INTEGER,
+    PRIMARY KEY (record, row),
+    FOREIGN KEY (record, previous) REFERENCES checksum (record, row)
+) STRICT, WITHOUT ROWID;
+
+-- Damaged rows that the owner has set apart: they are not counted, and no longer reported as damage. A row stays in its
+-- table. `value` is the checksum that it would have, so that a later change is damage again.
+CREATE TABLE set_apart (
+    record INTEGER NOT NULL,
+    row INTEGER NOT NULL,
+    value INTEGER NOT NULL,
+    fault TEXT NOT NULL,
+    at INTEGER NOT NULL,
     PRIMARY KEY (record, row)
 ) STRICT, WITHOUT ROWID;
 

@@ -15,6 +15,7 @@ use crate::catalog::db::request::{Message, Reply};
 use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::db::write_connection::{Work, WriteConnection};
 use crate::catalog::db::writer;
+use crate::catalog::records::left_out::LeftOut;
 
 /// Capacity of the writer's channel.
 const INBOX: usize = 1024;
@@ -35,6 +36,8 @@ pub struct Catalog {
     pub(crate) delay: Arc<CommitDelay>,
     /// Waits while a server is unavailable.
     pub(crate) retry_wait: Arc<RetryWait>,
+    /// Rows that reads leave out, because they are damaged.
+    pub(crate) left_out: Arc<LeftOut>,
     /// Path of the file, or the URL of a PostgreSQL catalog without the password.
     pub(crate) path: Arc<Path>,
 }
@@ -58,6 +61,7 @@ impl Catalog {
             inbox: None,
             delay: CommitDelay::new(),
             retry_wait: Arc::default(),
+            left_out: Arc::default(),
             path: path.into(),
         })
     }
@@ -107,6 +111,7 @@ impl Catalog {
             inbox: None,
             delay: CommitDelay::new(),
             retry_wait: Arc::default(),
+            left_out: Arc::default(),
             path: Path::new(&address.text()).into(),
         })
     }
@@ -126,7 +131,16 @@ impl Catalog {
             inbox: Some(sender),
             delay,
             retry_wait,
+            left_out: Arc::default(),
             path,
+        }
+    }
+
+    /// Returns the same catalog, whose reads leave out some rows.
+    pub(crate) fn leaving_out(&self, left_out: LeftOut) -> Self {
+        Self {
+            left_out: Arc::new(left_out),
+            ..self.clone()
         }
     }
 

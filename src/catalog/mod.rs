@@ -71,7 +71,8 @@ pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
 pub use queue::worker_list::{WorkerRecord, WorkerState};
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
-pub use records::checksums::{ChecksummedTable, FaultyRow, RowFault};
+pub use records::checksums::ChecksummedTable;
+pub use records::faulty_rows::{FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
@@ -83,5 +84,6 @@ pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
+pub use records::set_apart::SetApart;
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
 pub use transfer::CopiedTable;

@@ -183,10 +183,12 @@ async fn queries_of_inputs_and_counts_are_paged_or_small() {
 
 #[tokio::test]
 async fn pages_of_results_are_searched_by_key() {
-    for sql in [pair_results::PAGE, audited_pairs::PAGE] {
-        let page = plan(sql).await;
-        assert_only(&page, &[]);
-    }
+    // The list of damaged rows to leave out.
+    assert_only(
+        &plan(pair_results::PAGE).await,
+        &["json_each VIRTUAL TABLE"],
+    );
+    assert_only(&plan(audited_pairs::PAGE).await, &[]);
     for sql in [
         stage_results::STAGE_RESULTS,
         audited_pairs::RESULTS,

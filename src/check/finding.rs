@@ -89,8 +89,9 @@ impl Finding {
         }
     }
 
-    /// Describes a row that does not agree with its checksum, and what the user can do.
-    pub(super) fn row(faulty: &FaultyRow) -> Self {
+    /// Describes a row that does not agree with its checksum, and what the user can do. `may_set_apart` is whether a repair
+    /// by this user may set apart rows.
+    pub(super) fn row(faulty: &FaultyRow, may_set_apart: bool) -> Self {
         let remedy = match faulty.table {
             ChecksummedTable::Pair => IMPORT,
             ChecksummedTable::Block => "import the block again",
@@ -100,8 +101,18 @@ impl Finding {
             | ChecksummedTable::Answer
             | ChecksummedTable::AnswerUndo
             | ChecksummedTable::ManualAlignment
+            | ChecksummedTable::ManualAlignmentUndo
+                if may_set_apart =>
+            {
+                "it is not counted, and `check --repair` sets it apart; a backup may hold what was there before"
+            }
+            ChecksummedTable::Verdict
+            | ChecksummedTable::VerdictUndo
+            | ChecksummedTable::Answer
+            | ChecksummedTable::AnswerUndo
+            | ChecksummedTable::ManualAlignment
             | ChecksummedTable::ManualAlignmentUndo => {
-                "restore a backup, then import the verdicts that were given since"
+                "it is not counted, and the owner of the catalog can set it apart with `check --repair`"
             }
         };
         let name = faulty.pair.as_ref();

@@ -1,7 +1,8 @@
 //! Checks a project for damage. Compares the rows of the database with each other and with the files.
 //!
 //! Pairs are read in pages, so that memory use does not grow with the number of pairs. A repair makes the next run
-//! compute damaged results again. It never changes verdicts, answers, manual alignments or the log of attempts.
+//! compute damaged results again. It never changes verdicts, answers, manual alignments or the log of attempts; damaged ones
+//! are set apart where they are.
 
 mod blocks;
 mod finding;
@@ -17,7 +18,9 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
+    SetApart,
 };
+use crate::domain::UnixMillis;
 use crate::store::{ArtifactError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
@@ -34,6 +37,8 @@ pub struct CheckOptions {
     pub repair: bool,
     /// Whether a run may be writing artifacts. If so, unreferenced files are not reported.
     pub in_use: bool,
+    /// The current time.
+    pub now: UnixMillis,
     /// Remove unreferenced files and packs of at least this age, also while a run may be writing artifacts.
     pub collect: Option<Duration>,
 }
@@ -137,10 +142,7 @@ async fn rows_and_files(
     }
     counters(catalog, options, summary).await?;
     fingerprints(catalog, options, summary).await?;
-    let faulty = catalog.faulty_rows().await?;
-    for row in &faulty {
-        summary.add(Finding::row(row));
-    }
+    let faulty = damaged_rows(catalog, options, summary).await?;
     let mut is_readable = true;
     let mut named = ReferencedArtifacts::default();
     let mut after = None;
@@ -179,6 +181,33 @@ async fn rows_and_files(
         unreferenced_files(project, named, options.repair, summary).await?;
     }
     Ok(())
+}
+
+/// Checks the checksums of rows. With `repair`, sets apart the damaged rows of append-only tables, if the user may. Returns
+/// all damaged rows.
+async fn damaged_rows(
+    catalog: &Catalog,
+    options: CheckOptions,
+    summary: &mut CheckSummary,
+) -> Result<Vec<FaultyRow>, CheckError> {
+    let faulty = catalog.faulty_rows().await?;
+    let (known, new): (Vec<_>, Vec<_>) = faulty.iter().partition(|row| row.is_set_apart);
+    summary.set_apart = SetApart::of(known);
+    if new.is_empty() {
+        return Ok(faulty);
+    }
+    let may_set_apart = catalog.may_set_apart().await?;
+    let mut apart = Vec::new();
+    for row in new {
+        let is_repairable = may_set_apart && row.table.is_append_only();
+        summary.add_row(Finding::row(row, may_set_apart), is_repairable);
+        apart.extend(is_repairable.then(|| row.clone()));
+    }
+    if options.repair && !apart.is_empty() {
+        summary.set_rows_apart(apart.len() as u64);
+        catalog.set_apart(apart, options.now).await?;
+    }
+    Ok(faulty)
 }
 
 /// Checks all blocks, and adds their artifacts to `named`. With `repair`, sends damaged blocks back to the damaged

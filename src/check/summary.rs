@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Kind};
 use super::pairs::PairCheck;
+use crate::catalog::SetApart;
 use crate::store::{UnreferencedFile, UnreferencedKind};
 
 /// Number of findings listed per kind, and of input files listed.
@@ -24,6 +25,9 @@ pub struct CheckSummary {
     pub files: u64,
     /// Damage by kind, without kinds that were not found.
     pub damage: BTreeMap<Kind, Found>,
+    /// Damaged rows that the owner has set apart. They are not counted, and are no damage any more.
+    #[serde(skip_serializing_if = "SetApart::is_empty")]
+    pub set_apart: SetApart,
     /// Missing input files. This is not damage: results computed from them stay valid.
     pub inputs_missing: Notes,
     /// Input files that changed after they were read, or are unreadable. This is not damage: the next run handles it.
@@ -32,6 +36,9 @@ pub struct CheckSummary {
     pub unreferenced: Option<Unreferenced>,
     /// Repairs made.
     pub repaired: Repaired,
+    /// Number of damaged rows that a repair by this user would set apart.
+    #[serde(skip)]
+    rows_to_set_apart: u64,
 }
 
 /// Damage of one kind.
@@ -76,6 +83,8 @@ pub struct Repaired {
     pub requeued_blocks: u64,
     /// Number of damaged pairs that were not sent back, because an input is missing.
     pub not_requeued: u64,
+    /// Number of damaged rows that were set apart.
+    pub set_apart: u64,
     /// Whether the counters were rebuilt.
     pub counters: bool,
     /// Whether the indexes were rebuilt.
@@ -92,10 +101,12 @@ impl CheckSummary {
             pairs: 0,
             files: 0,
             damage: BTreeMap::new(),
+            set_apart: SetApart::default(),
             inputs_missing: Notes::default(),
             inputs_changed: Notes::default(),
             unreferenced: None,
             repaired: Repaired::default(),
+            rows_to_set_apart: 0,
         }
     }
 
@@ -116,6 +127,27 @@ impl CheckSummary {
         if found.first.len() < NAMED {
             found.first.push(finding);
         }
+    }
+
+    /// Adds a damaged row. `is_repairable` is whether a repair would set it apart.
+    pub(super) fn add_row(&mut self, finding: Finding, is_repairable: bool) {
+        self.add(finding);
+        self.rows_to_set_apart += u64::from(is_repairable);
+    }
+
+    /// Records that all damaged rows that can be set apart were set apart.
+    pub(super) fn set_rows_apart(&mut self, rows: u64) {
+        self.repaired.set_apart = rows;
+        if let Some(found) = self.damage.get_mut(&Kind::Row) {
+            found.left -= rows.min(found.left);
+        }
+    }
+
+    /// Returns whether `check --repair` by this user could repair something.
+    pub fn is_repairable(&self) -> bool {
+        self.rows_to_set_apart > 0
+            || (self.damage.keys())
+                .any(|kind| !matches!(kind, Kind::Database | Kind::Reference | Kind::Row))
     }
 
     /// Marks all findings of a kind as repaired, except `left` of them.

@@ -8,6 +8,7 @@ pub(super) async fn agreement(context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
     let found = report::agreement(&catalog).await?;
     catalog.close().await;
+    context.warn_about_set_apart(&found.set_apart);
     context.print(&found, || report::agreement_text(&found))?;
     if found.conflicts > 0 {
         context.next("review --adjudicate --reviewer NAME");

@@ -85,6 +85,7 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
         quick: args.quick,
         repair: args.repair,
         in_use: !args.repair && running,
+        now: now(),
         collect: args.collect.map(|hours| Duration::from_secs(hours * 3600)),
     };
     let summary = check_project(&project, &catalog, options).await;
@@ -145,10 +146,9 @@ fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<
 }
 
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
-    let is_repairable = |kind: &Kind| *kind != Kind::Database && *kind != Kind::Reference;
     if summary.repaired.requeued + summary.repaired.requeued_blocks > 0 {
         vec!["run"]
-    } else if !repaired && summary.damage.keys().any(is_repairable) {
+    } else if !repaired && summary.is_repairable() {
         vec!["check --repair"]
     } else {
         Vec::new()
@@ -185,6 +185,7 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         );
     }
     lines.extend(repairs(summary, args.repair));
+    lines.extend(set_apart(summary));
     lines.extend(notes(&summary.inputs_missing, "missing"));
     lines.extend(notes(
         &summary.inputs_changed,
@@ -255,6 +256,13 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
     ];
     let parts = parts.iter().filter(|(is_done, _)| *is_done);
     let mut lines: Vec<String> = parts.map(|(_, what)| (*what).to_owned()).collect();
+    if done.set_apart > 0 {
+        let rows = count(done.set_apart, "damaged row");
+        lines.push(format!(
+            "{rows} set apart: not counted, kept as stored, and shown by `verdict log`; to count a verdict after all, enter it \
+             again with `verdict set`"
+        ));
+    }
     if done.not_requeued > 0 {
         let pairs = count(done.not_requeued, "damaged pair");
         lines.push(format!(
@@ -268,6 +276,20 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// Formats the rows that the owner set apart earlier.
+fn set_apart(summary: &CheckSummary) -> Option<String> {
+    let found = &summary.set_apart;
+    (!found.is_empty()).then(|| {
+        let rows = count(found.count, "damaged row");
+        let named = found.first.iter().take(MAX_LISTED);
+        let mut lines = vec![format!("{rows} set apart earlier and not counted:")];
+        lines.extend(named.map(|row| format!("  {row}")));
+        let more = found.count.saturating_sub(MAX_LISTED as u64);
+        lines.extend((more > 0).then(|| format!("  and {more} more")));
+        lines.join("\n")
+    })
 }
 
 fn notes(notes: &Notes, problem: &str) -> Option<String> {

@@ -122,6 +122,7 @@ pub(super) async fn write(
     let sheet = draw_contact_sheet(&catalog, &project, options).await;
     drop(busy);
     let sheet = sheet?;
+    context.warn_about_set_apart(&sheet.set_apart);
     catalog.close().await;
     if sheet.shown == 0 {
         let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");

@@ -14,7 +14,7 @@ use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
-use crate::catalog::{Catalog, has_password};
+use crate::catalog::{Catalog, SetApart, has_password};
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use crate::domain::{UnixMillis, is_hidden};
 use crate::runner;
@@ -288,6 +288,13 @@ impl Context {
             ));
         }
         Ok(())
+    }
+
+    /// Warns about damaged rows that the output does not include.
+    pub(super) fn warn_about_set_apart(&self, found: &SetApart) {
+        if let Some(sentence) = found.sentence() {
+            self.warn(&sentence);
+        }
     }
 
     /// Returns a command for this project with the same settings. The text can be copied into a shell.

@@ -62,7 +62,9 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         error if error.is_of_server() && error.kind() == Some(CatalogErrorKind::ReadOnly) => {
             Some(ExitCode::Usage)
         }
-        CatalogError::Corrupt(_) | CatalogError::Json(_) => Some(ExitCode::Damaged),
+        CatalogError::Corrupt(_) | CatalogError::Json(_) | CatalogError::ForeignSchema { .. } => {
+            Some(ExitCode::Damaged)
+        }
         error if error.log_loss().is_some() => Some(ExitCode::Damaged),
         CatalogError::UnknownPair(_)
         | CatalogError::NoResult(_)
@@ -175,8 +177,11 @@ pub(super) fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
 
 /// Returns whether the catalog's content is damaged, empty or not a catalog.
 pub(super) fn is_damage(error: &CatalogError) -> bool {
-    use CatalogError::{Corrupt, Empty, Foreign, Json};
-    matches!(error, Empty(_) | Foreign { .. } | Corrupt(_) | Json(_)) || is_damaged_file(error)
+    use CatalogError::{Corrupt, Empty, Foreign, ForeignSchema, Json};
+    matches!(
+        error,
+        Empty(_) | Foreign { .. } | ForeignSchema { .. } | Corrupt(_) | Json(_)
+    ) || is_damaged_file(error)
 }
 
 /// Returns whether the pages of the catalog's file are inconsistent.
@@ -204,7 +209,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
     if let Some(loss) = error.log_loss() {
         return Some(log_lost(&path, loss));
     }
-    if let Some(reason) = error.refused_user() {
+    if let Some(reason) = error.refused_connection() {
         return Some(format!(
             "the database server of the catalog refused the connection: {reason}"
         ));
@@ -250,6 +255,9 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
         ),
         Some(CatalogErrorKind::Statement) | None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
+                // Without this file, the catalog is on a server.
+                let is_file = project.join(CATALOG_FILE).exists();
+                let path = if is_file { &*path } else { "the catalog" };
                 format!("{path} contains an invalid value: {error}; `check` gives details")
             }
             _ => return None,
@@ -351,9 +359,13 @@ mod tests {
         let found = catalog_error(&error).expect("the catalog's error");
         assert_eq!(join_causes(&error), found.to_string());
         assert!(is_damage(found));
-        let text = explain_catalog(found, Path::new("nowhere")).expect("a sentence");
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let text = explain_catalog(found, dir.path()).expect("a sentence");
+        assert!(text.starts_with("the catalog contains"), "{text}");
+        std::fs::write(dir.path().join("catalog.sqlite"), "").expect("written");
+        let text = explain_catalog(found, dir.path()).expect("a sentence");
         assert!(
-            text.replace('\\', "/").contains("nowhere/catalog.sqlite") && text.contains("`check`"),
+            text.contains("catalog.sqlite contains") && text.contains("`check`"),
             "{text}"
         );
         let plain = CatalogError::Missing("p/catalog.sqlite".into());

@@ -188,8 +188,10 @@ fn print_summary(
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     let blocks = summary.unreadable_blocks.iter();
     let blocks = blocks.map(|(block, why)| json!({"block": block, "error": why}));
+    context.warn_about_set_apart(&summary.set_apart);
     context.print_json(&json!({
         "schema": 1,
+        "set_apart": summary.set_apart,
         "done": summary.pairs.done,
         "without_result": summary.pairs.without_result,
         "left_out": summary.pairs.left_out,

@@ -90,6 +90,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     if let Some(problem) = &report.unusable_truth {
         context.warn(&format!("the report lacks the true alignment of {problem}"));
     }
+    context.warn_about_set_apart(&report.set_apart);
     let mut is_complete = report.unusable_truth.is_none();
     let text = if let Some(other) = &args.compare {
         compared(&report, other, format, context).await?

@@ -13,7 +13,7 @@ use super::output;
 use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
-use crate::catalog::StatusCounts;
+use crate::catalog::{SetApart, StatusCounts};
 use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
@@ -97,6 +97,8 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
+    let (catalog, damaged) = catalog.without_faulty_rows().await?;
+    context.warn_about_set_apart(&SetApart::of(&damaged));
     let language = args.lang.or_else(language_of_system);
     let options = ReviewOptions {
         listen: SocketAddr::new(

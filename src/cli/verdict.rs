@@ -14,8 +14,8 @@ use super::select;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
-use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
-use crate::domain::{Reason, ThresholdMetric, Verdict};
+use crate::catalog::{Catalog, FaultyRow, NewVerdict, ReviewContext, SetApart, VerdictEvent};
+use crate::domain::{Reason, ThresholdMetric, Verdict, one_line};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]
@@ -222,19 +222,43 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
         Some(typed) => Some(select::pair(&catalog, typed).await?),
         None => None,
     };
-    catalog.verify_checksums().await?;
-    let events = catalog.verdict_log(pair.as_ref()).await?;
+    let (sound, mut damaged) = catalog.without_faulty_rows().await?;
+    let events = sound.verdict_log(pair.as_ref()).await?;
     catalog.close().await;
+    if let Some(pair) = &pair {
+        damaged.retain(|row| row.pair.as_deref() == Some(pair.as_str()));
+    }
+    damaged.retain(|row| row.table.is_of_verdicts());
+    context.warn_about_set_apart(&SetApart::of(&damaged));
     if context.global.json {
         for event in &events {
             output::print_json_text(&serde_json::to_string(event)?)?;
         }
-    } else if events.is_empty() {
+        for row in &damaged {
+            let row = json!({"set_apart": {
+                "table": row.table.name(), "row": row.row, "pair": row.pair, "fault": row.fault.name(), "values": row.values,
+            }});
+            output::print_json_text(&row.to_string())?;
+        }
+    } else if events.is_empty() && damaged.is_empty() {
         context.info("no verdicts yet");
     } else {
         output::print(&log_text(&events, context.stdout))?;
+        output::print(&damaged_text(&damaged, context.stdout))?;
     }
     Ok(ExitCode::Done)
+}
+
+/// Formats damaged rows of the log with all their values, one line each.
+fn damaged_text(rows: &[FaultyRow], palette: Palette) -> String {
+    let line = |row: &FaultyRow| {
+        let values = row.values.iter();
+        let values = values.map(|(name, value)| format!("{name}={value}"));
+        let text = format!("{row}: {}", values.collect::<Vec<_>>().join(" "));
+        let head = palette.paint(Tone::Bad, "set apart");
+        format!("{head}  {}\n", one_line(&text))
+    };
+    rows.iter().map(line).collect()
 }
 
 async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {

@@ -6,7 +6,7 @@ use super::pictures::{
     ContactSheetCell, FrameKind, NOTE_SPACE, Rgb, SheetLegend, contact_sheet, tile_side,
 };
 use super::source_print::result_images;
-use crate::catalog::{Catalog, CatalogError, PairResults};
+use crate::catalog::{Catalog, CatalogError, PairResults, SetApart};
 use crate::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
@@ -79,6 +79,8 @@ pub struct ContactSheet {
     pub of: usize,
     /// Pairs on it whose images or ground truth cannot be read, and why.
     pub problems: Vec<(PairName, String)>,
+    /// Damaged rows that it does not show.
+    pub set_apart: SetApart,
 }
 
 /// Why images cannot be drawn.
@@ -113,7 +115,8 @@ pub async fn draw_contact_sheet(
     project: &Project,
     options: ContactSheetOptions,
 ) -> Result<ContactSheet, DrawError> {
-    let (chosen, of) = choose(catalog, project, &options).await?;
+    let (catalog, damaged) = catalog.without_faulty_rows().await?;
+    let (chosen, of) = choose(&catalog, project, &options).await?;
     let project = project.clone();
     let picture = move || {
         let side = tile_side(options.columns, chosen.len());
@@ -131,6 +134,7 @@ pub async fn draw_contact_sheet(
             shown: cells.len(),
             of,
             problems,
+            set_apart: SetApart::of(&damaged),
         }
     };
     Ok(tokio::task::spawn_blocking(picture).await?)
@@ -142,7 +146,6 @@ async fn choose(
     project: &Project,
     options: &ContactSheetOptions,
 ) -> Result<(Vec<SheetCandidate>, usize), DrawError> {
-    catalog.verify_checksums().await?;
     let (mut chosen, mut of) = (Vec::new(), 0);
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {

@@ -23,7 +23,7 @@ use super::pair_writer::{FormatOutput, PairWriter, WrittenPair};
 use super::readme;
 use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
-use crate::catalog::{Catalog, CatalogError, CutOrigin, PairResults, StoredAlignment};
+use crate::catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
 use crate::domain::{BlockName, PairName};
 use crate::store::Project;
 
@@ -37,6 +37,8 @@ const ENCODED_PER_CORE: usize = 2;
 pub struct ExportSummary {
     /// Numbers of pairs.
     pub pairs: PairCounts,
+    /// Damaged rows that the export does not include.
+    pub set_apart: SetApart,
     /// How the exported pairs were divided, if a split was requested.
     pub split: Option<SplitCounts>,
     /// Pairs whose result cannot be read, and why.
@@ -76,7 +78,7 @@ pub async fn export(
     formats: &[ExportFormat],
     options: ExportOptions,
 ) -> Result<ExportSummary, ExportError> {
-    catalog.verify_checksums().await?;
+    let (catalog, damaged) = &catalog.without_faulty_rows().await?;
     let plan = match options.split {
         Some(split) => Some(SplitPlan::new(
             &split,
@@ -96,6 +98,8 @@ pub async fn export(
         options,
     };
     let mut run = ExportRun::begin(project, dir, formats, context, plan)?;
+    run.summary.set_apart = SetApart::of(damaged);
+    run.summary.pairs.set_apart = run.summary.set_apart.count;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         let page = ExportedPage::read(catalog, page).await?;

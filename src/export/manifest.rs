@@ -43,6 +43,17 @@ pub struct PairCounts {
     pub without_result: u64,
     /// Pairs that were left out because no result of theirs was selected.
     pub left_out: u64,
+    /// Stored rows of any kind that are damaged, so that nothing of them is exported.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub set_apart: u64,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+const fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 /// The part of a manifest by which its files are recognized.

@@ -37,6 +37,13 @@ pub(super) fn render(
         "Made by {} with `export --to {format}`: {} pairs with a result, {} without, {} left out by the selection.\n",
         context.program, pairs.done, pairs.without_result, pairs.left_out
     );
+    if pairs.set_apart > 0 {
+        let _ = writeln!(
+            text,
+            "{} stored rows are damaged and not part of this export; `mocban check` lists them.\n",
+            pairs.set_apart
+        );
+    }
     let _ = write!(text, "## Files\n\n| path | content |\n|---|---|\n");
     for [path, meaning] in &guide.files {
         let _ = writeln!(text, "| `{path}` | {meaning} |");

@@ -24,7 +24,7 @@ use super::thresholds::{ThresholdDistribution, relative_height};
 use super::truth_evaluation::{TruthEvaluation, TruthProblems};
 use super::truth_summary::TruthSummary;
 use super::warnings::warnings;
-use crate::catalog::{MetricRecord, PairResults};
+use crate::catalog::{MetricRecord, PairResults, SetApart};
 use crate::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
 
 /// The sums from which a report is made.
@@ -187,6 +187,7 @@ impl ReportAccumulator {
             attention_checks: self.attention_checks,
             blocks: Vec::new(),
             unusable_truth: self.truth_problems.first,
+            set_apart: SetApart::default(),
             provenance: self.provenance.finish(),
         };
         report.headline = headline(&report);

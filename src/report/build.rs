@@ -7,7 +7,7 @@ use super::manual_alignment;
 use super::model::Report;
 use super::report_error::ReportError;
 use super::truth_evaluation::{TruthEvaluation, evaluate_pairs};
-use crate::catalog::{Catalog, PairResults};
+use crate::catalog::{Catalog, PairResults, SetApart};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -34,10 +34,10 @@ pub async fn build_with(
     project: &Project,
     mut visit: impl FnMut(&PairResults, &TruthEvaluation),
 ) -> Result<Report, ReportError> {
-    catalog.verify_checksums().await?;
+    let (catalog, damaged) = catalog.without_faulty_rows().await?;
     let mut report = ReportAccumulator::default();
-    report.set_attention_checks(attention_checks::project_rates(catalog).await?);
-    let mut blocks = BlockSums::of_true_boxes(catalog).await?;
+    report.set_attention_checks(attention_checks::project_rates(&catalog).await?);
+    let mut blocks = BlockSums::of_true_boxes(&catalog).await?;
     let manual_alignments = catalog.newest_manual_alignments().await?;
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {
@@ -50,8 +50,13 @@ pub async fn build_with(
             }
         }
     }
-    Ok(Report {
+    let mut report = Report {
         blocks: blocks.finish(),
+        set_apart: SetApart::of(&damaged),
         ..report.finish()
-    })
+    };
+    if let Some(sentence) = report.set_apart.sentence() {
+        report.warnings.insert(0, sentence + ".");
+    }
+    Ok(report)
 }

@@ -17,6 +17,7 @@ use super::stage_times::StageTimes;
 use super::stats::IntervalMethod;
 use super::thresholds::ThresholdDistribution;
 use super::truth_summary::TruthSummary;
+use crate::catalog::SetApart;
 use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.
@@ -62,6 +63,9 @@ pub struct Report {
     /// The first pair whose true alignment cannot be used, with the reason.
     #[serde(skip)]
     pub unusable_truth: Option<String>,
+    /// Damaged rows that the numbers do not include.
+    #[serde(skip_serializing_if = "SetApart::is_empty")]
+    pub set_apart: SetApart,
     /// Caveats on the numbers, in whole sentences.
     pub warnings: Vec<String>,
     /// What the numbers were computed from.

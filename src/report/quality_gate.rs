@@ -24,7 +24,8 @@ pub fn below(report: &Report, least: f64) -> Vec<String> {
 
 /// Returns the reasons why a report is incomplete. The list is empty if the report is complete.
 ///
-/// A report is complete if the project has pairs, every pair is done, and every result was passed or failed.
+/// A report is complete if the project has pairs, every pair is done, every result was passed or failed, and no stored row
+/// is damaged.
 pub fn missing(report: &Report) -> Vec<String> {
     let mut missing = Vec::new();
     let mut add = |what: String, n: u64| {
@@ -32,6 +33,7 @@ pub fn missing(report: &Report) -> Vec<String> {
     };
     add("failed pairs".to_owned(), report.progress.failed);
     add("unfinished pairs".to_owned(), report.progress.pending);
+    add("damaged rows set apart".to_owned(), report.set_apart.count);
     for row in &report.rows {
         add(
             format!("unjudged results of {}", row.metric),

@@ -10,7 +10,7 @@ use super::consensus::{Consensus, partition_verdicts};
 use super::pair_artifacts::group_identical;
 use super::stats::{AgreementTable, Rate};
 use crate::catalog::{
-    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults,
+    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults, SetApart,
 };
 use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 
@@ -38,6 +38,9 @@ pub struct ReviewerAgreement {
     pub reviewers: Vec<ReviewerRecord>,
     /// Planted faults that reviewers failed, as a share of all answers to planted faults.
     pub attention_checks: Rate,
+    /// Damaged rows that the numbers do not include.
+    #[serde(skip_serializing_if = "SetApart::is_empty")]
+    pub set_apart: SetApart,
 }
 
 /// Two reviewers on the same results.
@@ -95,7 +98,7 @@ pub struct ReviewerRecord {
 /// # Errors
 /// Returns an error if the catalog cannot be read.
 pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
-    catalog.verify_checksums().await?;
+    let (catalog, damaged) = &catalog.without_faulty_rows().await?;
     let mut counts = AgreementCounts::default();
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {
@@ -107,7 +110,10 @@ pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogEr
         let own = own_verdicts(catalog, reviewer).await?;
         counts.add_checks(reviewer, answers, &own);
     }
-    Ok(counts.finish())
+    Ok(ReviewerAgreement {
+        set_apart: SetApart::of(damaged),
+        ..counts.finish()
+    })
 }
 
 /// A reviewer's newest verdicts on results.
@@ -225,6 +231,7 @@ impl AgreementCounts {
             attention_checks: Rate::total(
                 reviewers.iter().map(|record| record.attention_checks.all),
             ),
+            set_apart: SetApart::default(),
             reviewers,
         }
     }

@@ -189,6 +189,7 @@ pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
         },
     };
     ReviewerAgreement {
+        set_apart: crate::catalog::SetApart::default(),
         schema: 1,
         conflicts: disputed,
         reviewer_pairs: vec![ReviewerPair {

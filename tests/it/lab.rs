@@ -12,6 +12,8 @@ use crate::resume::project;
 
 /// The code of PostgreSQL for a missing right, also by row-level security.
 pub(crate) const NOT_PERMITTED: &str = "42501";
+/// The code of PostgreSQL for a foreign key without its row.
+pub(crate) const NO_SUCH_ROW: &str = "23503";
 /// The code with which the schema refuses a change of an append-only table.
 pub(crate) const APPEND_ONLY: &str = "23000";
 
@@ -87,24 +89,21 @@ impl Lab {
         assert!(errors[0].contains(text), "{text}: {}", refused.err);
     }
 
-    /// Runs SQL statements as a user. Returns the rows as text, or the code of the error.
-    pub(crate) fn sql(&self, user: &str, sql: &str) -> Result<Vec<Vec<String>>, String> {
+    /// Opens a connection of a user.
+    pub(crate) fn session(&self, user: &str) -> Session {
         let options = "&options=-c%20search_path%3Dmocban";
         let url = format!("{}{options}", self.url(user));
         let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-        runtime.block_on(async {
-            let mut conn = PgConnection::connect(&url).await.expect("a connection");
-            let rows = sqlx::raw_sql(AssertSqlSafe(sql.to_owned())).fetch_all(&mut conn);
-            let rows = rows.await.map_err(|error| code(&error))?;
-            let text = |row: &sqlx::postgres::PgRow| {
-                let columns = 0..row.len();
-                let column = |index| row.try_get_unchecked::<Option<String>, _>(index);
-                columns
-                    .map(|index| column(index).expect("text").unwrap_or_default())
-                    .collect()
-            };
-            Ok(rows.iter().map(text).collect())
-        })
+        let conn = runtime.block_on(PgConnection::connect(&url));
+        Session {
+            conn: conn.expect("a connection"),
+            runtime,
+        }
+    }
+
+    /// Runs SQL statements as a user. Returns the rows as text, or the code of the error.
+    pub(crate) fn sql(&self, user: &str, sql: &str) -> Result<Vec<Vec<String>>, String> {
+        self.session(user).sql(sql)
     }
 
     /// Asserts that the database refuses statements of a user with an error code.
@@ -131,6 +130,28 @@ impl Lab {
     pub(crate) fn review(&self, user: &str, options: &str) -> Page {
         let words = format!("--json review --no-open --reviewer {user} {options}");
         Page::of(&mut self.command(user, &words)).with_session()
+    }
+}
+
+/// A connection to the server of a [`Lab`].
+pub(crate) struct Session {
+    conn: PgConnection,
+    runtime: tokio::runtime::Runtime,
+}
+
+impl Session {
+    /// Runs SQL statements. Returns the rows as text, or the code of the error.
+    pub(crate) fn sql(&mut self, sql: &str) -> Result<Vec<Vec<String>>, String> {
+        let rows = sqlx::raw_sql(AssertSqlSafe(sql.to_owned())).fetch_all(&mut self.conn);
+        let rows = self.runtime.block_on(rows).map_err(|error| code(&error))?;
+        let text = |row: &sqlx::postgres::PgRow| {
+            let columns = 0..row.len();
+            let column = |index| row.try_get_unchecked::<Option<String>, _>(index);
+            columns
+                .map(|index| column(index).expect("text").unwrap_or_default())
+                .collect()
+        };
+        Ok(rows.iter().map(text).collect())
     }
 }
 

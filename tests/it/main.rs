@@ -43,6 +43,7 @@ mod faults;
 #[cfg(unix)]
 mod fleet;
 #[cfg(target_os = "linux")]
+mod foreign_schema;
 mod grid_print;
 mod hanging;
 mod hostile;
@@ -67,6 +68,8 @@ mod names;
 mod object_store;
 mod object_store_blocks;
 mod odd;
+#[cfg(unix)]
+mod old_snapshots;
 mod one_pair;
 mod page;
 mod parsers;
@@ -108,12 +111,15 @@ mod silent_server;
 mod small_block;
 mod snapshots;
 mod source_text;
+mod stock_sqlite;
 mod stroke_map;
 mod style;
 mod terminal;
 mod test_size;
 mod tiff_file;
 mod tiff_kinds;
+#[cfg(unix)]
+mod tls_to_server;
 mod uninterrupted;
 #[cfg(unix)]
 mod watch_workers;

@@ -140,9 +140,9 @@ fn ten_reviewers_and_workers_at_the_same_time_lose_nothing() {
 fn assert_nothing_is_lost(lab: &Lab, acknowledged: &[Acknowledged]) {
     let stored = lab.sql(
         "guest",
-        "SELECT DISTINCT event, reviewer, CASE WHEN u.at IS NULL THEN '' ELSE 'undone' END
+        "SELECT DISTINCT event, v.reviewer, CASE WHEN u.at IS NULL THEN '' ELSE 'undone' END
             FROM verdict AS v LEFT JOIN verdict_undo AS u ON u.act = v.act
-        UNION ALL SELECT event, reviewer, CASE WHEN u.at IS NULL THEN '' ELSE 'undone' END
+        UNION ALL SELECT event, a.reviewer, CASE WHEN u.at IS NULL THEN '' ELSE 'undone' END
             FROM attention_check_answer AS a LEFT JOIN attention_check_undo AS u ON u.answer = a.id",
     );
     let stored: BTreeMap<_, _> = stored

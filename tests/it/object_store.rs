@@ -401,6 +401,7 @@ async fn old_files_are_removed_while_the_same_results_are_computed_again() {
         quick: true,
         repair: false,
         in_use: true,
+        now: 1,
         collect: Some(Duration::from_mins(30)),
     };
     mocban(local.dir(), &["run"]).expect(0);

@@ -19,11 +19,11 @@ const FOLDERS: [&str; 7] = [
 /// Creates a database cluster in the folder `$1` with the programs in `$2`, and starts the server. Then stops it at once,
 /// as in a crash, for each line `stop`, and starts it for each line `start`. Prints a line after each. Ends, and removes
 /// the folder, when its standard input ends. The server refuses to run as root, so `$3` may hold a command that changes
-/// the user. The user `guarded` needs a password.
+/// the user. `$4` may hold more options of the server. The user `guarded` needs a password.
 const SCRIPT: &str = r#"
 cd "$1" || exit 1
 start() {
-    $3 "$2/postgres" -D "$1/data" -k "$1" -c listen_addresses= -c max_connections=200 >>"$1/log" 2>&1 &
+    $3 "$2/postgres" -D "$1/data" -k "$1" -c listen_addresses= -c max_connections=200 $4 >>"$1/log" 2>&1 &
     server=$!
     until "$2/pg_isready" -q -h "$1" -U mocban -d postgres; do
         kill -0 $server 2>/dev/null || exit 1
@@ -31,18 +31,21 @@ start() {
     echo ready
 }
 $3 "$2/initdb" -D "$1/data" -U mocban -A trust --no-sync --locale=C -E UTF8 >"$1/log" 2>&1 || exit 1
-printf 'local all guarded scram-sha-256\nlocal all all trust\n' | $3 tee "$1/data/pg_hba.conf" >/dev/null
-start "$1" "$2" "$3"
+printf 'local all guarded scram-sha-256\nlocal all all trust\nhost all all 127.0.0.1/32 trust\n' | $3 tee "$1/data/pg_hba.conf" >/dev/null
+start "$1" "$2" "$3" "$4"
 while read -r command; do
     case $command in
         stop) kill -QUIT $server; wait $server; echo ready ;;
-        start) start "$1" "$2" "$3" ;;
+        start) start "$1" "$2" "$3" "$4" ;;
     esac
 done
 kill -QUIT $server
 wait $server
 rm -rf "$1"
 "#;
+
+/// The port in the name of a server's socket, unless it listens on a port of its own.
+const DEFAULT_PORT: u16 = 5432;
 
 /// A running server.
 #[derive(Debug)]
@@ -67,6 +70,15 @@ pub(crate) fn url() -> Option<&'static str> {
 impl Server {
     /// Starts a server. Returns `None`, and prints why once, if none is installed.
     pub(crate) fn start() -> Option<Self> {
+        Self::start_with(DEFAULT_PORT, "", |_| {})
+    }
+
+    /// Starts a server at a port with more options, after `prepare` has written files to its folder.
+    pub(crate) fn start_with(
+        port: u16,
+        options: &str,
+        prepare: impl FnOnce(&Path),
+    ) -> Option<Self> {
         static SKIPPED: Once = Once::new();
         let Some(programs) = programs() else {
             // Written directly, because the test harness hides what a passing test prints.
@@ -76,22 +88,28 @@ impl Server {
         };
         let dir = tempfile::Builder::new().prefix("mocban-pg-").tempdir();
         let dir = dir.expect("a temporary directory").keep();
+        prepare(&dir);
         let user = other_user(&dir);
         // It ends with this process, so nobody waits for it.
         #[allow(clippy::zombie_processes, reason = "the script ends with this process")]
         let mut script = Command::new("sh")
             .args(["-c", SCRIPT, "sh"])
             .args([&dir, &programs])
-            .arg(user)
+            .args([user, options])
+            .env("PGPORT", port.to_string())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .expect("a shell");
         let input = script.stdin.take().expect("a pipe");
         let output = script.stdout.take().expect("a pipe");
+        let place = match port {
+            DEFAULT_PORT => String::new(),
+            port => format!(":{port}"),
+        };
         let server = Self {
             url: format!(
-                "postgres://mocban@localhost/postgres?host={}",
+                "postgres://mocban@localhost{place}/postgres?host={}",
                 dir.display()
             ),
             commands: Mutex::new((input, BufReader::new(output))),
@@ -143,14 +161,18 @@ impl Server {
     }
 }
 
-/// Returns a command that changes the user if this process is root's, and gives the folder to that user.
+/// Returns a command that changes the user if this process is root's, and gives the folder and its files to that user.
 #[cfg(unix)]
 pub(crate) fn other_user(dir: &Path) -> &'static str {
     if !rustix::process::geteuid().is_root() {
         return "";
     }
     let nobody = Some(65534);
-    std::os::unix::fs::chown(dir, nobody, nobody).expect("root may change the owner");
+    let files = std::fs::read_dir(dir).expect("a folder");
+    let files = files.map(|file| file.expect("an entry").path());
+    for path in files.chain([dir.to_owned()]) {
+        std::os::unix::fs::chown(path, nobody, nobody).expect("root may change the owner");
+    }
     "setpriv --reuid=65534 --regid=65534 --clear-groups"
 }
 

@@ -2,14 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error_kind::CatalogErrorKind;
-use crate::catalog::db::open;
 use crate::catalog::db::query::{query_as, query_scalar};
+use crate::catalog::db::schema;
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
@@ -44,7 +43,7 @@ pub struct CounterDrift {
 const REFERENCES: Sql = Sql::pair(
     "
 SELECT \"table\" || coalesce(' row ' || rowid, '') || ' names a ' || parent || ' that is not there'
-FROM pragma_foreign_key_check LIMIT ?1",
+FROM pragma_foreign_key_check WHERE \"table\" <> 'checksum' LIMIT ?1",
     "
 SELECT what FROM (
     SELECT 'stage_result of pair ' || r.pair || ' names a pair that is not there' AS what
@@ -65,10 +64,28 @@ SELECT what FROM (
     WHERE j.worker IS NOT NULL AND NOT EXISTS (SELECT 1 FROM worker AS w WHERE w.id = j.worker)) AS broken LIMIT ?1",
 );
 
-const OBJECTS: &str = "
-SELECT type || ' ' || name, sql FROM sqlite_schema
-WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name NOT IN ('_sqlx_migrations', 'backup_settings')
-ORDER BY 1";
+/// Selects triggers and rules of PostgreSQL that could change rows besides those of this program, and triggers that are
+/// missing or switched off.
+const SERVER_OBJECTS: &str = "
+WITH wanted AS (
+    SELECT name, name || '_append_only' AS trigger FROM (VALUES ('review_act'), ('verdict'), ('verdict_undo'),
+        ('attention_check_answer'), ('attention_check_undo'), ('manual_alignment'), ('manual_alignment_undo')) AS log (name)
+    UNION ALL SELECT 'pair', 'pair_changed'),
+found AS (
+    SELECT CAST(c.relname AS text) AS name, CAST(t.tgname AS text) AS trigger, t.tgenabled <> 'D' AS is_on
+    FROM pg_trigger AS t JOIN pg_class AS c ON c.oid = t.tgrelid
+    WHERE c.relnamespace = CAST(current_schema() AS regnamespace) AND NOT t.tgisinternal)
+SELECT what FROM (
+    SELECT 'trigger ' || f.trigger || ' on ' || f.name || ' does not belong to this program' AS what
+    FROM found AS f WHERE NOT EXISTS (SELECT 1 FROM wanted AS w WHERE w.name = f.name AND w.trigger = f.trigger)
+    UNION ALL
+    SELECT 'trigger ' || w.trigger || ' is missing or switched off'
+    FROM wanted AS w WHERE NOT EXISTS (
+        SELECT 1 FROM found AS f WHERE w.name = f.name AND w.trigger = f.trigger AND f.is_on)
+    UNION ALL
+    SELECT 'rule ' || r.rulename || ' on ' || c.relname || ' does not belong to this program'
+    FROM pg_rewrite AS r JOIN pg_class AS c ON c.oid = r.ev_class
+    WHERE c.relnamespace = CAST(current_schema() AS regnamespace) AND c.relkind = 'r') AS difference ORDER BY what";
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
@@ -124,28 +141,21 @@ impl Catalog {
         lines.fetch_all(&mut conn).await
     }
 
-    /// Compares the tables, indexes and triggers with the schema of this program. Returns one line for each difference.
+    /// Compares the tables, indexes and triggers with the schema of this program, in PostgreSQL only the triggers and rules.
+    /// Returns one line for each difference.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
-        let Conn::Sqlite(mut conn) = self.read_conn().await? else {
-            return Ok(Vec::new());
+        let mut conn = match self.read_conn().await? {
+            Conn::Sqlite(conn) => conn,
+            mut conn @ Conn::Postgres(_) => {
+                return query_scalar(SERVER_OBJECTS).fetch_all(&mut conn).await;
+            }
         };
-        let found = objects(&mut conn).await?;
-        let wanted = wanted_objects().await?;
-        let gone = wanted.keys().filter(|name| !found.contains_key(*name));
-        let gone = gone.map(|name| format!("{name} is missing"));
-        let other = found
-            .iter()
-            .filter_map(|(name, sql)| match wanted.get(name) {
-                None => Some(format!("{name} does not belong to this program")),
-                Some(wanted) if wanted != sql => {
-                    Some(format!("{name} differs from its definition"))
-                }
-                Some(_) => None,
-            });
-        Ok(gone.chain(other).collect())
+        let wanted = schema::wanted_objects().await?;
+        let found = schema::differences(&mut conn, wanted).await?;
+        Ok(found.iter().map(ToString::to_string).collect())
     }
 
     /// Compares the counters, and the fingerprint and dirty mark of each job, with the rows they are derived from. With
@@ -218,20 +228,6 @@ fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());
     code.and_then(CatalogErrorKind::of_code) == Some(CatalogErrorKind::Disk)
-}
-
-/// Returns tables, indexes and triggers by kind and name, with their SQL.
-pub(crate) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
-    let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
-    Ok(found.into_iter().collect())
-}
-
-/// Returns the [`objects`] of a new catalog.
-pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
-    let options = SqliteConnectOptions::new().in_memory(true);
-    let mut conn = options.connect().await?;
-    open::MIGRATOR.run(&mut conn).await?;
-    objects(&mut conn).await
 }
 
 #[cfg(test)]

@@ -3,11 +3,12 @@
 use serde_json::json;
 use sqlx::AssertSqlSafe;
 
-use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
+use crate::catalog::audit::integrity::integrity;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::rows::json_array;
+use crate::catalog::db::schema::{self, SchemaDifference, wanted_objects};
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
 use crate::catalog::queue::job_counts::count_jobs;
@@ -139,11 +140,14 @@ impl Catalog {
                 let Conn::Sqlite(conn) = conn else {
                     return Ok(());
                 };
-                let found = objects(conn).await?;
-                for (name, sql) in wanted {
-                    if !name.starts_with("table ") && !found.contains_key(&name) {
+                for found in schema::differences(conn, wanted).await? {
+                    let SchemaDifference::Missing(name) = found else {
+                        continue;
+                    };
+                    if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
                         // SQL of our own migrations.
-                        sqlx::query(AssertSqlSafe(sql)).execute(&mut **conn).await?;
+                        let sql = AssertSqlSafe(sql.as_str());
+                        sqlx::query(sql).execute(&mut **conn).await?;
                     }
                 }
                 Ok(())

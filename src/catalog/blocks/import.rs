@@ -5,6 +5,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
@@ -37,6 +38,12 @@ RETURNING id";
 
 pub(crate) const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
+
+const NAMES: &str = concat!(
+    "SELECT name FROM block WHERE ",
+    is_counted!("id", "?1"),
+    " ORDER BY name"
+);
 
 impl Catalog {
     /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
@@ -88,7 +95,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn block_names(&self) -> Result<Vec<BlockName>> {
         let mut conn = self.read_conn().await?;
-        let names = query_scalar("SELECT name FROM block ORDER BY name");
+        let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));
         names.fetch_all(&mut conn).await
     }
 }

@@ -10,6 +10,8 @@ use crate::catalog::db::query::query_as;
 use crate::catalog::db::row::{FromRow, Row, from_row};
 use crate::catalog::db::value::Json;
 use crate::catalog::queue::lease::InputVersion;
+use crate::catalog::records::checksums::ChecksummedTable;
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{
     BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, ControlPoints, Failure,
@@ -28,7 +30,9 @@ SELECT id, name, mesh_path, page_path, labels_path, unit, side, mesh_hash, mesh_
 const RESULTS: &str =
     "SELECT stage, outcome, files, result_hash FROM block_result WHERE block = ?1 ORDER BY stage";
 
-const STATES: &str = "
+/// Selects one block or all, without the blocks of `?3`.
+const STATES: &str = concat!(
+    "
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     j.failed_stage, j.class, j.message, j.failed_at,
@@ -37,7 +41,10 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'retired') AS retired,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2)
         AS low_confidence
-FROM block AS b JOIN block_job AS j ON j.block = b.id WHERE ?1 IS NULL OR b.name = ?1 ORDER BY b.name";
+FROM block AS b JOIN block_job AS j ON j.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
+    is_counted!("b.id", "?3"),
+    " ORDER BY b.name"
+);
 
 const STAGES: &str = "
 SELECT r.stage, r.outcome, r.files, r.result_hash, r.made_with, r.ms, r.at
@@ -248,6 +255,7 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let states = query_as(STATES).bind(None::<&str>);
         let states = states.bind(Self::LOW_CHARACTER_CONFIDENCE);
+        let states = states.bind(self.left_out.of(ChecksummedTable::Block));
         states.fetch_all(&mut conn).await
     }
 
@@ -259,6 +267,7 @@ impl Catalog {
         let mut conn = self.snapshot().await?;
         let state = query_as(STATES).bind(name.as_str());
         let state = state.bind(Self::LOW_CHARACTER_CONFIDENCE);
+        let state = state.bind(self.left_out.of(ChecksummedTable::Block));
         let Some(state) = state.fetch_optional(&mut conn).await? else {
             return Ok(None);
         };

@@ -2,12 +2,18 @@
 
 use crate::catalog::db::query::query;
 use crate::catalog::db::value::Json;
+use crate::catalog::records::checksums::ChecksummedTable;
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{BlockName, TrueBox};
 
 const SET: &str = "UPDATE block SET true_boxes = ?2 WHERE name = ?1 RETURNING id";
 
-const ALL: &str = "SELECT name, true_boxes FROM block WHERE true_boxes IS NOT NULL ORDER BY name";
+const ALL: &str = concat!(
+    "SELECT name, true_boxes FROM block WHERE true_boxes IS NOT NULL AND ",
+    is_counted!("id", "?1"),
+    " ORDER BY name"
+);
 
 impl Catalog {
     /// Stores the true boxes of a block, replacing earlier ones. Returns `false` if there is no such block.
@@ -25,7 +31,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn true_boxes(&self) -> Result<Vec<(BlockName, Vec<TrueBox>)>> {
         let mut conn = self.read_conn().await?;
-        let rows = query(ALL).fetch_all(&mut conn).await?;
+        let rows = query(ALL).bind(self.left_out.of(ChecksummedTable::Block));
+        let rows = rows.fetch_all(&mut conn).await?;
         let blocks = rows.iter().map(|row| {
             let Json(boxes) = row.get("true_boxes")?;
             Ok((row.get("name")?, boxes))

@@ -9,6 +9,7 @@ use crate::catalog::audit::integrity;
 use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity, wrong_identity};
+use crate::catalog::db::schema;
 use crate::catalog::{Catalog, CatalogError, Result};
 
 /// Extended result codes of failed reads: `SQLITE_IOERR_READ`, `SQLITE_IOERR_SHORT_READ`. A copy is only written, so
@@ -61,15 +62,16 @@ impl Catalog {
     /// the backup holds. Does not sync the file to disk.
     ///
     /// # Errors
-    /// Returns an error if the backup is not a catalog, the copy fails, or the copy is damaged. May leave a partial
-    /// copy.
+    /// Returns an error if the backup is not a catalog, if another program added something to its schema, the copy fails,
+    /// or the copy is damaged. May leave a partial copy.
     pub async fn restore_backup(backup: &Path, file: &Path) -> Result<Option<Vec<u8>>> {
         let options = SqliteConnectOptions::new().filename(backup);
         let unreadable = |error| disk_error(backup, error);
         let opened = options.read_only(true).immutable(true).connect().await;
         let mut conn = opened.map_err(unreadable)?;
         match identity(&mut conn).await {
-            Ok(Identity::Current) => {}
+            // Checked before anything is written, and in the backup itself, which the error then names.
+            Ok(Identity::Current) => schema::require_own(&mut conn, backup).await?,
             Ok(Identity::Uninitialized) => return Err(CatalogError::Empty(backup.to_owned())),
             Ok(Identity::Other(number)) => return Err(wrong_identity(backup, number)),
             Err(CatalogError::Database(error)) => return Err(unreadable(error)),

@@ -42,6 +42,16 @@ pub enum CatalogError {
         /// Version of this program's schema.
         known: i64,
     },
+    /// Another program added something to the schema, or changed it.
+    #[error(
+        "{path} is not written to, because its schema was changed, so that a write could change other rows: {what}; if somebody sent you this file, do not use it, otherwise restore a backup"
+    )]
+    ForeignSchema {
+        /// The file.
+        path: PathBuf,
+        /// What was added or changed.
+        what: String,
+    },
     /// The file is corrupt.
     #[error(
         "{0} is damaged: part of it was overwritten, or the disk cannot read it; `check` reports how much can be read, and a backup can replace it"

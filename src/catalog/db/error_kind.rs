@@ -1,5 +1,8 @@
 //! Kinds of database errors, by SQLite's result codes.
 
+use std::io;
+
+use rustls::{CertificateError, Error as TlsError};
 use sqlx::postgres::PgDatabaseError;
 
 use crate::catalog::db::error::CatalogError;
@@ -50,6 +53,7 @@ impl CatalogErrorKind {
 
     pub(crate) fn of(error: &sqlx::Error) -> Option<Self> {
         let database = match error {
+            sqlx::Error::Io(error) if refused_by_tls(error).is_some() => return None,
             sqlx::Error::Io(_) | sqlx::Error::PoolTimedOut | sqlx::Error::Protocol(_) => {
                 return Some(Self::Unavailable);
             }
@@ -88,14 +92,17 @@ impl CatalogError {
         self.kind() == Some(CatalogErrorKind::Unavailable)
     }
 
-    /// Explains why the server refused the user of a connection, such as after a change of the password. Returns `None` for
-    /// other errors.
-    pub fn refused_user(&self) -> Option<String> {
+    /// Explains why a connection was refused for good, such as after a change of the password or of a certificate. Returns
+    /// `None` for other errors.
+    pub fn refused_connection(&self) -> Option<String> {
         let error = match self {
             Self::Database(error) => error,
-            Self::Shared(error) => return error.refused_user(),
+            Self::Shared(error) => return error.refused_connection(),
             _ => return None,
         };
+        if tls_reason(error).is_some() {
+            return Some(connection_error(error));
+        }
         let server = error.as_database_error()?;
         let server = server.try_downcast_ref::<PgDatabaseError>()?;
         server
@@ -148,8 +155,59 @@ impl CatalogError {
     }
 }
 
+/// Returns the error of TLS that ended a handshake for good. A broken record of an open connection is not one.
+fn refused_by_tls(error: &io::Error) -> Option<&TlsError> {
+    let error = error.get_ref()?.downcast_ref::<TlsError>()?;
+    let is_for_good = matches!(
+        error,
+        TlsError::InvalidCertificate(_)
+            | TlsError::NoCertificatesPresented
+            | TlsError::PeerIncompatible(_)
+            | TlsError::AlertReceived(_)
+    );
+    is_for_good.then_some(error)
+}
+
+/// Describes why an encrypted connection was refused, with what to do. Returns `None` for other errors.
+fn tls_reason(error: &sqlx::Error) -> Option<String> {
+    let error = match error {
+        sqlx::Error::Tls(error) => {
+            return Some(format!(
+                "{error}; set `ssl = on` in postgresql.conf of the server, and check the files of sslrootcert, sslcert and sslkey"
+            ));
+        }
+        sqlx::Error::Io(error) => refused_by_tls(error)?,
+        _ => return None,
+    };
+    let TlsError::InvalidCertificate(reason) = error else {
+        return Some(format!(
+            "{error}; check sslcert and sslkey in the address, and the settings of TLS on the server"
+        ));
+    };
+    Some(match reason {
+        CertificateError::Expired | CertificateError::ExpiredContext { .. } => {
+            "the certificate of the server has expired; renew it there, and check the clock of this computer".to_owned()
+        }
+        CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. } => {
+            "the certificate of the server is not valid yet; check the clocks of both computers".to_owned()
+        }
+        CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. } => {
+            "the certificate of the server is for another host name; use that name in the address, or give the server a certificate for this one".to_owned()
+        }
+        CertificateError::UnknownIssuer => {
+            "this computer does not know who signed the certificate of the server; name the certificate of that authority, or a self-signed one, with sslrootcert=FILE in the address".to_owned()
+        }
+        _ => format!(
+            "the certificate of the server cannot be used ({error}); give the server one that an authority signed, and name the certificate of the authority with sslrootcert=FILE in the address"
+        ),
+    })
+}
+
 /// Describes why a connection failed, with what to do.
 pub(crate) fn connection_error(error: &sqlx::Error) -> String {
+    if let Some(reason) = tls_reason(error) {
+        return reason;
+    }
     let Some(refused) = error.as_database_error() else {
         return match CatalogErrorKind::of(error) {
             Some(CatalogErrorKind::Unavailable) => {

@@ -23,6 +23,7 @@ pub(crate) mod retry_wait;
 pub(crate) mod roles;
 pub(crate) mod row;
 pub(crate) mod rows;
+pub(crate) mod schema;
 pub(crate) mod script;
 pub(crate) mod server_commit;
 pub(crate) mod unplaced;

@@ -2,39 +2,29 @@
 
 use std::io::{ErrorKind, Read as _};
 use std::path::Path;
-use std::sync::LazyLock;
 use std::time::Duration;
 
-use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{
-    AssertSqlSafe, ConnectOptions, Connection as _, Row as _, SqlSafeStr as _, SqliteConnection,
-};
+use sqlx::{AssertSqlSafe, ConnectOptions, Connection as _, Row as _, SqliteConnection};
 
 use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::sidecar;
 use crate::catalog::db::network_fs;
+use crate::catalog::db::schema::{self, MIGRATOR};
 use crate::domain::FileKind;
 
 /// SQLite's busy timeout of a connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
-/// Version of the schema. Versions 1 to 10 were never released.
-pub(crate) const SCHEMA_VERSION: i64 = 11;
+/// Version of the schema. Versions 1 to 11 were never released.
+pub(crate) const SCHEMA_VERSION: i64 = 12;
 /// Read connections per process.
 const READERS: u32 = 4;
-
-/// The migrations of SQLite. The macro of sqlx that reads the folder would compile sqlx a second time.
-pub(crate) static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| {
-    let sql = include_str!("../../../migrations/sqlite/0001_initial.sql").into_sql_str();
-    let kind = MigrationType::Simple;
-    Migrator::with_migrations(vec![Migration::new(1, "initial".into(), kind, sql, false)])
-});
 
 /// Returns the options of every connection.
 fn options(path: &Path) -> SqliteConnectOptions {
@@ -47,7 +37,8 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// Opens the write connection. If `allow_empty` is set, the file may have no bytes. Creates a missing schema.
+/// Opens the write connection. If `allow_empty` is set, the file may have no bytes. Creates a missing schema. Refuses a
+/// catalog to which another program added a trigger.
 pub(crate) async fn write_conn(path: &Path, allow_empty: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     check_file(path, allow_empty)?;
@@ -88,6 +79,7 @@ async fn connect(path: &Path) -> Result<SqliteConnection> {
         .connect()
         .await?;
     create_schema(&mut conn, path).await?;
+    schema::require_own(&mut conn, path).await?;
     Ok(conn)
 }
 
@@ -213,10 +205,11 @@ async fn read_identity(conn: &mut SqliteConnection) -> Result<Identity> {
 }
 
 async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
-    let tables: i64 =
-        sqlx::query_scalar("SELECT count(*) FROM sqlite_schema WHERE name <> '_sqlx_migrations'")
-            .fetch_one(conn)
-            .await?;
+    let tables: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM sqlite_schema WHERE type <> 'table' OR name <> '_sqlx_migrations'",
+    )
+    .fetch_one(conn)
+    .await?;
     Ok(tables == 0)
 }
 

@@ -6,7 +6,7 @@ use std::fmt;
 use sqlx::error::BoxDynError;
 use sqlx::postgres::{PgRow, PgValueRef};
 use sqlx::sqlite::{SqliteRow, SqliteValueRef};
-use sqlx::{Decode, Postgres, Row as _, Sqlite, TypeInfo as _, ValueRef as _};
+use sqlx::{Column as _, Decode, Postgres, Row as _, Sqlite, TypeInfo as _, ValueRef as _};
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::value::{FromValue, Value};
@@ -78,6 +78,14 @@ impl Row {
         match self {
             Self::Sqlite(row) => row.len(),
             Self::Postgres(row) => row.len(),
+        }
+    }
+
+    /// Returns the name of a column.
+    pub(crate) fn name(&self, column: usize) -> &str {
+        match self {
+            Self::Sqlite(row) => row.columns()[column].name(),
+            Self::Postgres(row) => row.columns()[column].name(),
         }
     }
 

@@ -2,23 +2,20 @@
 //!
 //! The table `checksum` has a row for each row of the tables in [`ChecksummedTable`], written in the same transaction.
 //! A checksum is the first 64 bits of a BLAKE3 hash of the table's number, the row's number and the row's columns. For
-//! a pair or a block, it covers only the columns that no run writes. For a verdict, an answer and a manual alignment, it
-//! also covers the previous row's checksum. This reveals a row that was removed together with its checksum. The tables
-//! of undone rows have no such chain.
+//! a pair or a block, it covers only the columns that no run writes. The checksum of a verdict, an answer or a manual
+//! alignment is stored with the number of the previous row, and covers it. This reveals a row that was removed together
+//! with its checksum, and no row can make another one faulty, whoever stores it and when. The tables of undone rows have
+//! no such chain.
 
 use serde_json::json;
 
+use crate::catalog::Result;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
-use crate::catalog::db::value::Value;
-use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{ContentHash, enum_names};
-
-/// Number of rows that are read at a time.
-const PAGE: i64 = 2000;
 
 /// A table whose rows have checksums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -50,72 +47,23 @@ enum_names! { pub ChecksummedTable, "a table with checksums":
     Block = "block",
 }
 
-/// What is wrong with a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RowFault {
-    /// The row differs from its checksum. In a chained table, this is also reported if the row before it was removed
-    /// with its checksum.
-    Changed,
-    /// The row is missing, but its checksum is stored.
-    Removed,
-    /// The row has no checksum.
-    Added,
-    /// Rows at the end of a log are missing, with their checksums.
-    CutOff,
-}
-
-/// A row that does not agree with its checksum.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FaultyRow {
-    /// The table.
-    pub table: ChecksummedTable,
-    /// The row's number.
-    pub row: i64,
-    /// Name of the pair that the row belongs to, if it is known. The name may be damaged too.
-    pub pair: Option<String>,
-    /// What is wrong.
-    pub fault: RowFault,
-}
-
-impl std::fmt::Display for FaultyRow {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (row, table) = (self.row, self.table);
-        let of_pair = self.pair.as_ref();
-        let of_pair = of_pair.map_or_else(String::new, |pair| format!(" (pair {pair})"));
-        match self.fault {
-            RowFault::Changed => {
-                write!(
-                    f,
-                    "row {row} of the table {table}{of_pair} differs from its checksum"
-                )
-            }
-            RowFault::Removed => write!(f, "row {row} of the table {table} is missing"),
-            RowFault::Added => write!(f, "row {row} of the table {table}{of_pair} has no checksum"),
-            RowFault::CutOff => write!(
-                f,
-                "the last rows of the table {table}, up to row {row}, are missing"
-            ),
-        }
-    }
-}
-
 /// The statements of one table.
-struct Statements {
+pub(super) struct Statements {
     /// Selects the rows with the listed numbers.
     listed: &'static str,
     /// Selects a page of rows with their checksums.
-    page: &'static str,
+    pub(super) page: &'static str,
     /// Selects the numbers of checksums without a row.
-    removed: &'static str,
+    pub(super) removed: &'static str,
     /// Whether a checksum also covers the previous row's checksum.
-    is_chained: bool,
+    pub(super) is_chained: bool,
 }
 
 /// Builds the statements of a table from its name, its key column, the columns that a checksum covers, an SQL
 /// expression for the id of a row's pair, and whether its checksums are chained.
 ///
-/// The first four columns of a selected row are its number, its checksum, the previous checksum, and the name of its
-/// pair. `listed` selects only the number, and NULL for the other three.
+/// The first four columns of a selected row are its number, its checksum, the number of the previous row, and the name of
+/// its pair. `listed` selects only the number, and NULL for the other three.
 macro_rules! statements {
     ($table:literal, $key:literal, $columns:literal, $pair:literal, $is_chained:literal) => {
         Statements {
@@ -133,9 +81,7 @@ macro_rules! statements {
             page: concat!(
                 "SELECT t.",
                 $key,
-                ", c.value, (SELECT value FROM checksum WHERE record = ?1 AND row < t.",
-                $key,
-                " ORDER BY row DESC LIMIT 1), (SELECT p.name FROM pair AS p WHERE p.id = ",
+                ", c.value, c.previous, (SELECT p.name FROM pair AS p WHERE p.id = ",
                 $pair,
                 "), ",
                 $columns,
@@ -152,7 +98,8 @@ macro_rules! statements {
                 $table,
                 " AS t WHERE t.",
                 $key,
-                " = c.row) ORDER BY 1"
+                " = c.row) UNION SELECT c.previous FROM checksum AS c WHERE c.record = ?1 AND c.previous IS NOT NULL \
+                 AND NOT EXISTS (SELECT 1 FROM checksum AS p WHERE p.record = ?1 AND p.row = c.previous) ORDER BY 1"
             ),
             is_chained: $is_chained,
         }
@@ -161,7 +108,7 @@ macro_rules! statements {
 
 impl ChecksummedTable {
     #[rustfmt::skip]
-    const fn statements(self) -> Statements {
+    pub(super) const fn statements(self) -> Statements {
         match self {
             Self::Pair => statements!("pair", "id",
                 "t.name, t.mesh_path, t.print_path, t.unit, t.scanned_face_down, t.character, t.block, t.meta, \
@@ -185,37 +132,39 @@ impl ChecksummedTable {
     }
 
     /// Returns whether rows are only added, never changed.
-    const fn is_append_only(self) -> bool {
+    pub const fn is_append_only(self) -> bool {
         !matches!(self, Self::Pair | Self::Truth | Self::Block)
     }
 
+    /// Returns whether this is the log of verdicts or of their undos.
+    pub const fn is_of_verdicts(self) -> bool {
+        matches!(self, Self::Verdict | Self::VerdictUndo)
+    }
+
     /// Returns the number by which the table `checksum` refers to this table.
-    const fn code(self) -> i64 {
+    pub(super) const fn code(self) -> i64 {
         self as i64
     }
 }
 
 /// Index of the first column that a checksum covers, in the rows of `listed` and `page`.
-const COVERED: usize = 4;
+pub(super) const COVERED: usize = 4;
 
 const LAST: &str =
-    "SELECT value FROM checksum WHERE record = ?1 AND row < ?2 ORDER BY row DESC LIMIT 1";
+    "SELECT row FROM checksum WHERE record = ?1 AND row < ?2 ORDER BY row DESC LIMIT 1";
 
 const STORE: &str = "
-INSERT INTO checksum (record, row, value) SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint) FROM json_each(?2) WHERE true
+INSERT INTO checksum (record, row, value, previous)
+SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint) FROM json_each(?2) WHERE true
 ON CONFLICT (record, row) DO UPDATE SET value = excluded.value";
 
 /// Like [`STORE`], for new rows of append-only tables. PostgreSQL needs no right to change checksums for it.
 const APPEND: Sql = Sql::pair(
     STORE,
     "
-INSERT INTO checksum (record, row, value) SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint) FROM json_each(?2)",
+INSERT INTO checksum (record, row, value, previous)
+SELECT ?1, CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint) FROM json_each(?2)",
 );
-
-const LAST_ROW: &str = "SELECT max(row) FROM checksum WHERE record = ?1";
-
-/// Selects the largest row number that a log has ever had, if it exceeds ?2.
-const CUT_OFF: &str = "SELECT seq FROM sqlite_sequence WHERE name = ?1 AND seq > ?2";
 
 /// Stores the checksums of new or changed rows. The caller writes the rows earlier in the same transaction.
 pub(crate) async fn store(conn: &mut Conn, table: ChecksummedTable, rows: &[i64]) -> Result<()> {
@@ -242,7 +191,7 @@ pub(crate) async fn store_of_rows(
     store_following(conn, table, rows, None).await
 }
 
-/// Stores the checksums of rows that follow a row with the checksum `before`.
+/// Stores the checksums of rows that follow the row `before`.
 async fn store_following(
     conn: &mut Conn,
     table: ChecksummedTable,
@@ -253,8 +202,12 @@ async fn store_following(
     let mut checksums = Vec::with_capacity(rows.len());
     for row in rows {
         let value = checksum(table, row, before)?;
-        checksums.push(json!([row.get::<i64>(0)?, value]));
-        before = is_chained.then_some(value);
+        let number: i64 = row.get(0)?;
+        checksums.push(match before {
+            Some(before) => json!([number, value, before]),
+            None => json!([number, value]),
+        });
+        before = is_chained.then_some(number);
     }
     let store = query(if table.is_append_only() {
         APPEND
@@ -265,9 +218,9 @@ async fn store_following(
     store.bind(json_array(checksums)).execute(conn).await
 }
 
-/// Returns the first 64 bits of a hash. The hash covers the table, the row's number, the previous checksum, and the
+/// Returns the first 64 bits of a hash. The hash covers the table, the numbers of the row and of the previous row, and the
 /// columns from [`COVERED`] on.
-fn checksum(table: ChecksummedTable, row: &Row, before: Option<i64>) -> Result<i64> {
+pub(super) fn checksum(table: ChecksummedTable, row: &Row, before: Option<i64>) -> Result<i64> {
     let mut bytes = Vec::with_capacity(512);
     bytes.extend(table.code().to_le_bytes());
     bytes.extend(row.get::<i64>(0)?.to_le_bytes());
@@ -278,92 +231,4 @@ fn checksum(table: ChecksummedTable, row: &Row, before: Option<i64>) -> Result<i
     let hash = ContentHash::of(&bytes);
     let (first, _) = hash.as_bytes().split_at(8);
     Ok(i64::from_le_bytes(first.try_into().unwrap_or_default()))
-}
-
-impl Catalog {
-    /// Compares the rows of all tables in [`ChecksummedTable`] with their checksums. Returns the rows that do not
-    /// agree.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn faulty_rows(&self) -> Result<Vec<FaultyRow>> {
-        let mut conn = self.snapshot().await?;
-        let mut faulty = Vec::new();
-        for table in ChecksummedTable::ALL {
-            faulty_rows(&mut conn, table, &mut faulty).await?;
-        }
-        Ok(faulty)
-    }
-
-    /// Verifies the checksums of all tables in [`ChecksummedTable`].
-    ///
-    /// # Errors
-    /// Returns an error that names the first faulty row, or an error if a database operation fails.
-    pub async fn verify_checksums(&self) -> Result<()> {
-        match self.faulty_rows().await?.first() {
-            None => Ok(()),
-            Some(faulty) => Err(CatalogError::Corrupt(faulty.to_string())),
-        }
-    }
-}
-
-async fn faulty_rows(
-    conn: &mut Conn,
-    table: ChecksummedTable,
-    faulty: &mut Vec<FaultyRow>,
-) -> Result<()> {
-    let statements = table.statements();
-    let fault = |row, pair, fault| FaultyRow {
-        table,
-        row,
-        pair,
-        fault,
-    };
-    let mut after = i64::MIN;
-    loop {
-        let page = query(statements.page).bind(table.code());
-        let page = page.bind(after).bind(PAGE).fetch_all(&mut *conn).await?;
-        let Some(last) = page.last() else { break };
-        after = last.get(0)?;
-        for row in &page {
-            let stored: Option<i64> = row.get(1)?;
-            let before = if statements.is_chained {
-                row.get(2)?
-            } else {
-                None
-            };
-            if stored != Some(checksum(table, row, before)?) {
-                let kind = stored.map_or(RowFault::Added, |_| RowFault::Changed);
-                faulty.push(fault(row.get(0)?, pair_name(row), kind));
-            }
-        }
-    }
-    let removed = query_scalar(statements.removed).bind(table.code());
-    let removed: Vec<i64> = removed.fetch_all(&mut *conn).await?;
-    faulty.extend(
-        removed
-            .into_iter()
-            .map(|row| fault(row, None, RowFault::Removed)),
-    );
-    // A sequence of PostgreSQL also counts rows that were rolled back, so it does not show whether rows are missing.
-    if statements.is_chained && matches!(conn, Conn::Sqlite(_)) {
-        let last: Option<i64> = query_scalar(LAST_ROW)
-            .bind(table.code())
-            .fetch_one(&mut *conn)
-            .await?;
-        let cut_off = query_scalar(CUT_OFF)
-            .bind(table.name())
-            .bind(last.unwrap_or(0));
-        let cut_off: Option<i64> = cut_off.fetch_optional(&mut *conn).await?;
-        faulty.extend(cut_off.map(|row| fault(row, None, RowFault::CutOff)));
-    }
-    Ok(())
-}
-
-/// Returns the name of a row's pair. Invalid UTF-8 is replaced, because the name may be what is damaged.
-fn pair_name(row: &Row) -> Option<String> {
-    match row.value(3) {
-        Ok(Value::Text(name)) => Some(String::from_utf8_lossy(&name).into_owned()),
-        _ => None,
-    }
 }

@@ -67,7 +67,8 @@ impl Catalog {
         find: impl FnMut(&str) -> Option<String> + Send + 'static,
     ) -> Result<Vec<String>> {
         // Verifies first, because the update would give a damaged row a valid checksum.
-        self.verify_checksums().await?;
+        let tables = [ChecksummedTable::Pair, ChecksummedTable::Block];
+        self.verify_checksums(&tables).await?;
         self.in_transaction(move |conn| Box::pin(replace(conn, find)))
             .await
     }

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::db::row::from_row;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::records::review_answers::pair_id;
 use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
@@ -70,7 +71,8 @@ SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13
 WHERE NOT EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1)
 RETURNING id";
 
-/// Selects manual alignments with their undo and whether they hold; the tables are in the order of the join.
+/// Selects manual alignments with their undo and whether they hold, without the alignments of `?3` and the undos of `?4`;
+/// the tables are in the order of the join.
 macro_rules! select_alignments {
     ($from:literal, $condition:literal) => {
         concat!(
@@ -82,10 +84,14 @@ SELECT a.id, a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_fr
 FROM ",
             $from,
             "
-    LEFT JOIN manual_alignment_undo AS u ON u.alignment = a.id
+    LEFT JOIN manual_alignment_undo AS u ON u.alignment = a.id AND ",
+            is_counted!("u.alignment", "?4"),
+            "
     LEFT JOIN stage_result AS d ON d.pair = a.pair AND d.stage = 1
     LEFT JOIN stage_result AS n ON n.pair = a.pair AND n.stage = 2
 WHERE ",
+            is_counted!("a.id", "?3"),
+            " AND ",
             $condition
         )
     };
@@ -158,6 +164,8 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(LOG).bind(after);
         let query = query.bind(limit as i64);
+        let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
+        let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         query.fetch_all(&mut conn).await
     }
 
@@ -182,6 +190,8 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query_as(OF_NAMES);
         let query = query.bind(first.as_str()).bind(last.as_str());
+        let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
+        let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         Ok(newest(query.fetch_all(&mut conn).await?))
     }
 }

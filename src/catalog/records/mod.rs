@@ -1,9 +1,11 @@
 //! Data of pairs: imports, results, verdicts, review answers and counts.
 
 pub(crate) mod checksums;
+pub(crate) mod faulty_rows;
 pub(crate) mod ground_truth;
 pub(crate) mod import;
 pub(crate) mod input_paths;
+pub(crate) mod left_out;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
 pub(crate) mod pair_groups;
@@ -12,6 +14,7 @@ pub(crate) mod pair_work;
 pub(crate) mod review_answers;
 pub(crate) mod review_context;
 pub(crate) mod review_rights;
+pub(crate) mod set_apart;
 pub(crate) mod stage_results;
 pub(crate) mod status;
 pub(crate) mod verdicts;

@@ -4,23 +4,41 @@ use std::collections::BTreeMap;
 
 use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
+use crate::catalog::records::checksums::ChecksummedTable;
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
 use crate::domain::PairName;
 
 const META_COLUMNS: Sql = Sql::pair(
-    "SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m ORDER BY m.key",
-    "SELECT DISTINCT m.key COLLATE \"C\" AS key FROM pair AS p, json_object_keys(CAST(p.meta AS json)) AS m (key) ORDER BY 1",
+    concat!(
+        "SELECT DISTINCT m.key FROM pair AS p, json_each(p.meta) AS m WHERE ",
+        is_counted!("p.id", "?1"),
+        " ORDER BY m.key"
+    ),
+    concat!(
+        "SELECT DISTINCT m.key COLLATE \"C\" AS key FROM pair AS p, json_object_keys(CAST(p.meta AS json)) AS m (key) WHERE ",
+        is_counted!("p.id", "?1"),
+        " ORDER BY 1"
+    ),
 );
 
-const GROUPS: &str = "
+const GROUPS: &str = concat!(
+    "
 SELECT p.shared, min(p.name) AS name, count(*) AS pairs FROM (
     SELECT CASE ?1 WHEN 'block' THEN nullif(block, '') WHEN 'character' THEN nullif(character, '') END AS shared, name
-    FROM pair WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = pair.id)) AS p
-GROUP BY p.shared, CASE WHEN p.shared IS NULL THEN p.name END";
+    FROM pair WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = pair.id) AND ",
+    is_counted!("pair.id", "?2"),
+    ") AS p
+GROUP BY p.shared, CASE WHEN p.shared IS NULL THEN p.name END"
+);
 
-const SHARED_PRINTS: &str = "
+const SHARED_PRINTS: &str = concat!(
+    "
 SELECT p.print_path, min(p.name) AS first FROM pair AS p
-WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = p.id) GROUP BY p.print_path HAVING count(*) > 1";
+WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = p.id) AND ",
+    is_counted!("p.id", "?1"),
+    " GROUP BY p.print_path HAVING count(*) > 1"
+);
 
 impl Catalog {
     /// Returns the names of the user's columns of all pairs, sorted.
@@ -29,7 +47,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn meta_columns(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
-        query_scalar(META_COLUMNS).fetch_all(&mut conn).await
+        let query = query_scalar(META_COLUMNS).bind(self.left_out.of(ChecksummedTable::Pair));
+        query.fetch_all(&mut conn).await
     }
 
     /// Counts the pairs with equal values of an attribute, which is `block`, `character` or another text for none. A
@@ -40,6 +59,7 @@ impl Catalog {
     pub async fn pair_groups(&self, attribute: &str) -> Result<BTreeMap<(bool, String), u64>> {
         let mut conn = self.read_conn().await?;
         let query = query(GROUPS).bind(attribute);
+        let query = query.bind(self.left_out.of(ChecksummedTable::Pair));
         let found = query.fetch_all(&mut conn).await?;
         let groups = found.iter().map(|row| {
             let shared: Option<String> = row.get("shared")?;
@@ -58,7 +78,8 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn shared_prints(&self) -> Result<BTreeMap<String, PairName>> {
         let mut conn = self.read_conn().await?;
-        let found = query(SHARED_PRINTS).fetch_all(&mut conn).await?;
+        let query = query(SHARED_PRINTS).bind(self.left_out.of(ChecksummedTable::Pair));
+        let found = query.fetch_all(&mut conn).await?;
         let prints = found
             .iter()
             .map(|row| Ok((row.get("print_path")?, row.get("first")?)));

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query, query_as};
+use crate::catalog::db::query::{Query, query, query_as};
 use crate::catalog::db::row::{FromRow as _, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::queue::counters::Cursor;
+use crate::catalog::records::checksums::ChecksummedTable;
+use crate::catalog::records::left_out::{LeftOut, is_counted};
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
     StoredFailure,
@@ -18,7 +20,8 @@ use crate::domain::{
     UnixMillis,
 };
 
-/// Selects pairs with their attributes, job, failure and true alignment.
+/// Selects pairs with their attributes, job, failure and true alignment, without the pairs of `?2` and the true alignments
+/// of `?3`.
 macro_rules! select_pairs {
     ($condition:literal) => {
         concat!(
@@ -28,14 +31,18 @@ SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.c
     f.message, f.at AS failed_at, t.body AS truth
 FROM pair AS p JOIN job AS j ON j.pair = p.id
     LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)
-    LEFT JOIN truth AS t ON t.pair = p.id
+    LEFT JOIN truth AS t ON t.pair = p.id AND ",
+            is_counted!("t.pair", "?3"),
+            "
 WHERE ",
+            is_counted!("p.id", "?2"),
+            " AND ",
             $condition
         )
     };
 }
 
-pub(crate) const PAGE: &str = select_pairs!("p.name > ?1 ORDER BY p.name LIMIT ?2");
+pub(crate) const PAGE: &str = select_pairs!("p.name > ?1 ORDER BY p.name LIMIT ?4");
 const ONE: &str = select_pairs!("p.name = ?1");
 
 pub(crate) const FAILED: &str = "
@@ -62,12 +69,9 @@ impl Catalog {
     ) -> Result<Vec<PairResults>> {
         // One transaction gives a consistent view of jobs, results and verdicts, even while a run writes.
         let mut conn = self.snapshot().await?;
-        let found = query(PAGE)
-            .bind(after.map_or("", PairName::as_str))
-            .bind(limit as i64)
-            .fetch_all(&mut conn)
-            .await?;
-        assemble(&mut conn, &found).await
+        let found = self.bind_left_out(query(PAGE).bind(after.map_or("", PairName::as_str)));
+        let found = found.bind(limit as i64).fetch_all(&mut conn).await?;
+        assemble(&mut conn, &found, &self.left_out).await
     }
 
     /// Returns the details of a pair, or `None` if the pair does not exist.
@@ -76,8 +80,9 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
-        let found = query(ONE).bind(name.as_str()).fetch_all(&mut conn).await?;
-        let Some(results) = assemble(&mut conn, &found).await?.pop() else {
+        let found = self.bind_left_out(query(ONE).bind(name.as_str()));
+        let found = found.fetch_all(&mut conn).await?;
+        let Some(results) = assemble(&mut conn, &found, &self.left_out).await?.pop() else {
             return Ok(None);
         };
         let row = &found[0];
@@ -89,8 +94,14 @@ impl Catalog {
             crashes: row.get("crashes")?,
             run_at: row.get("run_at")?,
             attempts: attempts(&mut conn, row.get("id")?).await?,
-            verdict_log: verdicts::log(&mut conn, Some(name)).await?,
+            verdict_log: verdicts::log(&mut conn, Some(name), &self.left_out).await?,
         }))
+    }
+
+    /// Binds the parameters `?2` and `?3` of [`PAGE`] and [`ONE`].
+    fn bind_left_out<R>(&self, query: Query<R>) -> Query<R> {
+        let query = query.bind(self.left_out.of(ChecksummedTable::Pair));
+        query.bind(self.left_out.of(ChecksummedTable::Truth))
     }
 
     /// Returns up to `limit` quarantined pairs, sorted by name.
@@ -126,12 +137,12 @@ impl Catalog {
 }
 
 /// Adds results, metrics and verdicts to rows of pairs.
-async fn assemble(conn: &mut Conn, found: &[Row]) -> Result<Vec<PairResults>> {
+async fn assemble(conn: &mut Conn, found: &[Row], left_out: &LeftOut) -> Result<Vec<PairResults>> {
     let ids = found.iter().map(|row| row.get("id"));
     let ids = ids.collect::<Result<Vec<i64>, _>>()?;
     let mut stages = stage_results::of_pairs(conn, &ids).await?;
     let hashes = stage_results::metric_hashes(conn, &ids).await?;
-    let verdicts = verdicts::of_pairs(conn, &ids).await?;
+    let verdicts = verdicts::of_pairs(conn, &ids, left_out).await?;
     let mut assemble_pair = |row: &Row, id: i64| {
         let cursor: Cursor = row.get("stage")?;
         let mut records = stages.remove(&id).unwrap_or_default();

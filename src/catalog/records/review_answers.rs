@@ -6,6 +6,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row, from_row};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::records::left_out::is_counted;
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
 use crate::catalog::{Catalog, CatalogError, Result};
@@ -114,38 +115,56 @@ RETURNING id";
 const KNOWN: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1)";
 
-const ANSWERS: &str = "
+/// Selects the answers of a reviewer, without the verdicts of `?2`, the answers of `?4`, and their undos of `?3` and `?5`.
+const ANSWERS: &str = concat!(
+    "
 SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name AS pair, v.result_hash AS hash, 0 AS is_check,
     v.verdict, v.reason, v.note, v.at AS at, v.id AS id
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair
-WHERE v.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+WHERE v.reviewer = ?1 AND ",
+    is_counted!("v.id", "?2"),
+    " AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act AND ",
+    is_counted!("u.act", "?3"),
+    ")
 UNION ALL
 SELECT c.event, p.name, c.seen, 1, c.verdict, c.reason, c.note, c.at, c.id
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair
-WHERE c.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id)
-ORDER BY at, is_check, id";
+WHERE c.reviewer = ?1 AND ",
+    is_counted!("c.id", "?4"),
+    " AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id AND ",
+    is_counted!("u.answer", "?5"),
+    ")
+ORDER BY at, is_check, id"
+);
 
-const CHECK_ANSWERS: &str = r#"
+/// Selects answers to attention checks, without the answers of `?3` and the undos of `?4`.
+const CHECK_ANSWERS: &str = concat!(
+    r#"
 SELECT c.id, c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "check", c.seen, c.shown_ms, c.angle_read_deg,
     NULL AS review_order, c.verdict, c.reviewer, c.reason, c.note, c.at, u.at AS undone_at
-FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
-WHERE c.id > ?1 ORDER BY c.id LIMIT ?2"#;
+FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id AND "#,
+    is_counted!("u.answer", "?4"),
+    "
+WHERE c.id > ?1 AND ",
+    is_counted!("c.id", "?3"),
+    " ORDER BY c.id LIMIT ?2"
+);
 
 /// Statements that undo what a reviewer stored under an event id, with their tables. A second undo has no effect.
 const UNDO: [(ChecksummedTable, &str); 3] = [
     (
         ChecksummedTable::VerdictUndo,
-        "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
+        "INSERT INTO verdict_undo (act, reviewer, at) SELECT DISTINCT act, reviewer, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING act",
     ),
     (
         ChecksummedTable::AnswerUndo,
-        "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
+        "INSERT INTO attention_check_undo (answer, reviewer, at) SELECT id, reviewer, ?3 FROM attention_check_answer
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING answer",
     ),
     (
         ChecksummedTable::ManualAlignmentUndo,
-        "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
+        "INSERT INTO manual_alignment_undo (alignment, reviewer, at) SELECT id, reviewer, ?3 FROM manual_alignment
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING RETURNING alignment",
     ),
 ];
@@ -234,7 +253,13 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(ANSWERS).bind(reviewer);
+        let left_out = &self.left_out;
+        let query = query_as(ANSWERS)
+            .bind(reviewer)
+            .bind(left_out.of(ChecksummedTable::Verdict))
+            .bind(left_out.of(ChecksummedTable::VerdictUndo))
+            .bind(left_out.of(ChecksummedTable::Answer))
+            .bind(left_out.of(ChecksummedTable::AnswerUndo));
         query.fetch_all(&mut conn).await
     }
 
@@ -256,8 +281,12 @@ impl Catalog {
         limit: usize,
     ) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(CHECK_ANSWERS).bind(after);
-        let query = query.bind(limit as i64);
+        let left_out = &self.left_out;
+        let query = query_as(CHECK_ANSWERS)
+            .bind(after)
+            .bind(limit as i64)
+            .bind(left_out.of(ChecksummedTable::Answer))
+            .bind(left_out.of(ChecksummedTable::AnswerUndo));
         query.fetch_all(&mut conn).await
     }
 

@@ -25,7 +25,7 @@ from_row! { ReviewRights { user: "user_name", quoted, adds_verdicts, reviews, is
 const RIGHTS: &str = "
 SELECT CAST(session_user AS text) AS user_name, quote_ident(session_user) AS quoted,
     has_any_column_privilege('verdict', 'INSERT') AS adds_verdicts,
-    (SELECT bool_and(has_any_column_privilege(name, 'INSERT')) FROM unnest(ARRAY['verdict', 'verdict_undo', 'attention_check_answer',
+    (SELECT bool_and(has_any_column_privilege(name, 'INSERT')) FROM unnest(ARRAY['review_act', 'verdict', 'verdict_undo', 'attention_check_answer',
         'attention_check_undo', 'manual_alignment', 'manual_alignment_undo', 'checksum']) AS name) AS reviews,
     row_security_active('verdict') AND NOT EXISTS (
         SELECT 1 FROM pg_roles WHERE rolname = 'mocban_worker' AND pg_has_role(oid, 'USAGE')) AS is_limited_to_own";

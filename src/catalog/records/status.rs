@@ -11,14 +11,16 @@ use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, Stage, Verdict};
 
-/// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts.
+/// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the verdicts
+/// that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
 const VERDICTS: &str = "
 SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
     WHERE n.pair = v.pair AND n.metric = v.metric AND n.reviewer = v.reviewer AND n.result_hash = v.result_hash
-        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
+        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
     AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
 GROUP BY v.verdict";
 

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::catalog::db::conn::Conn;
-use crate::catalog::db::query::{query, query_as, query_scalar};
+use crate::catalog::db::query::{As, Query, query, query_as, query_scalar};
 use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
+use crate::catalog::records::left_out::{LeftOut, is_counted};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
@@ -42,8 +43,7 @@ pub struct NewVerdict {
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
-    /// Number of the reviewer's action, which is the id of its first row. One action can judge several metrics of a
-    /// pair.
+    /// Number of the reviewer's action. One action can judge several metrics of a pair.
     pub act: i64,
     /// The pair.
     pub pair: PairName,
@@ -104,44 +104,68 @@ SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
     JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name = ?1 ORDER BY m.metric";
 
+/// Begins an action, unless a verdict with the same event and metric exists.
+const NEW_ACT: &str = "
+INSERT INTO review_act (reviewer) SELECT ?1
+WHERE ?2 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?2 AND metric = ?3)
+RETURNING id";
+
 const INSERT: &str = "
 INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, note, at,
     event, seen, shown_ms, angle_read_deg, review_order)
-SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
+SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
-RETURNING id, act";
+RETURNING id";
 
-/// Returns whether a verdict with an id up to `?9` has the same values and was not undone.
+/// Returns whether a verdict with an id up to `?9` has the same values, and was not undone or set apart.
 const IS_STORED: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict AS v
     WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
     AND v.verdict = ?5 AND v.reason IS NOT DISTINCT FROM ?6 AND v.note IS NOT DISTINCT FROM ?7
     AND v.at = ?8 AND v.id <= ?9
-    AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act))";
+    AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+    AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id))";
 
-/// Returns whether the reviewer's newest verdict on a result that was not undone has the same values.
+/// Returns whether the reviewer's newest verdict on a result that was not undone or set apart has the same values.
 const IS_NEWEST: &str = "
 SELECT EXISTS (SELECT 1 FROM (SELECT v.verdict, v.reason, v.note FROM verdict AS v
         WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+        AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id)
         ORDER BY v.id DESC LIMIT 1) AS last
     WHERE last.verdict = ?5 AND last.reason IS NOT DISTINCT FROM ?6 AND last.note IS NOT DISTINCT FROM ?7)";
 
 /// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
-/// that many rows.
-const LOG: &str = "
+/// that many rows. Leaves out the verdicts of `?5` and the undos of `?6`.
+const LOG: &str = concat!(
+    "
 SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
     v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, false) AS current
-FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
+FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act AND ",
+    is_counted!("u.act", "?6"),
+    "
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
-WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0)
-ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)";
+WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0) AND ",
+    is_counted!("v.id", "?5"),
+    "
+ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)"
+);
 
-pub(crate) const COUNTED: &str = "
+const UNDO: &str = "
+INSERT INTO verdict_undo (act, reviewer, at) SELECT id, reviewer, ?2 FROM review_act WHERE id = ?1";
+
+/// Selects the verdicts of the pairs of `?1`, without the verdicts of `?2` and the undos of `?3`.
+pub(crate) const COUNTED: &str = concat!(
+    "
 SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
 FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = CAST(wanted.atom AS bigint)
-WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
-ORDER BY v.pair, v.metric, v.reviewer, v.id";
+WHERE ",
+    is_counted!("v.id", "?2"),
+    " AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act AND ",
+    is_counted!("u.act", "?3"),
+    ")
+ORDER BY v.pair, v.metric, v.reviewer, v.id"
+);
 
 impl Catalog {
     /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
@@ -190,18 +214,12 @@ impl Catalog {
                 let Some(act) = act else {
                     return Err(CatalogError::NothingToUndo(reviewer));
                 };
-                query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
-                    .bind(act)
-                    .bind(now)
-                    .execute(&mut *conn)
-                    .await?;
+                query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
                 checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
-                let query = query_as(LOG)
-                    .bind(act)
-                    .bind(None::<&str>)
-                    .bind(None::<i64>)
-                    .bind(None::<i64>);
-                query.fetch_all(conn).await
+                let nothing = LeftOut::default();
+                select_log((Some(act), None), (None, None), &nothing)
+                    .fetch_all(conn)
+                    .await
             })
         })
         .await
@@ -213,7 +231,7 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
-        log(&mut conn, pair).await
+        log(&mut conn, pair, &self.left_out).await
     }
 
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
@@ -222,9 +240,10 @@ impl Catalog {
     /// Returns an error if a database operation fails.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(LOG).bind(None::<i64>).bind(None::<&str>);
-        let query = query.bind(after).bind(limit as i64);
-        query.fetch_all(&mut conn).await
+        let (after, limit) = (Some(after), Some(limit as i64));
+        select_log((None, None), (after, limit), &self.left_out)
+            .fetch_all(&mut conn)
+            .await
     }
 }
 
@@ -298,7 +317,17 @@ pub(crate) async fn insert(
     now: UnixMillis,
 ) -> Result<Option<i64>> {
     let look = &new.look;
-    let inserted: Option<(i64, i64)> = query_as(INSERT)
+    let act = if let Some(act) = act {
+        act
+    } else {
+        let begun = query_scalar(NEW_ACT).bind(&new.reviewer);
+        let begun = begun.bind(&look.event).bind(metric.name());
+        let Some(act) = begun.fetch_optional(&mut *conn).await? else {
+            return Ok(None);
+        };
+        act
+    };
+    let inserted: Option<i64> = query_scalar(INSERT)
         .bind(act)
         .bind(pair)
         .bind(metric.name())
@@ -315,7 +344,7 @@ pub(crate) async fn insert(
         .bind(look.review_order.map(ReviewOrder::name))
         .fetch_optional(&mut *conn)
         .await?;
-    let Some((row, act)) = inserted else {
+    let Some(row) = inserted else {
         return Ok(None);
     };
     checksums::store(conn, ChecksummedTable::Verdict, &[row]).await?;
@@ -323,11 +352,26 @@ pub(crate) async fn insert(
 }
 
 /// Reads the log of one pair or all.
-pub(crate) async fn log(conn: &mut Conn, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
-    let query = query_as(LOG).bind(None::<i64>);
-    let query = query.bind(pair.map(PairName::as_str));
-    let query = query.bind(None::<i64>).bind(None::<i64>);
-    query.fetch_all(conn).await
+pub(crate) async fn log(
+    conn: &mut Conn,
+    pair: Option<&PairName>,
+    left_out: &LeftOut,
+) -> Result<Vec<VerdictEvent>> {
+    select_log((None, pair), (None, None), left_out)
+        .fetch_all(conn)
+        .await
+}
+
+/// Returns the query of [`LOG`]: of an action or a pair, with rows after a number and at most so many.
+fn select_log(
+    (act, pair): (Option<i64>, Option<&PairName>),
+    (after, limit): (Option<i64>, Option<i64>),
+    left_out: &LeftOut,
+) -> Query<As<VerdictEvent>> {
+    let query = query_as(LOG).bind(act).bind(pair.map(PairName::as_str));
+    let query = query.bind(after).bind(limit);
+    let query = query.bind(left_out.of(ChecksummedTable::Verdict));
+    query.bind(left_out.of(ChecksummedTable::VerdictUndo))
 }
 
 /// Returns each reviewer's newest verdict on each result of the given pairs, sorted by reviewer. Ignores undone
@@ -335,9 +379,12 @@ pub(crate) async fn log(conn: &mut Conn, pair: Option<&PairName>) -> Result<Vec<
 pub(crate) async fn of_pairs(
     conn: &mut Conn,
     pairs: &[i64],
+    left_out: &LeftOut,
 ) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<ResultVerdict>>> {
-    let pairs = json_array(pairs.iter().copied());
-    let found: Vec<ResultVerdict> = query_as(COUNTED).bind(pairs).fetch_all(conn).await?;
+    let query = query_as(COUNTED).bind(json_array(pairs.iter().copied()));
+    let query = query.bind(left_out.of(ChecksummedTable::Verdict));
+    let query = query.bind(left_out.of(ChecksummedTable::VerdictUndo));
+    let found: Vec<ResultVerdict> = query.fetch_all(conn).await?;
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
     for newest in found {
         let of_metric = counted.entry((newest.pair, newest.metric)).or_default();

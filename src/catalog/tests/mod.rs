@@ -15,6 +15,7 @@ mod protocol;
 mod recovery;
 mod schema;
 mod server_plans;
+mod set_apart;
 mod silence;
 mod staleness;
 mod state_machine;

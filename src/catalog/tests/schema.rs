@@ -14,6 +14,8 @@ async fn check_constraints_and_enums_agree() {
     let mut conn = world.place.conn().await;
     let mut accepts = async |sql: &'static str, value: &str| {
         query("BEGIN").execute(&mut conn).await.expect("begun");
+        let act = query("INSERT INTO review_act (id, reviewer) VALUES (1, 'me')");
+        act.execute(&mut conn).await.expect("stored");
         let outcome = query(sql).bind(value).execute(&mut conn).await;
         query("ROLLBACK")
             .execute(&mut conn)

@@ -80,7 +80,7 @@ macro_rules! table_by_two {
 
 /// Every table, in an order in which no row refers to a later table. The counters are counted anew, and the settings of
 /// the last plan are not copied.
-pub(super) const TABLES: [CopyTable; 23] = [
+pub(super) const TABLES: [CopyTable; 25] = [
     table!("review_key", 2, "id", "key"),
     table!("worker", 11, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "block_settings",
         "died", "metrics"; numbered),
@@ -162,16 +162,17 @@ pub(super) const TABLES: [CopyTable; 23] = [
         "at_bound",
         "result_hash"; true
     ),
+    table!("review_act", 2, "id", "reviewer"; numbered),
     table!("verdict", 15, "id", "act", "pair", "metric", "result_hash", "verdict", "reviewer", "reason", "note", "at", "event",
         "seen", "shown_ms", "angle_read_deg", "review_order"; numbered),
-    table!("verdict_undo", 2, "act", "at"),
+    table!("verdict_undo", 3, "act", "reviewer", "at"),
     table!("truth", 2, "pair", "body"),
     table!("attention_check_answer", 15, "id", "event", "pair", "metric", "result_hash", "kind", "attention_check", "seen",
         "shown_ms", "angle_read_deg", "verdict", "reviewer", "reason", "note", "at"; numbered),
-    table!("attention_check_undo", 2, "answer", "at"),
+    table!("attention_check_undo", 3, "answer", "reviewer", "at"),
     table!("manual_alignment", 14, "id", "event", "pair", "mesh_hash", "print_hash", "depth_hash", "seen", "print_from_depth",
         "print_from_mesh", "iou", "dice", "reviewer", "note", "at"; numbered),
-    table!("manual_alignment_undo", 2, "alignment", "at"),
+    table!("manual_alignment_undo", 3, "alignment", "reviewer", "at"),
     table!(
         "retired_pair",
         7,
@@ -208,7 +209,8 @@ pub(super) const TABLES: [CopyTable; 23] = [
     table!("block_attempt", 8, "id", "block", "stage", "worker", "class", "message", "ms", "at"; numbered),
     table_by_two!("block_character", 10, "block", "label", "place", "character", "box", "confidence", "state", "reason", "maps",
         "pair"; true),
-    table_by_two!("checksum", 3, "record", "row", "value"; false),
+    table_by_two!("checksum", 4, "record", "row", "value", "previous"; false),
+    table_by_two!("set_apart", 5, "record", "row", "value", "fault", "at"; false),
 ];
 
 #[cfg(test)]

@@ -11,8 +11,10 @@ use crate::report::stats::{IntervalMethod, Rate};
 
 /// Returns the agreement as aligned tables, with a newline at the end.
 pub fn agreement_text(found: &ReviewerAgreement) -> String {
+    let sentence = found.set_apart.sentence();
+    let sentence = sentence.map(|text| wrapped("", &(text + ".")));
     if found.reviewers.is_empty() {
-        return "Nobody has judged a result yet.\n".to_owned();
+        return "Nobody has judged a result yet.\n".to_owned() + &sentence.unwrap_or_default();
     }
     let mut blocks = Vec::new();
     if found.reviewer_pairs.is_empty() {
@@ -25,6 +27,7 @@ pub fn agreement_text(found: &ReviewerAgreement) -> String {
     blocks.push(with_caption(&reviewers(found)));
     let conflicts = format_count(found.conflicts);
     blocks.push(format!("Conflicts waiting: {conflicts}\n"));
+    blocks.extend(sentence);
     blocks.join("\n")
 }
 
