@@ -52,7 +52,6 @@ pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
-pub use db::postgres_address::has_password;
 pub use db::roles::{ROLES, initialize_database, roles_sql};
 pub use handle::Catalog;
 pub use new_catalog::NewCatalog;

@@ -14,9 +14,9 @@ use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
-use crate::catalog::{Catalog, has_password};
+use crate::catalog::Catalog;
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
-use crate::domain::{UnixMillis, is_hidden};
+use crate::domain::{UnixMillis, has_password, is_hidden};
 use crate::runner;
 use crate::store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 
