@@ -5,6 +5,7 @@
 
 mod document;
 mod error;
+mod passwords;
 mod ranges;
 mod sources;
 mod tree;
@@ -37,6 +38,8 @@ pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
     for (key, value, origin) in sources.single_values(&tree)? {
         changes.extend(tree.change(&key, value, &origin)?);
     }
+    // First, because errors quote values.
+    changes.iter().try_for_each(passwords::refuse)?;
     for change in &changes {
         tree.apply(change);
     }
