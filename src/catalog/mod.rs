@@ -83,4 +83,4 @@ pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Show
 pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
-pub use transfer::CopiedTable;
+pub use transfer::{CatalogCopy, CopiedTable, CopyProgress};

@@ -315,6 +315,17 @@ impl Context {
     }
 }
 
+/// Returns the settings of the file in a project folder, without those of the environment and of flags.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, or has an invalid setting.
+pub(super) fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
+    load(&Sources {
+        base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
+        ..Sources::default()
+    })
+}
+
 /// Returns whether the settings could not be read.
 fn is_unread(error: &anyhow::Error) -> bool {
     matches!(error.downcast_ref(), Some(ConfigError::Read { .. }))

@@ -14,6 +14,8 @@ mod blocks;
 mod browser;
 mod check;
 mod cli;
+#[cfg(unix)]
+mod copies;
 mod corruption;
 mod creation;
 #[cfg(target_os = "linux")]
