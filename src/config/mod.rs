@@ -5,6 +5,7 @@
 
 mod document;
 mod error;
+mod local;
 mod passwords;
 mod ranges;
 mod sources;
@@ -12,6 +13,7 @@ mod tree;
 
 pub use document::{Config, InputLimits, ReviewSettings, RunSettings, StorageSettings};
 pub use error::{ConfigError, Origin, hint, nearest};
+pub use local::{LocalSettings, make_local};
 pub use sources::{BaseLayer, Preset, Sources, explanation};
 pub use tree::{Setting, Tree};
 

@@ -10,8 +10,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::check::done;
-use crate::cli::{Call, binary, empty, mocban};
+use crate::cli::{Call, binary, call, empty, mocban};
 use crate::postgres_server::url;
+use crate::resume::copy_folder;
 use crate::test_size::trials;
 
 /// Pairs of a list without files.
@@ -238,4 +239,81 @@ fn a_copy_of_a_catalog_that_changes_has_the_state_of_one_moment() {
         assert!(pairs >= 1000 && pairs.is_multiple_of(50), "{pairs}");
         on(root, &to, &["check"]).expect(0);
     }
+}
+
+/// A backup of a catalog on a server, restored: no command on it reaches the server.
+#[test]
+fn a_restored_project_is_local() {
+    let dir = empty();
+    let root = dir.path();
+    done(root);
+    let server = schema().inspect(|server| {
+        copy(root, "p", server).expect(0);
+    });
+    let server = server.as_deref().unwrap_or("postgres://me@db.invalid/lab");
+    let is_there = url().is_some();
+    let settings = format!(
+        "# lab\n[depth]\nlongest_px = 96\n[storage] # ours\ncatalog = '{server}'\nartifacts = 's3://mocban-no-bucket/x'\ncache_gb = 7\n"
+    );
+    std::fs::write(root.join("p/mocban.toml"), &settings).expect("written");
+    let backup = ["-C", "p", "--set", "storage.artifacts=", "backup", "b"];
+    let file = ["--catalog", ""];
+    let file: &[&str] = if is_there { &[] } else { &file };
+    mocban(root, &[file, &backup[..]].concat()).expect(0);
+    let log = |place: &str| on(root, place, &["verdict", "log", "--json"]).expect(0).out;
+    let before = is_there.then(|| log(server));
+
+    // A variable or flag would lead the next commands to another catalog.
+    for (arguments, variable) in [
+        (&[] as &[&str], Some(("MOCBAN_STORAGE__CATALOG", server))),
+        (&[], Some(("MOCBAN_STORAGE_ARTIFACTS", "s3://lab/x"))),
+        (&["--catalog", server], None),
+        (&["--set", "storage.artifacts=s3://lab/x"], None),
+    ] {
+        let mut command = binary();
+        command.current_dir(root).envs(variable).args(arguments);
+        let refused = call(command.args(["restore", "b", "q"])).expect(2);
+        assert!(refused.err.contains("would work there"), "{}", refused.err);
+        assert!(!root.join("q").exists());
+    }
+    std::fs::create_dir(root.join("taken")).expect("a folder");
+    std::fs::write(root.join("taken/mocban.toml"), &settings).expect("written");
+    let refused = mocban(root, &["restore", "b", "taken"]).expect(2);
+    assert!(
+        refused
+            .err
+            .contains("taken/mocban.toml sets storage.catalog")
+    );
+    assert_eq!(crate::backup::files(&root.join("taken")), ["mocban.toml"]);
+
+    copy_folder(&root.join("p/data"), &root.join("q/data"));
+    let told = mocban(root, &["restore", "b", "q", "--json"]).expect(0);
+    let removed = &told.json()["settings_removed"];
+    let expected = serde_json::json!(["storage.catalog", "storage.artifacts"]);
+    assert_eq!(removed, &expected);
+    assert!(
+        told.err.contains("commented out storage.catalog"),
+        "{}",
+        told.err
+    );
+    let restored = std::fs::read_to_string(root.join("q/mocban.toml")).expect("settings");
+    let kept: Vec<_> = settings
+        .lines()
+        .filter(|line| !line.contains("://"))
+        .collect();
+    let found: Vec<_> = restored
+        .lines()
+        .filter(|line| !line.contains("://"))
+        .collect();
+    let without_reason = |line: &&&str| kept.contains(*line);
+    assert_eq!(found.iter().filter(without_reason).count(), kept.len());
+    for line in restored.lines().filter(|line| line.contains("://")) {
+        assert!(line.starts_with('#'), "{line}");
+    }
+    let verdict = ["verdict", "set", "upright-0001", "fail", "--reviewer", "x"];
+    mocban(root, &[&["-C", "q"], &verdict[..]].concat()).expect(0);
+    mocban(root, &["-C", "q", "check", "--repair"]).expect(0);
+    mocban(root, &["-C", "q", "status"]).expect(0);
+    assert_eq!(is_there.then(|| log(server)), before);
+    assert!(log("q").contains("\"x\""));
 }
