@@ -317,3 +317,23 @@ fn a_restored_project_is_local() {
     assert_eq!(is_there.then(|| log(server)), before);
     assert!(log("q").contains("\"x\""));
 }
+
+/// The file in the folder is not what the settings name.
+#[test]
+fn invalid_settings_that_may_name_a_server_do_not_lead_to_the_file() {
+    let dir = empty();
+    let root = dir.path();
+    import(root, "p", "a", 1);
+    let log = || mocban(root, &["-C", "p", "verdict", "log"]);
+    let write = |text: &str| std::fs::write(root.join("p/mocban.toml"), text).expect("written");
+    write("[depht]\nlongest_px = 96\n# storage\n");
+    log().expect(0);
+    for form in [
+        "[storage]\ncatalog = 'postgres://me@db.example/lab'",
+        "\"stor\\u0061ge\" = { catalog = 'postgres://me@db.example/lab' }",
+    ] {
+        write(&format!("{form}\n[depht]\nlongest_px = 96\n"));
+        let refused = log().expect(2);
+        assert!(refused.err.contains("depht"), "{}", refused.err);
+    }
+}
