@@ -81,6 +81,8 @@ mod power;
 mod processes;
 mod queue;
 mod readers;
+#[cfg(unix)]
+mod refused_writes;
 mod renamed;
 mod report;
 mod resume;
