@@ -14,9 +14,9 @@ use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
-use crate::catalog::{Catalog, SetApart, has_password};
+use crate::catalog::{Catalog, SetApart};
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
-use crate::domain::{UnixMillis, is_hidden};
+use crate::domain::{UnixMillis, has_password, is_hidden};
 use crate::runner;
 use crate::store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 
@@ -204,6 +204,11 @@ impl Context {
         &self,
     ) -> anyhow::Result<(Option<ProjectStorage>, Option<String>)> {
         let settings = self.settings();
+        if let Err(error) = &settings
+            && self.may_name_places(error)
+        {
+            return settings.map(|_| (None, None));
+        }
         let storage = Self::storage(settings.as_ref().ok())?;
         Ok((storage, self.catalog_of(settings)?))
     }
@@ -226,8 +231,8 @@ impl Context {
     /// Returns the URL of the catalog in PostgreSQL, or `None` if the catalog is a file in the project.
     ///
     /// # Errors
-    /// Returns an error if the URL on the command line has a password, or if the settings are invalid and no catalog
-    /// file shows where the catalog is.
+    /// Returns an error if the URL on the command line has a password, or if the settings are invalid and may name a
+    /// catalog elsewhere, or no catalog file shows where the catalog is.
     pub(super) fn catalog_url(&self) -> anyhow::Result<Option<String>> {
         self.catalog_of(self.settings())
     }
@@ -243,7 +248,11 @@ impl Context {
                 Ok(Some(url).filter(|url| !url.is_empty()))
             }
             // Commands that need no settings work with invalid ones, but not with a file that cannot be read.
-            Err(error) if self.dir().join(CATALOG_FILE).exists() && !is_unread(&error) => Ok(None),
+            Err(error)
+                if self.dir().join(CATALOG_FILE).exists() && !self.may_name_places(&error) =>
+            {
+                Ok(None)
+            }
             Err(error) => Err(error),
         }
     }
@@ -259,6 +268,10 @@ impl Context {
     }
 
     fn load_settings(&self) -> anyhow::Result<Loaded> {
+        Ok(load(&self.sources())?)
+    }
+
+    fn sources(&self) -> Sources {
         let base = match &self.global.config {
             Some(name) => name
                 .parse()
@@ -269,7 +282,13 @@ impl Context {
             .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)))
             .collect();
         let sets = self.global.set.clone();
-        Ok(load(&Sources { base, env, sets })?)
+        Sources { base, env, sets }
+    }
+
+    /// Returns whether invalid settings may name a catalog or artifacts elsewhere. Then a command must not use the files in
+    /// the project's folder instead.
+    fn may_name_places(&self, error: &anyhow::Error) -> bool {
+        is_unread(error) || self.sources().may_set("storage")
     }
 
     /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
@@ -320,6 +339,17 @@ impl Context {
     pub(super) fn program_with(&self, tail: &str) -> String {
         format!("{} {tail}", self.program)
     }
+}
+
+/// Returns the settings of the file in a project folder, without those of the environment and of flags.
+///
+/// # Errors
+/// Returns an error if the file cannot be read, or has an invalid setting.
+pub(super) fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
+    load(&Sources {
+        base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
+        ..Sources::default()
+    })
 }
 
 /// Returns whether the settings could not be read.

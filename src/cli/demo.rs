@@ -61,21 +61,16 @@ pub(super) struct DemoArgs {
 
 pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let dir = demo_dir(&args, context);
-    let context = &save_settings(&dir, &context.at(&dir))?;
-    if let Some(kind) = args.block {
-        let options = BlockOptions {
-            kind,
-            seed: args.seed,
-            spacing_mm: args.spacing,
-        };
-        return block_demo(&dir, options, &args, context).await;
-    }
-    let options = DemoOptions {
-        pairs: args.pairs,
-        seed: args.seed,
-        tier: args.tier,
+    let content = content(&args);
+    let context = context.at(&dir);
+    // Before settings and data are written there.
+    check_directory(&dir, &dir.join("data"), &content)?;
+    context.data_locations()?;
+    let context = &save_settings(&dir, &context)?;
+    let options = match content {
+        DemoContent::Block(options) => return block_demo(&dir, options, &args, context).await,
+        DemoContent::Pairs(options) => options,
     };
-    let options = options.limited();
     let Some(files) = create_dataset(&dir, options, context).await? else {
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);
@@ -92,6 +87,23 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         return Ok(ExitCode::Done);
     }
     align(&dir, None, context).await
+}
+
+/// Returns what the demo is to contain.
+fn content(args: &DemoArgs) -> DemoContent {
+    if let Some(kind) = args.block {
+        return DemoContent::Block(BlockOptions {
+            kind,
+            seed: args.seed,
+            spacing_mm: args.spacing,
+        });
+    }
+    let options = DemoOptions {
+        pairs: args.pairs,
+        seed: args.seed,
+        tier: args.tier,
+    };
+    DemoContent::Pairs(options.limited())
 }
 
 /// Creates a whole block, imports and runs it.

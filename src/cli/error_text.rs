@@ -1,7 +1,7 @@
 //! The exit code and the message of an error.
 
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::exit::{ExitCode, Refusal};
 use super::time_text::local;
@@ -57,7 +57,10 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         | CatalogError::TransactionPooler(_)
         | CatalogError::MayNotCreateRoles(_)
         | CatalogError::MayNotReview(_)
-        | CatalogError::OtherReviewer { .. } => Some(ExitCode::Usage),
+        | CatalogError::OtherReviewer { .. }
+        | CatalogError::NotEmpty(_)
+        | CatalogError::SameCatalog(_)
+        | CatalogError::FinishedCopy { .. } => Some(ExitCode::Usage),
         error if error.is_of_pooler() => Some(ExitCode::Usage),
         error if error.is_of_server() && error.kind() == Some(CatalogErrorKind::ReadOnly) => {
             Some(ExitCode::Usage)
@@ -74,6 +77,27 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
 }
 
+/// Context of an error that names the project folder of its catalog, if that is not the folder of the command.
+#[derive(Debug)]
+pub(super) struct ErrorPlace {
+    dir: PathBuf,
+    text: String,
+}
+
+impl ErrorPlace {
+    /// Makes the context of an error of a catalog in a folder. The text precedes errors without an explanation.
+    pub(super) fn new(dir: impl Into<PathBuf>, text: String) -> Self {
+        let dir = dir.into();
+        Self { dir, text }
+    }
+}
+
+impl std::fmt::Display for ErrorPlace {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
 /// Returns the message for an error: the explanation of a catalog error, or otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
     if is_out_of_files(error) {
@@ -82,6 +106,8 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
             platform::max_open_files()
         );
     }
+    let place = error.downcast_ref::<ErrorPlace>();
+    let project = place.map_or(project, |place| &place.dir);
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     let text = explained.unwrap_or_else(|| {
         let mut text = join_causes(error);

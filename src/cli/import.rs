@@ -132,8 +132,9 @@ pub(super) async fn import_pairs(
         truths,
         allow_missing: args.allow_missing,
     });
+    let check = async || check_rows(&project, &list).await;
     let import = async |catalog: &Catalog| store_in(catalog, &project, &list).await;
-    let (summary, truths, missing) = import_with(&project, url.as_deref(), import).await?;
+    let (summary, truths, missing) = import_with(&project, url.as_deref(), check, import).await?;
     Ok(ImportOutcome {
         summary,
         truths,
@@ -169,6 +170,15 @@ async fn store_in(
         .context("the task that reads the list stopped")??;
     let (summary, truths) = stored?;
     Ok((summary, truths, missing))
+}
+
+/// Refuses a list that [`store_in`] would refuse because of a file.
+async fn check_rows(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<()> {
+    // Nobody receives the rows.
+    let (sender, _) = mpsc::channel(1);
+    let (project, list) = (project.clone(), Arc::clone(list));
+    let checked = tokio::task::spawn_blocking(move || send_rows(&list, &project, &sender));
+    checked.await?.map(|_| ())
 }
 
 /// Sends the rows to the catalog in chunks. Returns the missing files.

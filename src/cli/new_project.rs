@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::catalog::{Catalog, NewCatalog};
+use crate::catalog::{Catalog, CatalogError, NewCatalog};
 use crate::store::Project;
 
 /// Returns the missing directories of a path, the deepest first.
@@ -14,17 +14,19 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded.
+/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded. A new catalog on a
+/// server is created when `check` has succeeded, which refuses what `import` would refuse.
 ///
 /// # Errors
-/// Returns the error of `import`, or an error if the catalog or the disk fails.
+/// Returns the error of `check` or `import`, or an error if the catalog or the disk fails.
 pub(super) async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
+    check: impl AsyncFnOnce() -> anyhow::Result<()>,
     import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
     let missing_dirs = missing_dirs(project.dir());
-    let stored = store(project, url, import).await;
+    let stored = store(project, url, check, import).await;
     if stored.is_err() {
         // Fails, as it should, if another process put something there.
         let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
@@ -35,11 +37,18 @@ pub(super) async fn import_with<T>(
 async fn store<T>(
     project: &Project,
     url: Option<&str>,
+    check: impl AsyncFnOnce() -> anyhow::Result<()>,
     import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
-        let catalog = Catalog::connect(url, true).await?;
+        let catalog = match Catalog::connect(url, false).await {
+            Err(CatalogError::NoSchema(_)) => {
+                check().await?;
+                Catalog::connect(url, true).await?
+            }
+            catalog => catalog?,
+        };
         let stored = import(&catalog).await;
         catalog.close().await;
         return stored;

@@ -76,6 +76,10 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
             .map_or(Ok(ReportFormat::Text), format_of_file)?,
     };
     let format = chosen_format(format, context);
+    if args.compare.is_some() && !matches!(format, ReportFormat::Text | ReportFormat::Json) {
+        let text = format!("--compare needs the format text or json, not {format}");
+        return Err(Refusal::Usage(text).into());
+    }
     let busy = Busy::start(context, "reading the results");
     let mut pictures = GallerySelection::new(IMAGE_SEED);
     let report = if format == ReportFormat::Html {
@@ -165,7 +169,7 @@ async fn pictured(
     Ok((page(report, &gallery, &cover), problems.is_empty()))
 }
 
-/// Renders this project's report with another one.
+/// Renders this project's report with another one, as text or JSON.
 async fn compared(
     here: &Report,
     other: &Path,
@@ -174,21 +178,13 @@ async fn compared(
 ) -> anyhow::Result<String> {
     let there = read(&context.at(other)).await?.with_interval(here.interval);
     let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
-    match format {
-        ReportFormat::Text => {
-            let tables = side_by_side(here, &there, [&names[0], &names[1]]);
-            Ok(format!("{}\n{tables}", render(here, format)))
-        }
-        ReportFormat::Json => {
-            let mut value = serde_json::to_value(here)?;
-            value["compared_with"] = json!({"project": names[1], "report": there});
-            Ok(serde_json::to_string_pretty(&value)?)
-        }
-        _ => {
-            let text = format!("--compare needs the format text or json, not {format}");
-            Err(Refusal::Usage(text).into())
-        }
+    if format == ReportFormat::Json {
+        let mut value = serde_json::to_value(here)?;
+        value["compared_with"] = json!({"project": names[1], "report": there});
+        return Ok(serde_json::to_string_pretty(&value)?);
     }
+    let tables = side_by_side(here, &there, [&names[0], &names[1]]);
+    Ok(format!("{}\n{tables}", render(here, format)))
 }
 
 /// Prints the beginning of the report to stdout, or with `--json` the whole report.

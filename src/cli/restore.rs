@@ -14,9 +14,9 @@ use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
+use crate::config::{LocalSettings, make_local};
 use crate::store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
-    write_synced,
+    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
 };
 
 /// Arguments of `restore`.
@@ -42,6 +42,7 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         check_inputs(inputs)?;
     }
     check_directory(&Project::at(&dir))?;
+    require_local(&context.at(&dir))?;
     let existed = dir.exists();
     let busy = Busy::start(context, "restoring the project");
     let restored = restore_into(&backup, &dir, inputs.as_deref()).await;
@@ -54,7 +55,8 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
     let (pairs, verdicts) = (restored.pairs, restored.verdicts);
     context.print_json(&json!({
         "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
-        "settings": restored.has_settings, "inputs_missing": restored.missing.len(),
+        "settings": restored.settings.is_some(), "inputs_missing": restored.missing.len(),
+        "settings_removed": restored.settings.as_ref().map_or(&[][..], |settings| &settings.removed),
     }))?;
     let places = match &inputs {
         None => "their old places".to_owned(),
@@ -74,6 +76,15 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
             inputs.display()
         ));
     }
+    if let Some(removed) = restored.settings.map(|settings| settings.removed)
+        && !removed.is_empty()
+    {
+        context.warn(&format!(
+            "the restored project uses only its own folder: in {}, `restore` commented out {}; that file says how to use a server again",
+            dir.join(SETTINGS_FILE).display(),
+            removed.join(", ")
+        ));
+    }
     let context = context.at(&dir);
     context.next("check --repair");
     context.next("run");
@@ -84,7 +95,8 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
 struct Restored {
     pairs: u64,
     verdicts: u64,
-    has_settings: bool,
+    /// Settings of the backup, made local.
+    settings: Option<LocalSettings>,
     /// Paths of meshes and prints that `--inputs` did not find.
     missing: Vec<String>,
 }
@@ -112,16 +124,25 @@ async fn restore_into(
         }
     };
     let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
-    // Another process may have created a project in the meantime.
     check_directory(&project)?;
-    if let Some(bytes) = &settings {
-        write_settings(&project, bytes, staging.path()).with_context(failed)?;
+    let settings = settings.as_deref().map(make_local);
+    let wrote_settings = match &settings {
+        Some(settings) => {
+            write_settings(&project, &settings.text, staging.path()).with_context(failed)?
+        }
+        None => false,
+    };
+    if !place_new_file(&new, &catalog).with_context(failed)? {
+        // Another process created a project in the meantime, which has no settings of its own.
+        if wrote_settings {
+            let _ = std::fs::remove_file(project.settings_path());
+        }
+        return Err(is_project_already(&project));
     }
-    rename_into_place(&new, &catalog).with_context(failed)?;
     Ok(Restored {
         pairs,
         verdicts,
-        has_settings: settings.is_some(),
+        settings,
         missing,
     })
 }
@@ -152,19 +173,53 @@ async fn locate_inputs(
     Ok(missing?)
 }
 
-/// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it.
-fn write_settings(project: &Project, bytes: &[u8], staging: &Path) -> anyhow::Result<()> {
+/// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it. Returns
+/// whether the file was written.
+fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Result<bool> {
     let path = project.settings_path();
-    if files::small(&path)?.is_some_and(|found| found != bytes) {
-        let text = format!(
-            "{} exists and differs from the settings in the backup; rename it",
-            path.display()
-        );
-        return Err(Refusal::Usage(text).into());
-    }
     let new = staging.join(SETTINGS_FILE);
-    write_synced(&new, bytes)?;
-    Ok(rename_into_place(&new, &path)?)
+    write_synced(&new, text.as_bytes())?;
+    if place_new_file(&new, &path)? {
+        return Ok(true);
+    }
+    if files::small(&path)?.is_some_and(|found| found == text.as_bytes()) {
+        return Ok(false);
+    }
+    let text = format!(
+        "{} exists and differs from the settings that the backup would write there; rename it",
+        path.display()
+    );
+    Err(Refusal::Usage(text).into())
+}
+
+/// Refuses settings of the environment, of flags or of a file in the directory that lead commands in it to a catalog on a
+/// server or to an object store, instead of what was restored.
+fn require_local(context: &Context) -> anyhow::Result<()> {
+    let settings = context.settings()?;
+    let storage = &settings.config.storage;
+    let catalog = context.catalog_url()?.unwrap_or_default();
+    for (key, place, instead) in [
+        ("storage.catalog", &catalog, "--catalog ''"),
+        (
+            "storage.artifacts",
+            &storage.artifacts,
+            "--set storage.artifacts=",
+        ),
+    ] {
+        if place.is_empty() {
+            continue;
+        }
+        let origin = if key == "storage.catalog" && context.global.catalog.is_some() {
+            "--catalog".to_owned()
+        } else {
+            settings.tree.origin(key).to_string()
+        };
+        return Err(Refusal::Usage(format!(
+            "{origin} sets {key} to {place}, so commands on the restored project would work there and not in its folder; remove that setting, or give {instead} to this command and all others on the project"
+        ))
+        .into());
+    }
+    Ok(())
 }
 
 /// Refuses inputs that are not a directory.
@@ -208,8 +263,15 @@ fn check_directory(project: &Project) -> anyhow::Result<()> {
         .with_context(|| format!("cannot read {shown}"))?
         .is_some()
     {
-        let text = format!("{shown} is a project already; name another directory");
-        return Err(Refusal::Usage(text).into());
+        return Err(is_project_already(project));
     }
     Ok(())
+}
+
+fn is_project_already(project: &Project) -> anyhow::Error {
+    let shown = project.dir().display();
+    Refusal::Usage(format!(
+        "{shown} is a project already; name another directory"
+    ))
+    .into()
 }

@@ -5,12 +5,15 @@
 
 mod document;
 mod error;
+mod local;
+mod passwords;
 mod ranges;
 mod sources;
 mod tree;
 
 pub use document::{Config, InputLimits, ReviewSettings, RunSettings, StorageSettings};
 pub use error::{ConfigError, Origin, hint, nearest};
+pub use local::{LocalSettings, make_local};
 pub use sources::{BaseLayer, Preset, Sources, explanation};
 pub use tree::{Setting, Tree};
 
@@ -37,6 +40,8 @@ pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
     for (key, value, origin) in sources.single_values(&tree)? {
         changes.extend(tree.change(&key, value, &origin)?);
     }
+    // First, because errors quote values.
+    changes.iter().try_for_each(passwords::refuse)?;
     for change in &changes {
         tree.apply(change);
     }

@@ -120,6 +120,32 @@ impl Sources {
         }
     }
 
+    /// Returns whether a layer may set a key of a section, although the settings may be invalid: whether the project's file
+    /// contains the name, or a variable or flag begins with it. Any other file may.
+    pub fn may_set(&self, section: &str) -> bool {
+        let in_file = match &self.base {
+            BaseLayer::Preset(_) => false,
+            // A pipe cannot be read twice.
+            BaseLayer::File(_) => true,
+            BaseLayer::Project(path) => {
+                let bytes = read_file_or_pipe(path, MAX_FILE_BYTES).unwrap_or_default();
+                // A key may be written with escapes.
+                let text = String::from_utf8_lossy(&bytes);
+                text.lines()
+                    .any(|line| !line.trim_start().starts_with('#') && line.contains(section))
+                    || text.contains("\\u")
+                    || text.contains("\\x")
+            }
+        };
+        let prefix = format!("MOCBAN_{}_", section.to_ascii_uppercase());
+        in_file
+            || self.env.iter().any(|(name, _)| name.starts_with(&prefix))
+            || self
+                .sets
+                .iter()
+                .any(|set| set.trim_start().starts_with(section))
+    }
+
     /// Returns the settings from environment variables, followed by the settings from flags.
     pub(super) fn single_values(
         &self,

@@ -156,7 +156,8 @@ fn dotted(prefix: &str, key: &str) -> String {
     }
 }
 
-fn flatten(table: &Table, prefix: &str, visit: &mut impl FnMut(String, &Value)) {
+/// Passes each value that is not a table with content to `visit`, with its dotted key.
+pub(super) fn flatten(table: &Table, prefix: &str, visit: &mut impl FnMut(String, &Value)) {
     for (key, value) in table {
         match value {
             Value::Table(inner) if !inner.is_empty() => flatten(inner, &dotted(prefix, key), visit),

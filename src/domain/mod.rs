@@ -1,5 +1,6 @@
 //! Domain types: small values that do not use files, SQL, async code or image buffers.
 
+mod address;
 mod alignment_prior;
 mod artifact;
 pub mod artifact_role;
@@ -31,6 +32,7 @@ mod unit;
 mod verdict;
 mod worker_metrics;
 
+pub use address::{has_password, is_address, without_password};
 pub use alignment_prior::AlignmentPrior;
 pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
 pub use attention_check::AttentionCheck;

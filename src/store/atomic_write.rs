@@ -63,10 +63,32 @@ pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
         std::fs::set_permissions(partial, earlier.permissions())?;
     }
     rename(partial, path)?;
+    sync_name(path)
+}
+
+/// Makes the new name of a file durable.
+fn sync_name(path: &Path) -> std::io::Result<()> {
     sync_folder(&parent_folder(path)).map_err(|error| {
         let text = format!("the file is complete, but the disk did not confirm its name: {error}");
         std::io::Error::new(error.kind(), text)
     })
+}
+
+/// Syncs a complete file and gives it its final name, unless that name is taken. Returns whether the file was renamed.
+///
+/// # Errors
+/// Returns an error if the file system does, or if the new name may not survive a power cut.
+pub fn place_new_file(partial: &Path, path: &Path) -> std::io::Result<bool> {
+    sync_file(partial)?;
+    match tempfile::TempPath::try_from_path(partial)?.persist_noclobber(path) {
+        Ok(()) => {}
+        Err(refused) if refused.error.kind() == std::io::ErrorKind::AlreadyExists => {
+            return Ok(false);
+        }
+        Err(refused) => return Err(refused.error),
+    }
+    sync_name(path)?;
+    Ok(true)
 }
 
 /// Sets the time of change of a file to the present, so that it is not removed as an old unreferenced file. Returns

@@ -20,7 +20,7 @@ mod staging;
 mod target_lock;
 
 pub use artifacts::{ArtifactError, NewArtifact};
-pub use atomic_write::{rename_into_place, write_atomic, write_synced};
+pub use atomic_write::{place_new_file, rename_into_place, write_atomic, write_synced};
 pub use input_error::InputError;
 pub use input_place::Input;
 pub use inputs::{

@@ -103,6 +103,12 @@ fn restore(root: &Path) -> Command {
     command
 }
 
+fn copy_catalog(root: &Path) -> Command {
+    let mut command = binary();
+    command.arg("copy").arg(root.join("p")).arg(root.join("q"));
+    command
+}
+
 fn verdict_import(root: &Path) -> Command {
     let mut command = command(root, &["verdict", "import"]);
     command.arg(root.join("verdicts.csv"));
@@ -171,6 +177,28 @@ const VERDICT_IMPORT: FaultScenario = FaultScenario {
     },
 };
 
+const COPY: FaultScenario = FaultScenario {
+    before: |comparison, root| {
+        copy(comparison.expected.project(), &root.join("p"));
+        judge(root, "pass");
+    },
+    command: copy_catalog,
+    after: |_, root, done| {
+        let is_there = root.join("q/catalog.sqlite").exists();
+        assert!(is_there || !done);
+        // A catalog that is there is a whole one, so the same command has nothing to write.
+        let mut again = copy_catalog(root);
+        let again = call(again.arg("--json")).expect(0).json();
+        assert_eq!(again["existed"], is_there);
+        let log = |name| {
+            mocban(root, &["-C", name, "verdict", "log", "--json"])
+                .expect(0)
+                .out
+        };
+        assert_eq!(log("p"), log("q"));
+    },
+};
+
 const RESTORE: FaultScenario = FaultScenario {
     before: |comparison, root| {
         let project = copy(comparison.expected.project(), &root.join("p"));
@@ -223,6 +251,11 @@ fn a_contact_sheet_is_whole_whichever_call_fails() {
 #[test]
 fn verdicts_are_imported_all_or_none_whichever_call_fails() {
     VERDICT_IMPORT.check_all(ANY, fault_points());
+}
+
+#[test]
+fn a_copy_is_whole_whichever_call_fails() {
+    COPY.check_all(ANY, fault_points());
 }
 
 #[test]

@@ -14,6 +14,8 @@ mod blocks;
 mod browser;
 mod check;
 mod cli;
+#[cfg(unix)]
+mod copies;
 mod corruption;
 mod creation;
 #[cfg(target_os = "linux")]
@@ -42,8 +44,8 @@ mod fault_scenario;
 mod faults;
 #[cfg(unix)]
 mod fleet;
-#[cfg(target_os = "linux")]
 mod foreign_schema;
+#[cfg(target_os = "linux")]
 mod grid_print;
 mod hanging;
 mod hostile;
@@ -82,6 +84,8 @@ mod power;
 mod processes;
 mod queue;
 mod readers;
+#[cfg(unix)]
+mod refused_writes;
 mod renamed;
 mod report;
 mod resume;

@@ -94,19 +94,12 @@ impl Catalog {
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                if let Conn::Postgres(_) = conn {
-                    query(LOCK_COUNTERS).execute(&mut *conn).await?;
+                // Before the jobs are changed, so that heartbeats wait.
+                lock_counters(conn).await?;
+                for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
+                    query(sql).execute(&mut *conn).await?;
                 }
-                let marks = [FIX_FINGERPRINTS, MARK_DIRTY].map(Sql::from);
-                for sql in marks.iter().chain(&RESET_COUNTERS) {
-                    query(*sql).execute(&mut *conn).await?;
-                }
-                let mut deltas = Deltas::default();
-                for (key, jobs) in count_jobs(conn).await? {
-                    deltas.add(key, jobs.cast_signed());
-                }
-                deltas.apply(conn).await?;
-                Ok(())
+                recount(conn).await
             })
         })
         .await
@@ -155,6 +148,26 @@ impl Catalog {
         })
         .await
     }
+}
+
+async fn lock_counters(conn: &mut Conn) -> Result<()> {
+    match conn {
+        Conn::Postgres(_) => query(LOCK_COUNTERS).execute(conn).await,
+        Conn::Sqlite(_) => Ok(()),
+    }
+}
+
+/// Recounts all counters in an open transaction.
+pub(crate) async fn recount(conn: &mut Conn) -> Result<()> {
+    lock_counters(conn).await?;
+    for sql in RESET_COUNTERS {
+        query(sql).execute(&mut *conn).await?;
+    }
+    let mut deltas = Deltas::default();
+    for (key, jobs) in count_jobs(conn).await? {
+        deltas.add(key, jobs.cast_signed());
+    }
+    deltas.apply(conn).await
 }
 
 async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {

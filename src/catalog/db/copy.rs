@@ -49,10 +49,11 @@ impl Catalog {
 
     /// Like [`Self::back_up`], for a catalog in PostgreSQL.
     async fn back_up_from_server(&self, file: &Path, settings: Option<&[u8]>) -> Result<()> {
-        let copy = Self::create(file).await?;
-        let copied = self.copy_to(&copy, |_, _| {}).await;
-        copy.close().await;
-        copied?;
+        let copied = self.copy_to_file(file, |_, _| {}).await;
+        copied.map_err(|error| match error {
+            CatalogError::Original(error) => *error,
+            error => error,
+        })?;
         let stored = store_settings(file, settings).await;
         stored.map_err(|error| disk_error(file, error))?;
         verify(file).await

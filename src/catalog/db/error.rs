@@ -142,13 +142,33 @@ pub enum CatalogError {
         reviewer: String,
     },
     /// The target of a copy holds another catalog.
-    #[error("{0} holds another catalog; give an empty target")]
+    #[error("{0} holds another catalog, so nothing was copied; name a target without a catalog")]
     NotEmpty(PathBuf),
-    /// After a copy, a table differs from the original.
+    /// The target of a copy is the original.
+    #[error("{0} is the catalog to copy itself, so nothing was copied; name another target")]
+    SameCatalog(PathBuf),
+    /// The target of a copy is a finished copy, and one of both catalogs has changed.
     #[error(
-        "the table {0} of the copy differs from the original, which changed since the copy was begun; remove the copy, and copy again while no run is active"
+        "{target} is a finished copy of this catalog, but the table {table} differs ({original_rows} rows in the original, {copy_rows} in the copy), because one of them was used since; nothing was written, so both are as they were: go on with one of them, or name a target without a catalog for another copy"
+    )]
+    FinishedCopy {
+        /// The target.
+        target: PathBuf,
+        /// The first table that differs.
+        table: &'static str,
+        /// Number of its rows in the original.
+        original_rows: u64,
+        /// Number of its rows in the copy.
+        copy_rows: u64,
+    },
+    /// A table that was copied differs from the original.
+    #[error(
+        "the database of the copy returned other rows of the table {0} than it was given, so the copy was given up and nothing is left of it; `check` tells whether the original is sound"
     )]
     CopyDiffers(&'static str),
+    /// An error of the catalog that is copied, not of the copy.
+    #[error("{0}")]
+    Original(Box<CatalogError>),
     /// A path that is not UTF-8.
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),
@@ -252,6 +272,11 @@ impl CatalogError {
             Self::Shared(error) => error.log_loss(),
             _ => None,
         }
+    }
+
+    /// Marks an error of the catalog that is copied.
+    pub(crate) fn of_original(self) -> Self {
+        Self::Original(Box::new(self))
     }
 
     /// Names the pair whose row holds an invalid value.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use sqlx::postgres::{PgPool, PgPoolOptions};
-use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Postgres, Row as _, Transaction};
+use sqlx::{ConnectOptions as _, Connection as _, PgConnection, Row as _};
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::{CatalogErrorKind, connection_error};
@@ -214,22 +214,19 @@ impl PostgresAddress {
         Ok(transaction.commit().await?)
     }
 
-    /// Creates the schema in a transaction, and takes the lock of the catalog. Returns `false` if the schema exists.
-    pub(crate) async fn create_schema_in(
-        &self,
-        transaction: &mut Transaction<'_, Postgres>,
-    ) -> Result<bool> {
-        sqlx::query(LOCK).execute(&mut **transaction).await?;
+    /// Creates the schema in the open transaction, and takes the lock of the catalog. Returns `false` if the schema exists.
+    pub(crate) async fn create_schema_in(&self, conn: &mut PgConnection) -> Result<bool> {
+        sqlx::query(LOCK).execute(&mut *conn).await?;
         // Another process may have created it before the lock was free.
-        if self.version(transaction).await?.is_some() {
+        if self.version(conn).await?.is_some() {
             return Ok(false);
         }
         // Lower-case letters, digits and `_` only.
         let create = format!("CREATE SCHEMA IF NOT EXISTS {}", self.schema);
         sqlx::raw_sql(sqlx::AssertSqlSafe(create))
-            .execute(&mut **transaction)
+            .execute(&mut *conn)
             .await?;
-        sqlx::raw_sql(CREATE).execute(&mut **transaction).await?;
+        sqlx::raw_sql(CREATE).execute(conn).await?;
         Ok(true)
     }
 }

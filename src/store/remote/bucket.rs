@@ -16,6 +16,7 @@ use super::bucket_error::BucketError;
 use super::client::LazyClient;
 use super::object_stat::ObjectStat;
 use super::request::start;
+use crate::domain::without_password;
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
@@ -295,14 +296,6 @@ fn key_below(folder: &Path, object: &Path) -> Option<String> {
     let parts = object.prefix_match(folder)?;
     let parts: Vec<_> = parts.map(|part| part.as_ref().to_owned()).collect();
     Some(parts.join("/"))
-}
-
-/// Returns the address without a user and password.
-fn without_password(address: &str) -> String {
-    match (address.split_once("://"), address.rsplit_once('@')) {
-        (Some((scheme, _)), Some((_, rest))) => format!("{scheme}://{rest}"),
-        _ => address.to_owned(),
-    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
 use super::pack::{key, read_pack};
 use super::recent::Recent;
+use crate::domain::is_address;
 
 /// The settings of a storage.
 #[derive(Debug, Clone, Default)]
@@ -120,7 +121,7 @@ impl ProjectStorage {
             if !is_root_name(name) {
                 return Err(StorageError::RootName(name.clone()));
             }
-            let root = if place.contains("://") {
+            let root = if is_address(place) {
                 Root::Bucket(open(&format!("storage.roots.{name}"), place)?)
             } else if Path::new(place).is_absolute() {
                 Root::Folder(PathBuf::from(place))

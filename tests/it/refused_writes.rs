@@ -1,0 +1,71 @@
+//! Commands that are refused leave everything as it was.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::backup::files;
+use crate::cli::{Call, empty, mocban};
+use crate::postgres_server::url;
+
+/// Rows of more than two chunks that an import sends to the catalog.
+const ROWS: usize = 5_000;
+
+/// Writes a list whose last row names a missing file, and imports it.
+fn import_with_a_wrong_last_row(root: &Path, args: &[&str]) -> Call {
+    for name in ["a.stl", "a.png"] {
+        std::fs::write(root.join(name), "x").expect("written");
+    }
+    let mut list = "id,mesh,print\n".to_owned();
+    for row in 0..ROWS {
+        // Writing to a string does not fail.
+        let _ = writeln!(list, "r{row},a.stl,a.png");
+    }
+    list += "last,missing.stl,a.png\n";
+    std::fs::write(root.join("list.csv"), list).expect("written");
+    mocban(root, &[args, &["import", "list.csv"]].concat())
+}
+
+#[test]
+fn an_import_with_an_error_in_its_last_row_adds_nothing() {
+    let dir = empty();
+    let root = dir.path();
+    std::fs::write(root.join("one.csv"), "id,mesh,print\none,b,c\n").expect("written");
+    let first = ["-C", "p", "-q", "import", "--allow-missing", "one.csv"];
+    mocban(root, &first).expect(0);
+    let refused = import_with_a_wrong_last_row(root, &["-C", "p"]).expect(2);
+    assert!(refused.err.contains("missing.stl"), "{}", refused.err);
+    let status = mocban(root, &["-C", "p", "status", "--json"]).expect(0);
+    assert_eq!(status.json()["pairs"], 1);
+}
+
+#[test]
+fn an_import_that_is_refused_creates_no_catalog_on_a_server() {
+    let Some(url) = url() else { return };
+    let dir = empty();
+    let server = format!(
+        "{url}&options=-c%20search_path%3Drefused{}",
+        std::process::id()
+    );
+    let at = ["-C", "p", "--catalog", &server];
+    import_with_a_wrong_last_row(dir.path(), &at).expect(2);
+    assert!(!dir.path().join("p").exists());
+    let status = mocban(dir.path(), &["--catalog", &server, "status"]);
+    assert!(status.err.contains("there is no catalog"), "{}", status.err);
+}
+
+#[test]
+fn a_demo_that_is_refused_writes_nothing() {
+    let dir = empty();
+    let data = dir.path().join("d/data");
+    std::fs::create_dir_all(&data).expect("a folder");
+    std::fs::write(data.join("mine"), "ten years").expect("written");
+    for kind in [&[] as &[&str], &["--block"]] {
+        let demo = ["demo", "d", "--no-run", "--set", "run.workers=1"];
+        mocban(dir.path(), &[&demo[..], kind].concat()).expect(2);
+        assert_eq!(files(&dir.path().join("d")), ["data"]);
+    }
+    let address = "postgres://me:secret@db.example/lab";
+    let demo = ["demo", "other", "--no-run", "--catalog", address];
+    mocban(dir.path(), &demo).expect(2);
+    assert!(!dir.path().join("other").exists());
+}
