@@ -7,7 +7,8 @@
 use std::path::PathBuf;
 
 use super::Project;
-use super::artifacts::{ArtifactError, NewArtifact};
+use super::artifact_error::ArtifactError;
+use super::artifacts::NewArtifact;
 use super::packed::of_bucket;
 use super::remote::{Bucket, ProjectStorage};
 use crate::domain::{ArtifactRef, ContentHash};

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::Project;
-use super::artifacts::ArtifactError;
+use super::artifact_error::ArtifactError;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 use super::remote::{Bucket, PACKS, pack_number};
 use crate::domain::{ARTIFACTS, ArtifactRef};

@@ -1,5 +1,6 @@
 //! A project on disk: its directory, its input files, its artifacts, and the lock of its run.
 
+mod artifact_error;
 mod artifact_object;
 mod artifacts;
 mod atomic_write;
@@ -19,7 +20,8 @@ mod replacement_folder;
 mod staging;
 mod target_lock;
 
-pub use artifacts::{ArtifactError, NewArtifact};
+pub use artifact_error::ArtifactError;
+pub use artifacts::NewArtifact;
 pub use atomic_write::{rename_into_place, write_atomic, write_synced};
 pub use input_error::InputError;
 pub use input_place::Input;

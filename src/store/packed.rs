@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use super::Project;
-use super::artifacts::{ArtifactError, NewArtifact};
+use super::artifact_error::ArtifactError;
+use super::artifacts::NewArtifact;
 use super::remote::{Bucket, BucketError, Pack, ProjectStorage, pack_key, read_from_pack};
 use crate::domain::{ArtifactRef, PackLocation};
 
