@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (11);
+INSERT INTO catalog_version (version) VALUES (12);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (
@@ -372,6 +372,10 @@ CREATE TABLE checksum (
 CREATE TABLE review_key (id bigint PRIMARY KEY CHECK (id = 1), key bytea NOT NULL CHECK (length(key) = 32));
 INSERT INTO review_key (id, key)
 VALUES (1, decode(replace(CAST(gen_random_uuid() AS text) || CAST(gen_random_uuid() AS text), '-', ''), 'hex'));
+
+CREATE TABLE catalog_identity (row bigint PRIMARY KEY CHECK (row = 1), id bytea NOT NULL CHECK (length(id) = 16));
+INSERT INTO catalog_identity (row, id)
+VALUES (1, decode(replace(CAST(gen_random_uuid() AS text), '-', ''), 'hex'));
 
 -- Functions and operators of SQLite that statements for both databases use. `atom` is the text of an element.
 CREATE FUNCTION json_each(items text) RETURNS TABLE (key bigint, value json, atom text) LANGUAGE sql IMMUTABLE

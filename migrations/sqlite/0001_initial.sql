@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 11;
+PRAGMA user_version = 12;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -383,3 +383,7 @@ CREATE TABLE checksum (
 -- Key for the names of pictures on the review page: they reveal nothing and stay the same after a restart.
 CREATE TABLE review_key (id INTEGER PRIMARY KEY CHECK (id = 1), key BLOB NOT NULL CHECK (length(key) = 32)) STRICT;
 INSERT INTO review_key (id, key) VALUES (1, randomblob(32));
+
+-- Identifies this catalog, as the owner of a place of artifacts. Made anew for a restored catalog, never copied.
+CREATE TABLE catalog_identity (row INTEGER PRIMARY KEY CHECK (row = 1), id BLOB NOT NULL CHECK (length(id) = 16)) STRICT;
+INSERT INTO catalog_identity (row, id) VALUES (1, randomblob(16));

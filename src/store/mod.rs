@@ -3,6 +3,7 @@
 mod artifact_error;
 mod artifact_object;
 mod artifacts;
+mod artifacts_place;
 mod atomic_write;
 mod collect;
 mod input_error;
@@ -11,8 +12,10 @@ mod inputs;
 mod lock;
 mod lock_file;
 mod open_file;
+mod owner_record;
 mod packed;
 mod parent_folder;
+mod place_owner;
 mod project;
 mod referenced;
 mod remote;
@@ -30,6 +33,7 @@ pub use inputs::{
 };
 pub use lock::{LockError, RunLock};
 pub use open_file::{open_regular, read_file_or_pipe};
+pub use place_owner::PlaceError;
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 pub use remote::{BucketError, ProjectStorage, StorageError, StorageOptions};

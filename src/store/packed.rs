@@ -94,10 +94,11 @@ impl Project {
     }
 }
 
-/// Converts an error of a bucket. A missing object is a missing artifact.
+/// Converts an error of a bucket. A missing object is a missing artifact, and a larger one is a changed one.
 pub(super) fn of_bucket(error: BucketError) -> ArtifactError {
     match error {
         BucketError::NotThere(address) => ArtifactError::Missing(address.into()),
+        BucketError::TooLarge { address, .. } => ArtifactError::Changed(address.into()),
         error => ArtifactError::Bucket(error),
     }
 }

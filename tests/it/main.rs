@@ -70,6 +70,7 @@ mod odd;
 mod one_pair;
 mod page;
 mod parsers;
+mod place_owner;
 #[cfg(unix)]
 mod pooler;
 #[cfg(unix)]

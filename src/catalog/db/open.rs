@@ -24,8 +24,8 @@ use crate::domain::FileKind;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
-/// Version of the schema. Versions 1 to 10 were never released.
-pub(crate) const SCHEMA_VERSION: i64 = 11;
+/// Version of the schema. Versions 1 to 11 were never released.
+pub(crate) const SCHEMA_VERSION: i64 = 12;
 /// Read connections per process.
 const READERS: u32 = 4;
 
@@ -121,6 +121,10 @@ async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identit
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
         Ok(meta) if meta.len() > 0 => Err(CatalogError::NotCheckpointed(log)),
+        // Results that are only in a log that cannot be looked at would be missing.
+        Err(source) if source.kind() != ErrorKind::NotFound => {
+            Err(CatalogError::Io { path: log, source })
+        }
         Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
         Ok(_) | Err(_) => pool(options(path).read_only(true).immutable(true))
             .await

@@ -2,6 +2,7 @@
 
 pub(crate) mod checksums;
 pub(crate) mod ground_truth;
+pub(crate) mod identity;
 pub(crate) mod import;
 pub(crate) mod input_paths;
 pub(crate) mod manual_alignments;
