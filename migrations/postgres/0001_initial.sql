@@ -402,6 +402,10 @@ CREATE TABLE review_key (id bigint PRIMARY KEY CHECK (id = 1), key bytea NOT NUL
 INSERT INTO review_key (id, key)
 VALUES (1, decode(replace(CAST(gen_random_uuid() AS text) || CAST(gen_random_uuid() AS text), '-', ''), 'hex'));
 
+CREATE TABLE catalog_identity (row bigint PRIMARY KEY CHECK (row = 1), id bytea NOT NULL CHECK (length(id) = 16));
+INSERT INTO catalog_identity (row, id)
+VALUES (1, decode(replace(CAST(gen_random_uuid() AS text), '-', ''), 'hex'));
+
 -- Functions and operators of SQLite that statements for both databases use. `atom` is the text of an element.
 CREATE FUNCTION json_each(items text) RETURNS TABLE (key bigint, value json, atom text) LANGUAGE sql IMMUTABLE
 AS 'SELECT ordinality - 1, value, value #>> ''{}'' FROM json_array_elements(CAST($1 AS json)) WITH ORDINALITY';

@@ -415,3 +415,7 @@ CREATE TABLE set_apart (
 -- Key for the names of pictures on the review page: they reveal nothing and stay the same after a restart.
 CREATE TABLE review_key (id INTEGER PRIMARY KEY CHECK (id = 1), key BLOB NOT NULL CHECK (length(key) = 32)) STRICT;
 INSERT INTO review_key (id, key) VALUES (1, randomblob(32));
+
+-- Identifies this catalog, as the owner of a place of artifacts. Made anew for a restored catalog, never copied.
+CREATE TABLE catalog_identity (row INTEGER PRIMARY KEY CHECK (row = 1), id BLOB NOT NULL CHECK (length(id) = 16)) STRICT;
+INSERT INTO catalog_identity (row, id) VALUES (1, randomblob(16));

@@ -6,14 +6,14 @@ use super::pairs::kind_of;
 use crate::catalog::AuditedBlock;
 use crate::domain::{BlockId, BlockStage};
 use crate::runner::result_hash;
-use crate::store::Project;
+use crate::store::{ArtifactError, Project};
 
 /// Result of the check of one block.
 #[derive(Debug)]
 pub(super) struct BlockCheck {
     pub(super) block: BlockId,
     pub(super) damage: Vec<Finding>,
-    /// The first damaged stage, from which the block must run again.
+    /// The first stage with damage that a run repairs, from which the block must run again.
     pub(super) from: Option<BlockStage>,
     /// Number of files checked.
     pub(super) files: u64,
@@ -21,7 +21,14 @@ pub(super) struct BlockCheck {
 
 /// Checks the rows and files of a block. With `quick`, checks only the length of each file. Results of stages that will
 /// run again (from the job's cursor on) are not checked.
-pub(super) fn check_block(project: &Project, block: &AuditedBlock, quick: bool) -> BlockCheck {
+///
+/// # Errors
+/// Returns an error if no artifact can be read, for example because the object store refuses the request.
+pub(super) fn check_block(
+    project: &Project,
+    block: &AuditedBlock,
+    quick: bool,
+) -> Result<BlockCheck, ArtifactError> {
     let mut check = BlockCheck {
         block: block.block,
         damage: Vec::new(),
@@ -30,7 +37,7 @@ pub(super) fn check_block(project: &Project, block: &AuditedBlock, quick: bool) 
     };
     let Some(cursor) = block.cursor else {
         check.add(block, Kind::JobMissing, BlockStage::Face, "it has no job");
-        return check;
+        return Ok(check);
     };
     let stages = BlockStage::ALL.into_iter();
     for stage in stages.take_while(|stage| (stage.index() as i64) < cursor) {
@@ -46,17 +53,20 @@ pub(super) fn check_block(project: &Project, block: &AuditedBlock, quick: bool) 
         check.files += result.files.len() as u64;
         for artifact in result.files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                check.add(block, kind_of(&error), stage, &error.to_string());
+                let text = error.to_string();
+                check.add(block, kind_of(error)?, stage, &text);
             }
         }
     }
-    check
+    Ok(check)
 }
 
 impl BlockCheck {
     fn add(&mut self, block: &AuditedBlock, kind: Kind, stage: BlockStage, what: &str) {
         let what = format!("block {} at {stage}: {what}", block.name);
         self.damage.push(Finding::new(kind, what));
-        self.from = Some(self.from.map_or(stage, |from| from.min(stage)));
+        if kind.is_repairable() {
+            self.from = Some(self.from.map_or(stage, |from| from.min(stage)));
+        }
     }
 }

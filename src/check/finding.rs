@@ -44,6 +44,12 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Returns whether computing a result again repairs this damage of a pair or block. A file that cannot be read may be
+    /// sound.
+    pub(super) const fn is_repairable(self) -> bool {
+        !matches!(self, Self::FileUnreadable)
+    }
+
     /// Returns the label of a number of findings of this kind.
     pub const fn heading(self) -> &'static str {
         match self {

@@ -20,8 +20,9 @@ use crate::catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use crate::domain::UnixMillis;
-use crate::store::{ArtifactError, Project, ReferencedArtifacts, UnreferencedKind};
+use crate::domain::{BlockId, BlockStage, PairId, Stage, UnixMillis};
+use crate::runner::{RunError, claim_artifacts};
+use crate::store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
 /// Number of pairs in memory at a time.
@@ -35,12 +36,17 @@ pub struct CheckOptions {
     pub quick: bool,
     /// Repair what can be repaired. The caller holds the exclusive run lock.
     pub repair: bool,
+    /// Repair although most result files are missing. Otherwise a repair changes no results then, because a disk may
+    /// not be mounted.
+    pub accept_missing: bool,
     /// Whether a run may be writing artifacts. If so, unreferenced files are not reported.
     pub in_use: bool,
     /// The current time.
     pub now: UnixMillis,
     /// Remove unreferenced files and packs of at least this age, also while a run may be writing artifacts.
     pub collect: Option<Duration>,
+    /// Make the catalog the owner of its artifacts, in place of any other catalog.
+    pub take_over: bool,
 }
 
 /// Why a check could not be completed. Damage is not an error, because the summary lists it.
@@ -49,15 +55,13 @@ pub enum CheckError {
     /// The catalog returned an error.
     #[error("{0}")]
     Catalog(#[from] CatalogError),
-    /// The artifact folder cannot be read.
-    #[error("{path}: {source}")]
-    Artifacts {
-        /// The folder.
-        path: std::path::PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
-    /// An artifact folder or object store failed while unreferenced artifacts were collected.
+    /// The artifacts belong to another catalog, or their owner cannot be read or written.
+    #[error("{0}")]
+    Claim(#[from] RunError),
+    /// The folder or the object store of the artifacts cannot be read.
+    #[error("{0}; no result was changed")]
+    Unreadable(ArtifactError),
+    /// The folder or the object store failed while unreferenced artifacts were removed.
     #[error("{0}")]
     Collect(#[from] ArtifactError),
     /// A worker thread panicked or was cancelled.
@@ -70,23 +74,31 @@ pub enum CheckError {
 /// A damaged database is not written to, with one exception: if only indexes are damaged, a repair rebuilds them.
 ///
 /// # Errors
-/// Returns an error if the catalog or the artifact folder cannot be read or written, or a worker thread panics.
+/// Returns an error if the catalog or the place of the artifacts cannot be read or written, or a worker thread panics.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,
     options: CheckOptions,
 ) -> Result<CheckSummary, CheckError> {
     let mut summary = CheckSummary::new(options.quick);
+    let readable = project.clone();
+    let looked = tokio::task::spawn_blocking(move || readable.check_artifacts_place()).await?;
+    looked.map_err(CheckError::Unreadable)?;
     let sound = database(catalog, options, &mut summary).await?;
     let options = CheckOptions {
         repair: options.repair && sound,
+        // The artifacts of rows that a damaged database does not return would look unreferenced.
+        collect: options.collect.filter(|_| sound),
         ..options
     };
+    if sound {
+        claim(project, catalog, options, &mut summary).await?;
+    }
     let rest = rows_and_files(project, catalog, options, &mut summary).await;
     match rest {
         Err(CheckError::Catalog(error)) if is_damage(&error) => {
             // SQLite's integrity check can miss an invalid value, which is found only when its row is read.
-            summary.add(Finding::new(
+            summary.note(Finding::new(
                 Kind::Database,
                 format!("not read to its end: {error}"),
             ));
@@ -95,6 +107,26 @@ pub async fn check(
         Err(error) => Err(error),
         Ok(()) => Ok(summary),
     }
+}
+
+/// Makes the catalog the owner of its artifacts before any of them is removed. Otherwise notes if another catalog is the
+/// owner.
+async fn claim(
+    project: &Project,
+    catalog: &Catalog,
+    options: CheckOptions,
+    summary: &mut CheckSummary,
+) -> Result<(), CheckError> {
+    if options.repair || options.collect.is_some() || options.take_over {
+        return Ok(claim_artifacts(project, catalog, options.take_over).await?);
+    }
+    let (identity, project) = (catalog.identity().await?, project.clone());
+    match tokio::task::spawn_blocking(move || project.check_places(&identity)).await? {
+        Err(PlaceError::Failed(error)) => return Err(CheckError::Unreadable(error)),
+        Err(error) => summary.foreign_artifacts = Some(error.to_string()),
+        Ok(()) => {}
+    }
+    Ok(())
 }
 
 fn is_damage(error: &CatalogError) -> bool {
@@ -112,7 +144,7 @@ async fn database(
     let faults = catalog.integrity(options.quick).await?;
     let indexes_alone = !faults.is_empty() && faults.iter().all(|line| is_of_index(line));
     for line in &faults {
-        summary.add(Finding::new(Kind::Database, line.clone()));
+        summary.note(Finding::new(Kind::Database, line.clone()));
     }
     if faults.is_empty() {
         return Ok(true);
@@ -138,13 +170,14 @@ async fn rows_and_files(
 ) -> Result<(), CheckError> {
     schema(catalog, options, summary).await?;
     for line in catalog.broken_references().await? {
-        summary.add(Finding::new(Kind::Reference, line));
+        summary.note(Finding::new(Kind::Reference, line));
     }
     counters(catalog, options, summary).await?;
     fingerprints(catalog, options, summary).await?;
     let faulty = damaged_rows(catalog, options, summary).await?;
     let mut is_readable = true;
     let mut named = ReferencedArtifacts::default();
+    let mut back = DamagedJobs::default();
     let mut after = None;
     loop {
         let page = catalog.audit_page(after, PAGE).await?;
@@ -155,24 +188,26 @@ async fn rows_and_files(
             let is_listed =
                 |row: &FaultyRow| (row.table, row.row) == (ChecksummedTable::Pair, pair.0);
             if !faulty.iter().any(is_listed) {
-                summary.add(Finding::unreadable(*pair, reason));
+                summary.note(Finding::unreadable(*pair, reason));
             }
         }
-        let checks = check_page(project, page.pairs, options.quick).await?;
-        repair_pairs(catalog, options, &checks, summary).await?;
-        for check in checks {
+        for check in check_page(project, page.pairs, options.quick).await? {
             for artifact in &check.named {
                 named.add(artifact);
             }
+            is_readable &= check.names_all;
+            let stage = check.back_to();
+            back.pairs.extend(stage.map(|stage| (check.pair, stage)));
             summary.count(check, options.repair);
         }
     }
-    check_blocks(project, catalog, options, &mut named, summary).await?;
+    back.blocks = check_blocks(project, catalog, options.quick, &mut named, summary).await?;
+    let is_withheld = options.repair && !repair_jobs(catalog, options, back, summary).await?;
     if options.repair {
         catalog.remove_stale_files();
     }
     // The files of a pair that cannot be read would look unreferenced.
-    if !is_readable {
+    if !is_readable || is_withheld {
         return Ok(());
     }
     if let Some(age) = options.collect {
@@ -210,38 +245,72 @@ async fn damaged_rows(
     Ok(faulty)
 }
 
-/// Checks all blocks, and adds their artifacts to `named`. With `repair`, sends damaged blocks back to the damaged
-/// stage, so that the next run writes the files again.
+/// The damaged pairs and blocks that a repair sends back, each with its first damaged stage. All are known before the
+/// first one is sent back, because their number decides whether a repair is plausible.
+#[derive(Debug, Default)]
+struct DamagedJobs {
+    pairs: Vec<(PairId, Stage)>,
+    blocks: Vec<(BlockId, BlockStage)>,
+}
+
+/// Sends damaged pairs and blocks back, so that the next run computes their results again. Returns `false`, and changes
+/// nothing, if most result files are missing and the caller does not accept that.
+async fn repair_jobs(
+    catalog: &Catalog,
+    options: CheckOptions,
+    back: DamagedJobs,
+    summary: &mut CheckSummary,
+) -> Result<bool, CheckError> {
+    let DamagedJobs { pairs, blocks } = back;
+    if pairs.is_empty() && blocks.is_empty() {
+        return Ok(true);
+    }
+    if summary.lacks_most_files() && !options.accept_missing {
+        summary.repaired.withheld = true;
+        return Ok(false);
+    }
+    summary.repaired.requeued += pairs.len() as u64;
+    summary.repaired.requeued_blocks += blocks.len() as u64;
+    for page in pairs.chunks(PAGE) {
+        catalog.restore(page.to_vec()).await?;
+    }
+    if !blocks.is_empty() {
+        catalog.reset_blocks(blocks).await?;
+    }
+    summary.mark_repairable();
+    Ok(true)
+}
+
+/// Checks all blocks, and adds their artifacts to `named`. Returns the damaged blocks, each with its first damaged
+/// stage.
 async fn check_blocks(
     project: &Project,
     catalog: &Catalog,
-    options: CheckOptions,
+    quick: bool,
     named: &mut ReferencedArtifacts,
     summary: &mut CheckSummary,
-) -> Result<(), CheckError> {
+) -> Result<Vec<(BlockId, BlockStage)>, CheckError> {
     let blocks = catalog.audited_blocks().await?;
     let results = blocks.iter().flat_map(|block| &block.results);
     let files = results.flat_map(|result| result.files.values());
     files.for_each(|artifact| named.add(artifact));
-    let (project, quick) = (project.clone(), options.quick);
+    let project = project.clone();
     let work = move || {
         let checked = blocks.into_par_iter();
         let checked = checked.map(|block| blocks::check_block(&project, &block, quick));
-        checked.collect::<Vec<_>>()
+        checked.collect::<Result<Vec<_>, _>>()
     };
+    let checked = tokio::task::spawn_blocking(work).await?;
     let mut back = Vec::new();
-    for check in tokio::task::spawn_blocking(work).await? {
+    for check in checked.map_err(CheckError::Unreadable)? {
         summary.files += check.files;
         for finding in check.damage {
-            summary.add_repairable(finding, options.repair);
+            let is_repairable = finding.kind.is_repairable();
+            summary.add(finding, is_repairable);
         }
         back.extend(check.from.map(|stage| (check.block, stage)));
     }
-    if options.repair && !back.is_empty() {
-        summary.repaired.requeued_blocks += back.len() as u64;
-        catalog.reset_blocks(back).await?;
-    }
-    Ok(())
+    Ok(back)
 }
 
 async fn schema(
@@ -251,7 +320,7 @@ async fn schema(
 ) -> Result<(), CheckError> {
     let found = catalog.schema_differences().await?;
     for line in &found {
-        summary.add(Finding::new(Kind::Schema, line.clone()));
+        summary.note(Finding::new(Kind::Schema, line.clone()));
     }
     if options.repair && !found.is_empty() {
         catalog.restore_schema().await?;
@@ -270,10 +339,10 @@ async fn counters(
     let drift = catalog.drift(options.quick).await?;
     let is_off = drift != Drift::default();
     for drift in &drift.counters {
-        summary.add(Finding::counter(drift));
+        summary.note(Finding::counter(drift));
     }
     for line in drift.marks {
-        summary.add(Finding::new(Kind::Counter, line));
+        summary.note(Finding::new(Kind::Counter, line));
     }
     if options.repair && is_off {
         catalog.rebuild_counters().await?;
@@ -290,7 +359,7 @@ async fn fingerprints(
 ) -> Result<(), CheckError> {
     let faulty = catalog.faulty_fingerprints().await?;
     for fingerprint in &faulty {
-        summary.add(Finding::fingerprint(fingerprint));
+        summary.note(Finding::fingerprint(fingerprint));
     }
     if options.repair && !faulty.is_empty() {
         catalog.retire_fingerprints(faulty).await?;
@@ -309,25 +378,10 @@ async fn check_page(
     let work = move || {
         page.into_par_iter()
             .map(|pair| pairs::check_pair(&project, &pair, quick))
-            .collect()
+            .collect::<Result<Vec<_>, _>>()
     };
-    Ok(tokio::task::spawn_blocking(work).await?)
-}
-
-async fn repair_pairs(
-    catalog: &Catalog,
-    options: CheckOptions,
-    checks: &[PairCheck],
-    summary: &mut CheckSummary,
-) -> Result<(), CheckError> {
-    let back = checks.iter();
-    let back = back.filter_map(|check| Some((check.pair, check.back_to()?)));
-    let back: Vec<_> = back.collect();
-    if options.repair && !back.is_empty() {
-        summary.repaired.requeued += back.len() as u64;
-        catalog.restore(back).await?;
-    }
-    Ok(())
+    let checked = tokio::task::spawn_blocking(work).await?;
+    checked.map_err(CheckError::Unreadable)
 }
 
 /// Counts unreferenced files and packs, and removes those of at least this age. With `is_idle`, also objects of
@@ -373,10 +427,10 @@ async fn unreferenced_files(
             summary.unreferenced = Some(found);
             Ok(())
         }
-        Err(source) => Err(CheckError::Artifacts {
+        Err(source) => Err(CheckError::Collect(ArtifactError::Io {
             path: project.artifacts_dir(),
             source,
-        }),
+        })),
     }
 }
 

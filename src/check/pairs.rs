@@ -23,24 +23,29 @@ pub(super) struct PairCheck {
     pub(super) named: Vec<ArtifactRef>,
     /// Number of files checked.
     pub(super) files: u64,
+    /// Whether `named` is complete. If not, a result is so damaged that its files are unknown.
+    pub(super) names_all: bool,
     pub(super) inputs_missing: Vec<String>,
     pub(super) inputs_changed: Vec<String>,
+    pub(super) inputs_unreadable: Vec<String>,
 }
 
 impl PairCheck {
-    /// Returns the first damaged stage, from which the pair must run again.
+    /// Returns the first stage with damage that a run repairs, from which the pair must run again.
     fn damaged_from(&self) -> Option<Stage> {
-        self.damage.iter().filter_map(|finding| finding.stage).min()
+        let damage = self.damage.iter();
+        let damage = damage.filter(|finding| finding.kind.is_repairable());
+        damage.filter_map(|finding| finding.stage).min()
     }
 
     /// Returns the stage from which a repair queues the pair again. Returns `None` if the pair is not damaged, or if an
-    /// input is missing: a run could then not recompute the results that the repair removes.
+    /// input is missing or unreadable: a run could then not recompute the results that the repair removes.
     pub(super) fn back_to(&self) -> Option<Stage> {
-        let can_run = self.inputs_missing.is_empty();
+        let can_run = self.inputs_missing.is_empty() && self.inputs_unreadable.is_empty();
         self.damaged_from().filter(|_| can_run)
     }
 
-    /// Returns whether the pair is damaged, and a repair cannot queue it again because an input is missing.
+    /// Returns whether the pair is damaged, and a repair cannot queue it again because of an input.
     pub(super) fn lacks_inputs(&self) -> bool {
         self.damaged_from().is_some() && self.back_to().is_none()
     }
@@ -48,14 +53,23 @@ impl PairCheck {
 
 /// Checks the rows and files of a pair. With `quick`, checks only the length of each file. Results of stages that will
 /// run again (from the job's cursor on) are not checked, but their files count as referenced.
-pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
+///
+/// # Errors
+/// Returns an error if no artifact can be read, for example because the object store refuses the request.
+pub(super) fn check_pair(
+    project: &Project,
+    pair: &AuditedPair,
+    quick: bool,
+) -> Result<PairCheck, ArtifactError> {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
         damage: state(pair),
         named: Vec::new(),
         files: 0,
+        names_all: true,
         inputs_missing: Vec::new(),
         inputs_changed: Vec::new(),
+        inputs_unreadable: Vec::new(),
     };
     // The files of a pair that was cut from a block are artifacts of the block.
     let cut = [&pair.inputs.mesh_path, &pair.inputs.print_path];
@@ -65,6 +79,7 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
     check.named.extend(cut);
     for (stage, result) in &pair.results {
         let files: Option<ArtifactSet> = serde_json::from_str(&result.files).ok();
+        check.names_all &= files.is_some();
         let files = files.unwrap_or_default();
         check.named.extend(files.values().cloned());
         if !is_before_cursor(pair, *stage) {
@@ -73,24 +88,27 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         check.files += files.len() as u64;
         for artifact in files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                let finding = damage(pair, kind_of(&error), *stage, error.to_string());
-                check.damage.push(finding);
+                let text = error.to_string();
+                check
+                    .damage
+                    .push(damage(pair, kind_of(error)?, *stage, text));
             }
         }
     }
     inputs(project, pair, &mut check);
-    check
+    Ok(check)
 }
 
 /// Returns the kind of damage of an artifact.
-pub(super) const fn kind_of(error: &ArtifactError) -> Kind {
+///
+/// # Errors
+/// Returns the error if it does not concern this artifact alone.
+pub(super) fn kind_of(error: ArtifactError) -> Result<Kind, ArtifactError> {
     match error {
-        ArtifactError::Missing(_) => Kind::FileMissing,
-        ArtifactError::Changed(_) => Kind::FileChanged,
-        ArtifactError::Io { .. }
-        | ArtifactError::Moved(_)
-        | ArtifactError::NoStore(_)
-        | ArtifactError::Bucket(_) => Kind::FileUnreadable,
+        ArtifactError::Missing(_) => Ok(Kind::FileMissing),
+        ArtifactError::Changed(_) => Ok(Kind::FileChanged),
+        error if error.concerns_one_file() => Ok(Kind::FileUnreadable),
+        error => Err(error),
     }
 }
 
@@ -234,19 +252,21 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
         (&known.print_path, known.print.as_ref()),
     ] {
         let input = project.input(stored);
+        let unreadable = |error: &InputError| format!("{error} ({})", pair.name);
         let note = || format!("{} of {}", input.path().display(), pair.name);
         match stat_input(&input) {
             // A run of its block writes the file again: the check of the block reports it.
             Err(InputError::NotThere(_)) if ArtifactRef::at_path(stored).is_some() => {}
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
-            Err(_) => check.inputs_changed.push(note()),
+            Err(error) => check.inputs_unreadable.push(unreadable(&error)),
             Ok(stat) => {
-                let moved = |seen: &&InputVersion| seen.stat != stat;
-                let changed = seen.filter(moved).is_some_and(|seen| {
-                    hash_input(&input).map_or(true, |found| found.hash != seen.hash)
-                });
-                if changed {
-                    check.inputs_changed.push(note());
+                let Some(seen) = seen.filter(|seen: &&InputVersion| seen.stat != stat) else {
+                    continue;
+                };
+                match hash_input(&input) {
+                    Ok(found) if found.hash == seen.hash => {}
+                    Ok(_) => check.inputs_changed.push(note()),
+                    Err(error) => check.inputs_unreadable.push(unreadable(&error)),
                 }
             }
         }

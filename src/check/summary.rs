@@ -30,10 +30,14 @@ pub struct CheckSummary {
     pub set_apart: SetApart,
     /// Missing input files. This is not damage: results computed from them stay valid.
     pub inputs_missing: Notes,
-    /// Input files that changed after they were read, or are unreadable. This is not damage: the next run handles it.
+    /// Input files that changed after they were read. This is not damage: the next run handles it.
     pub inputs_changed: Notes,
+    /// Input files that cannot be read, with the reasons. They may be unchanged.
+    pub inputs_unreadable: Notes,
     /// Unreferenced files in the artifact folder. `None` if not counted, for example because a run may be writing.
     pub unreferenced: Option<Unreferenced>,
+    /// Why the artifacts do not belong to this catalog, if another catalog is their owner.
+    pub foreign_artifacts: Option<String>,
     /// Repairs made.
     pub repaired: Repaired,
     /// Number of damaged rows that a repair by this user would set apart.
@@ -50,6 +54,9 @@ pub struct Found {
     pub left: u64,
     /// The first findings.
     pub first: Vec<Finding>,
+    /// Number of findings that disappear if the damaged pairs and blocks are queued again.
+    #[serde(skip)]
+    pub(super) repairable: u64,
 }
 
 /// Notes about files: their number and the first of them.
@@ -81,10 +88,12 @@ pub struct Repaired {
     pub requeued: u64,
     /// Number of blocks sent back to an earlier stage.
     pub requeued_blocks: u64,
-    /// Number of damaged pairs that were not sent back, because an input is missing.
+    /// Number of damaged pairs that were not sent back, because an input is missing or unreadable.
     pub not_requeued: u64,
     /// Number of damaged rows that were set apart.
     pub set_apart: u64,
+    /// Whether nothing was sent back, because most result files are missing.
+    pub withheld: bool,
     /// Whether the counters were rebuilt.
     pub counters: bool,
     /// Whether the indexes were rebuilt.
@@ -104,7 +113,9 @@ impl CheckSummary {
             set_apart: SetApart::default(),
             inputs_missing: Notes::default(),
             inputs_changed: Notes::default(),
+            inputs_unreadable: Notes::default(),
             unreferenced: None,
+            foreign_artifacts: None,
             repaired: Repaired::default(),
             rows_to_set_apart: 0,
         }
@@ -120,10 +131,23 @@ impl CheckSummary {
         self.damage.values().map(|found| found.found).sum()
     }
 
-    pub(super) fn add(&mut self, finding: Finding) {
+    /// Returns whether more than half of the result files are missing, as if their disk were not mounted.
+    pub fn lacks_most_files(&self) -> bool {
+        let missing = self.damage.get(&Kind::FileMissing);
+        missing.is_some_and(|missing| missing.found * 2 > self.files)
+    }
+
+    /// Adds damage that queueing a pair or block again does not repair.
+    pub(super) fn note(&mut self, finding: Finding) {
+        self.add(finding, false);
+    }
+
+    /// Adds damage.
+    pub(super) fn add(&mut self, finding: Finding, is_repairable: bool) {
         let found = self.damage.entry(finding.kind).or_default();
         found.found += 1;
         found.left += 1;
+        found.repairable += u64::from(is_repairable);
         if found.first.len() < NAMED {
             found.first.push(finding);
         }
@@ -131,7 +155,7 @@ impl CheckSummary {
 
     /// Adds a damaged row. `is_repairable` is whether a repair would set it apart.
     pub(super) fn add_row(&mut self, finding: Finding, is_repairable: bool) {
-        self.add(finding);
+        self.add(finding, false);
         self.rows_to_set_apart += u64::from(is_repairable);
     }
 
@@ -146,8 +170,12 @@ impl CheckSummary {
     /// Returns whether `check --repair` by this user could repair something.
     pub fn is_repairable(&self) -> bool {
         self.rows_to_set_apart > 0
-            || (self.damage.keys())
-                .any(|kind| !matches!(kind, Kind::Database | Kind::Reference | Kind::Row))
+            || (self.damage.keys()).any(|kind| {
+                !matches!(
+                    kind,
+                    Kind::Database | Kind::Reference | Kind::Row | Kind::FileUnreadable
+                )
+            })
     }
 
     /// Marks all findings of a kind as repaired, except `left` of them.
@@ -157,26 +185,26 @@ impl CheckSummary {
         }
     }
 
-    /// Adds damage that `repair` repairs.
-    pub(super) fn add_repairable(&mut self, finding: Finding, repair: bool) {
-        let kind = finding.kind;
-        self.add(finding);
-        if let (true, Some(found)) = (repair, self.damage.get_mut(&kind)) {
-            found.left -= 1;
+    /// Marks the findings as repaired that queueing pairs and blocks again repairs.
+    pub(super) fn mark_repairable(&mut self) {
+        for found in self.damage.values_mut() {
+            found.left -= found.repairable;
         }
     }
 
-    /// Adds the check of a pair. With `repair`, its damage counts as repaired if the pair can be queued again.
+    /// Adds the check of a pair.
     pub(super) fn count(&mut self, check: PairCheck, repair: bool) {
-        let requeued = repair && check.back_to().is_some();
+        let can_run = check.back_to().is_some();
         self.repaired.not_requeued += u64::from(repair && check.lacks_inputs());
         self.pairs += 1;
         self.files += check.files;
         for finding in check.damage {
-            self.add_repairable(finding, requeued);
+            let is_repairable = can_run && finding.kind.is_repairable();
+            self.add(finding, is_repairable);
         }
         self.inputs_missing.add(check.inputs_missing);
         self.inputs_changed.add(check.inputs_changed);
+        self.inputs_unreadable.add(check.inputs_unreadable);
     }
 }
 

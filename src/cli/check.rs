@@ -28,6 +28,10 @@ pub(super) struct CheckArgs {
     /// Queue missing or changed results again, recount, and remove unreferenced files; verdicts are never touched
     #[arg(long)]
     pub(super) repair: bool,
+    /// Repair although most result files are missing; without it, a repair then changes no results, because a disk may not
+    /// be mounted
+    #[arg(long, requires = "repair")]
+    pub(super) accept_missing: bool,
     /// Compare only the lengths of files instead of every byte
     #[arg(long)]
     pub(super) quick: bool,
@@ -35,6 +39,10 @@ pub(super) struct CheckArgs {
     #[arg(long, value_name = "HOURS", num_args = 0..=1, default_missing_value = "24", require_equals = true,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub(super) collect: Option<u64>,
+    /// Make this catalog the owner of the folder or object store of its result files, in place of another one that is not
+    /// used any more
+    #[arg(long)]
+    pub(super) take_over: bool,
 }
 
 /// Findings of each kind, and inputs, that are listed.
@@ -56,6 +64,9 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
         Ok(summary) => summary,
         Err(error) => return report_unreadable(error, context),
     };
+    if let Some(reason) = &summary.foreign_artifacts {
+        context.warn(reason);
+    }
     context.print(&summary, || text(&summary, &args, context.stdout))?;
     for command in next_steps(&summary, args.repair) {
         context.next(command);
@@ -84,6 +95,8 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
     let options = CheckOptions {
         quick: args.quick,
         repair: args.repair,
+        accept_missing: args.accept_missing,
+        take_over: args.take_over,
         in_use: !args.repair && running,
         now: now(),
         collect: args.collect.map(|hours| Duration::from_secs(hours * 3600)),
@@ -148,6 +161,8 @@ fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
     if summary.repaired.requeued + summary.repaired.requeued_blocks > 0 {
         vec!["run"]
+    } else if summary.lacks_most_files() && summary.repaired.not_requeued == 0 {
+        vec!["check --repair --accept-missing"]
     } else if !repaired && summary.is_repairable() {
         vec!["check --repair"]
     } else {
@@ -167,15 +182,13 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         lines.push(palette.paint(tone, head));
         lines.push(listed(&found.first, found.found));
     }
-    if lacks_all_files(summary) {
-        let inputs = match summary.inputs_missing.count {
-            0 => "",
-            _ => "once scans and prints are at their places, ",
-        };
-        lines.push(format!(
-            "no result file is there, as after `restore`, or if a disk is not mounted; {inputs}`check --repair` and `run` \
-             compute them again"
-        ));
+    lines.extend(missing_files(summary));
+    if summary.damage.contains_key(&Kind::FileUnreadable) {
+        lines.push(
+            "files that cannot be read may be sound, so their results stay: correct what the lines above name; to give a file up, \
+             remove it, then run `check --repair`"
+                .to_owned(),
+        );
     }
     if summary.damage.contains_key(&Kind::Database) && summary.left() > 0 {
         lines.push(
@@ -191,16 +204,37 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         &summary.inputs_changed,
         "changed since they were read",
     ));
+    lines.extend(notes(&summary.inputs_unreadable, "unreadable"));
     lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
-    lines.collect::<Vec<_>>().join("\n") + "\n"
+    error_text::without_error_numbers(&lines.collect::<Vec<_>>().join("\n")) + "\n"
 }
 
-/// Returns whether all result files are missing, and nothing was repaired.
-fn lacks_all_files(summary: &CheckSummary) -> bool {
+/// Says what to do if most result files are missing and their results stay.
+fn missing_files(summary: &CheckSummary) -> Option<String> {
     let missing = summary.damage.get(&Kind::FileMissing);
-    missing.is_some_and(|missing| missing.left == missing.found && missing.found == summary.files)
+    let missing =
+        missing.filter(|found| summary.lacks_most_files() && found.left == found.found)?;
+    let which = if missing.found == summary.files {
+        "no result file is there".to_owned()
+    } else {
+        let (missing, files) = (missing.found, count(summary.files, "result file"));
+        format!("{missing} of {files} are missing")
+    };
+    let inputs = match summary.inputs_missing.count {
+        0 => "",
+        _ => "once scans and prints are at their places, ",
+    };
+    let withheld = if summary.repaired.withheld {
+        "so nothing was queued again; "
+    } else {
+        ""
+    };
+    Some(format!(
+        "{which}, as after `restore`, or if a disk is not mounted, {withheld}if they are really gone, {inputs}\
+         `check --repair --accept-missing` and `run` compute them again"
+    ))
 }
 
 fn headline(summary: &CheckSummary, palette: Palette) -> String {
@@ -266,7 +300,7 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
     if done.not_requeued > 0 {
         let pairs = count(done.not_requeued, "damaged pair");
         lines.push(format!(
-            "{pairs} not queued again, because a mesh or print is missing: put it back, then run `check --repair`"
+            "{pairs} not queued again, because a mesh or print is missing or cannot be read: put it back, then run `check --repair`"
         ));
     }
     if repaired && done.requeued + done.requeued_blocks > 0 {

@@ -10,7 +10,7 @@ use crate::config::ConfigError;
 use crate::export::FolderError;
 use crate::platform;
 use crate::runner::RunError;
-use crate::store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
+use crate::store::{CATALOG_FILE, PlaceError, StorageError, StoreError, TargetLockError};
 
 /// Returns the exit code of an error.
 pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
@@ -40,7 +40,13 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     match cause.downcast_ref() {
         Some(RunError::InUse(_)) => return Some(ExitCode::InUse),
-        Some(RunError::OtherSettings(_) | RunError::OtherPlan(_)) => return Some(ExitCode::Usage),
+        Some(
+            RunError::OtherSettings(_)
+            | RunError::OtherPlan(_)
+            | RunError::Place(
+                PlaceError::Taken { .. } | PlaceError::Unknown(_) | PlaceError::Unreadable(_),
+            ),
+        ) => return Some(ExitCode::Usage),
         Some(RunError::NoSuchPair(_) | RunError::NoSuchBlock(_)) => {
             return Some(ExitCode::NothingSelected);
         }
@@ -121,7 +127,7 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
 }
 
 /// Removes the numbers that the standard library adds to the system's messages, such as `(os error 2)`.
-fn without_error_numbers(text: &str) -> String {
+pub(super) fn without_error_numbers(text: &str) -> String {
     const START: &str = " (os error ";
     let mut parts = text.split(START);
     let mut plain = parts.next().unwrap_or_default().to_owned();

@@ -224,9 +224,13 @@ fn print_summary(
         ));
     }
     if !summary.is_complete() {
-        // A run trusts the catalog, so the check must come first.
-        context.next("check --repair");
-        context.next("run");
+        // A run trusts the catalog, so the check must come first. If most files are missing, it says what to do.
+        if summary.unreadable.len() as u64 > summary.pairs.done {
+            context.next("check");
+        } else {
+            context.next("check --repair");
+            context.next("run");
+        }
     }
     Ok(())
 }

@@ -6,10 +6,10 @@ use crate::domain::JobStatus;
 use crate::store::Project;
 
 /// Explains what is missing and what to do, for `status` and `run`.
-pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; once the scans and prints are in place, `check --repair` lets the next run compute them again; if they are in another folder, restore the backup into a new folder with `--inputs DIR`";
+pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; if their disk is not mounted, mount it; once the scans and prints are in place, `check --repair --accept-missing` lets the next run compute them again; if they are in another folder, restore the backup into a new folder with `--inputs DIR`";
 
 /// The command that helps.
-pub(super) const NEXT: &str = "check --repair";
+pub(super) const NEXT: &str = "check --repair --accept-missing";
 
 /// Returns whether a project has results, but none of their files. Files that are only partly missing are found by
 /// `check`.

@@ -71,7 +71,7 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
     ));
     if let (Some(first), Some(inputs)) = (restored.missing.first(), &inputs) {
         context.warn(&format!(
-            "{} neither at the old place nor in {}, first {first}; put meshes and prints there before `check --repair`",
+            "{} neither at the old place nor in {}, first {first}; put meshes and prints there before `check --repair --accept-missing`",
             count(restored.missing.len() as u64, "path"),
             inputs.display()
         ));
@@ -86,7 +86,7 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         ));
     }
     let context = context.at(&dir);
-    context.next("check --repair");
+    context.next("check --repair --accept-missing");
     context.next("run");
     Ok(ExitCode::Done)
 }
@@ -157,7 +157,7 @@ async fn locate_inputs(
     let catalog = Catalog::open(new).await?;
     let (project, inputs) = (project.clone(), inputs.to_owned());
     let replaced = catalog.replace_input_paths(move |stored| {
-        if project.input_path(stored).exists() {
+        if project.input(stored).exists() {
             return Some(stored.to_owned());
         }
         project.find_input(stored, &inputs).ok()?
@@ -227,6 +227,8 @@ fn check_inputs(inputs: &Path) -> anyhow::Result<()> {
     let shown = inputs.display();
     let found = metadata(inputs).with_context(|| format!("cannot read {shown}"))?;
     if found.is_some_and(|found| found.is_dir()) {
+        // Otherwise every file would look missing.
+        std::fs::read_dir(inputs).with_context(|| format!("cannot read {shown}"))?;
         return Ok(());
     }
     Err(Refusal::Usage(format!("there is no directory {shown}")).into())

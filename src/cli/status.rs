@@ -389,7 +389,10 @@ mod tests {
         assert_eq!(next_steps(&done), ["report"]);
         done.are_results_missing = true;
         done.running = false;
-        assert_eq!(next_steps(&done), ["check --repair", "run", "report"]);
+        assert_eq!(
+            next_steps(&done),
+            [super::missing_results::NEXT, "run", "report"]
+        );
         let text = screen(&done, "demo", Palette::PLAIN);
         assert!(
             text.contains("files        the depth maps and masks"),

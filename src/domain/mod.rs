@@ -8,6 +8,7 @@ mod attention_check;
 mod block;
 mod box_iou;
 mod box_name;
+mod catalog_identity;
 mod control_points;
 mod enum_names;
 mod failure;
@@ -41,6 +42,7 @@ pub use block::{
 };
 pub use box_iou::box_iou;
 pub use box_name::{BoxName, NotePart};
+pub use catalog_identity::{CatalogIdentity, UNKNOWN_SERVER};
 pub use control_points::{ControlPoint, ControlPoints};
 pub(crate) use enum_names::{enum_names, stage_order};
 pub use failure::{Failure, FailureClass};

@@ -69,7 +69,8 @@ impl ExportSummary {
 /// select no result.
 ///
 /// # Errors
-/// Returns an error if the folder cannot be written, the catalog cannot be read or a worker task panics. If the error
+/// Returns an error if the folder cannot be written, the catalog or the place of the artifacts cannot be read, or a worker
+/// task panics. If the error
 /// occurs before the earlier export is replaced, that export is kept.
 pub async fn export(
     catalog: &Catalog,
@@ -79,6 +80,8 @@ pub async fn export(
     options: ExportOptions,
 ) -> Result<ExportSummary, ExportError> {
     let (catalog, damaged) = &catalog.without_faulty_rows().await?;
+    let readable = project.clone();
+    tokio::task::spawn_blocking(move || readable.check_artifacts_place()).await??;
     let plan = match options.split {
         Some(split) => Some(SplitPlan::new(
             &split,

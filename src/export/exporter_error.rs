@@ -2,6 +2,7 @@
 
 use super::export_folder::FolderError;
 use crate::catalog::CatalogError;
+use crate::store::ArtifactError;
 
 /// Why nothing was exported.
 #[derive(Debug, thiserror::Error)]
@@ -9,6 +10,9 @@ pub enum ExportError {
     /// The catalog cannot be read.
     #[error("{0}")]
     Catalog(#[from] CatalogError),
+    /// The folder or the object store of the artifacts cannot be read, so that the export would have no files.
+    #[error("{0}")]
+    Artifacts(#[from] ArtifactError),
     /// The folder cannot be used, or a file in it not written.
     #[error("{0}")]
     Folder(#[from] FolderError),

@@ -45,7 +45,7 @@ impl<'a> StageArtifacts<'a> {
             return Ok(written);
         }
         failpoint::hit(self.stage, Point::Written, Some(self.block));
-        let locations = self.project.write_pack(&packed).map_err(failed)?;
+        let locations = self.project.write_pack(&packed).map_err(unwritten)?;
         for (file, location) in packed.iter().zip(locations) {
             if let Some(artifact) = written.get_mut(file.role()) {
                 artifact.pack = Some(location);
@@ -59,11 +59,11 @@ impl<'a> StageArtifacts<'a> {
         let on_written = || failpoint::hit(self.stage, Point::Written, Some(self.block));
         if !self.project.has_packs() {
             let files = std::slice::from_ref(&file);
-            return (self.project.write_artifacts(files, &on_written)).map_err(failed);
+            return (self.project.write_artifacts(files, &on_written)).map_err(unwritten);
         }
         if self.stage == BlockStage::Cut {
             on_written();
-            return self.project.write_objects(&[file]).map_err(failed);
+            return self.project.write_objects(&[file]).map_err(unwritten);
         }
         let mut packed = self.packed.lock().unwrap_or_else(PoisonError::into_inner);
         packed.push(file);
@@ -95,17 +95,30 @@ impl BlockArtifacts for StageArtifacts<'_> {
                     tracing::warn!(block = %self.block, stage = %record.stage, "{error}; the stage runs again");
                     rerun()
                 }
-                error => failed(error),
+                error => unread(error),
             })
     }
 }
 
-fn failed(error: ArtifactError) -> BlockStageError {
+/// Converts an error of reading an artifact.
+fn unread(error: ArtifactError) -> BlockStageError {
     match error {
         ArtifactError::NoStore(_) | ArtifactError::Bucket(_) => BlockStageError::Store(error),
         error => BlockStageError::Failed {
             failure: Failure::new(FailureClass::Io, error.to_string()),
-            is_transient: !matches!(error, ArtifactError::Moved(_)),
+            is_transient: !matches!(
+                error,
+                ArtifactError::Moved(_) | ArtifactError::Blocked { .. }
+            ),
         },
+    }
+}
+
+/// Converts an error of writing an artifact. A disk that is full or fails is not the fault of the block, and would fail
+/// all others.
+fn unwritten(error: ArtifactError) -> BlockStageError {
+    match error {
+        error @ ArtifactError::Blocked { .. } => unread(error),
+        error => BlockStageError::Store(error),
     }
 }

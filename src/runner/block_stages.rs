@@ -206,7 +206,7 @@ pub enum BlockStageError {
     RerunFrom(BlockStage),
     /// The stage noticed that it is to stop.
     Stopped,
-    /// An object store failed, which is not the fault of the block.
+    /// An object store failed, or the disk of the artifacts, which is not the fault of the block.
     Store(ArtifactError),
     /// The stage failed. A refusal, such as a page of another block, has the class `NoSolution`; it is not retried.
     Failed {

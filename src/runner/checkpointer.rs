@@ -10,10 +10,11 @@ use tokio::task::JoinHandle;
 use super::compute_thread::{ComputedStage, task_result};
 use super::error::RunError;
 use super::events::RunEvent;
+use super::pair_failure::FailedPair;
 use super::run_context::{PairEnd, PairReport, RunContext};
-use super::stage_files::write_batch;
+use super::stage_files::{Unwritten, write_batch};
 use crate::catalog::{CheckpointOutcome, Lease};
-use crate::domain::{PairName, Stage};
+use crate::domain::{Failure, FailureClass, PairName, Stage};
 use crate::failpoint::{self, Point};
 
 /// The task that holds a pair's lease and stores its stages.
@@ -28,9 +29,9 @@ pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// `false` if a stage is unstored because of a stop request or an unavailable object store. A lost lease does not
-    /// change this flag.
-    is_complete: bool,
+    /// Why a stage is unstored. A lost lease does not change this.
+    unwritten: Option<Unwritten>,
+    pair: PairName,
 }
 
 impl StoredStages {
@@ -40,26 +41,36 @@ impl StoredStages {
     /// Returns `self` if the lease is lost or ended with the pair's last stage, or if a stage was left unstored.
     pub(super) fn into_lease(self) -> Result<Lease, Self> {
         match self.lease {
-            CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),
+            CheckpointOutcome::Lease(lease) if self.unwritten.is_none() => Ok(lease),
             lease => Err(Self { lease, ..self }),
         }
     }
 
-    /// Releases the lease if it is still held. Returns how the pair ended: `end`, unless the lease was lost or a stage
-    /// is unstored.
+    /// Ends the lease if it is still held: stores a failure if something else has the name of a file. Returns how the
+    /// pair ended: `end`, unless the lease was lost or a stage is unstored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
-        let end = match &self.lease {
-            CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
-            _ if self.is_complete => end,
-            _ => PairEnd::Released,
-        };
-        let mut end = Ok(end);
-        if let CheckpointOutcome::Lease(lease) = self.lease
-            && let Err(error) = context.catalog.release(lease).await
-        {
-            end = Err(error.into());
-        }
         let stages = self.stages;
+        let end = match (self.lease, self.unwritten) {
+            (CheckpointOutcome::LeaseLost, _) => Ok(PairEnd::LeaseLost),
+            (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
+                let failed = FailedPair {
+                    name: self.pair,
+                    attributes: stage.attributes,
+                    stage: stage.stage,
+                    failure: Failure::new(FailureClass::Io, error.to_string()),
+                    is_transient: false,
+                    inputs: stage.inputs,
+                    ms: Some(stage.ms),
+                };
+                failed.store(context, lease).await
+            }
+            (CheckpointOutcome::Lease(lease), unwritten) => {
+                let end = unwritten.map_or(end, |_| PairEnd::Released);
+                let released = context.catalog.release(lease).await;
+                released.map(|_| end).map_err(RunError::from)
+            }
+            (CheckpointOutcome::Done, _) => Ok(end),
+        };
         PairReport { end, stages }
     }
 }
@@ -114,10 +125,10 @@ async fn store_stages(
     lease: Lease,
     mut stages: mpsc::UnboundedReceiver<ComputedStage>,
 ) -> Result<StoredStages, RunError> {
-    let (mut count, mut is_complete) = (0, true);
+    let (mut count, mut unwritten) = (0, None);
     let mut outcome = CheckpointOutcome::Lease(lease);
     // After a stage that was not stored, no later stage may be stored.
-    while is_complete
+    while unwritten.is_none()
         && matches!(outcome, CheckpointOutcome::Lease(_))
         && let Some(first) = stages.recv().await
     {
@@ -125,7 +136,7 @@ async fn store_stages(
             break;
         };
         let batch;
-        (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
+        (batch, unwritten) = write_batch(&context, &pair, first, &mut stages).await?;
         let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
         context.metrics.begin_commit();
         let stored = context.catalog.checkpoint(lease, batch).await;
@@ -141,7 +152,8 @@ async fn store_stages(
     Ok(StoredStages {
         lease: outcome,
         stages: count,
-        is_complete,
+        unwritten,
+        pair,
     })
 }
 

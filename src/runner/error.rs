@@ -2,7 +2,7 @@
 
 use crate::catalog::{CatalogError, FieldChange};
 use crate::domain::{BlockName, PairName};
-use crate::store::{ArtifactError, LockError, StorageError, StoreError};
+use crate::store::{ArtifactError, LockError, PlaceError, StorageError, StoreError};
 
 /// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +37,9 @@ pub enum RunError {
     /// The folder of inputs cannot be used.
     #[error("{0}")]
     Storage(#[from] StorageError),
+    /// The artifacts belong to another catalog.
+    #[error(transparent)]
+    Place(#[from] PlaceError),
     /// An artifact could not be written.
     #[error(transparent)]
     Artifact(#[from] ArtifactError),

@@ -13,7 +13,7 @@ use crate::store::{Project, StorageError};
 /// Longest time for looking at the folder of a root.
 const MAX_TIME: Duration = Duration::from_secs(30);
 
-/// Checks that the project's directory was not renamed, and that the roots of inputs with these stored paths can be read
+/// Checks that the project's directory was not renamed, that the folder of artifacts can be read, and that the roots of inputs with these stored paths can be read
 /// and are not empty. A disk that is not mounted ends the run, because otherwise it would fail every pair. A folder that
 /// does not answer in time is not an error here.
 ///
@@ -24,7 +24,11 @@ pub(super) async fn check_folders<const N: usize>(
     inputs: [String; N],
 ) -> Result<(), RunError> {
     let project = context.project.clone();
-    run_blocking(move || project.check_in_place()).await?;
+    run_blocking(move || {
+        project.check_in_place()?;
+        project.check_artifacts_folder()
+    })
+    .await?;
     if context.project.storage().is_none() {
         return Ok(());
     }

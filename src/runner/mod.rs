@@ -6,6 +6,7 @@
 //! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task`
 //! runs its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
 
+mod artifacts_owner;
 mod block_artifacts;
 mod block_checkpoint;
 mod block_inputs;
@@ -30,6 +31,7 @@ mod liveness;
 mod memory_budget;
 mod options;
 mod pair_context;
+mod pair_failure;
 mod pair_task;
 mod policy;
 mod prefetch;
@@ -50,6 +52,7 @@ mod stop;
 mod tests;
 mod worker_session;
 
+pub use artifacts_owner::claim_artifacts;
 pub use block_stages::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
     CharacterOutput, CutFiles,

@@ -13,10 +13,10 @@ use super::folder_check::check_folders;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
-use super::policy::{self, FailedAttempt};
+use super::pair_failure::FailedPair;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
+use crate::catalog::{InputVersions, Lease, PairAttributes, PairWork};
 use crate::domain::{Failure, FailureClass, Stage, WaitReason};
 use crate::failpoint::{self, Point};
 use crate::platform::ActiveClock;
@@ -209,51 +209,16 @@ async fn store_failure(
         Some(inputs) => inputs,
         None => pair.inputs_now(context).await,
     };
-    let now = context.clock.now();
-    let attempt = FailedAttempt {
-        pair: lease.pair(),
-        class: failed.failure.class,
-        is_transient: failed.is_transient,
-        attempt: lease.attempt(),
-        exclusive: lease.exclusive(),
-    };
-    let action = policy::failure_action(attempt, now);
-    let record = StageFailure {
-        stage,
-        failure: failed.failure.clone(),
-        action,
-        fingerprint: context.fingerprints.of(stage),
+    let failed = FailedPair {
+        name: pair.attributes.name,
         attributes: pair.attributes_json,
+        stage,
+        failure: failed.failure,
+        is_transient: failed.is_transient,
         inputs,
         ms: failed.ms,
-        at: now,
-        alive_since: context.alive_since(),
     };
-    if !context.catalog.fail(lease, record).await? {
-        return Ok(PairEnd::LeaseLost);
-    }
-    let (pair, failure) = (pair.attributes.name, failed.failure);
-    let wait_ms = match action {
-        FailureAction::BackOff { run_at } => (run_at - now).unsigned_abs(),
-        FailureAction::RetryExclusive => 0,
-        FailureAction::Quarantine => {
-            let skipped = (context.until.index() + 1).saturating_sub(stage.index()) as u64;
-            context.emit(RunEvent::PairFailed {
-                pair,
-                stage,
-                failure,
-                skipped,
-            });
-            return Ok(PairEnd::Failed);
-        }
-    };
-    context.emit(RunEvent::PairBackingOff {
-        pair,
-        stage,
-        failure,
-        wait_ms,
-    });
-    Ok(PairEnd::Retry)
+    failed.store(context, lease).await
 }
 
 /// Data that is stored if the pair fails. The task keeps this copy, because the thread's data is lost if the thread

@@ -8,6 +8,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
+use super::artifacts_owner::claim_artifacts;
 use super::block_pipeline::BlockPipeline;
 use super::block_plan;
 use super::block_stages::{BlockStages, block_settings};
@@ -89,6 +90,7 @@ pub(super) async fn run_with(
     let mut selection = RunSelection::of(catalog, options.only.as_ref()).await?;
     let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
     let mut guard = RunGuard::acquire(project, catalog, options)?;
+    claim_artifacts(project, catalog, false).await?;
     let settings = WorkerSettings {
         fingerprints: fingerprint_ids,
         blocks: block_settings(&*executors.blocks),

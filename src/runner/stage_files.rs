@@ -34,27 +34,41 @@ const LONGEST_WRITE_AFTER_STOP: Duration = Duration::from_secs(5);
 /// After a stop request, a write is given at least this long.
 const SHORTEST_WRITE_AFTER_STOP: Duration = Duration::from_secs(1);
 
+/// Why the files of a stage were not written, although the run goes on.
+pub(super) enum Unwritten {
+    /// A stop request, or an unavailable object store.
+    Interrupted,
+    /// Something else has the name of a file of this stage.
+    Blocked(Box<StageCheckpoint>, ArtifactError),
+}
+
 /// Writes the files of `first` and of the stages that have arrived meanwhile. Returns the rows of the written stages,
-/// and `false` if a stage is unwritten because of a stop request or an unavailable object store.
+/// and why a stage is unwritten, if one is.
 pub(super) async fn write_batch(
     context: &RunContext,
     pair: &PairName,
     first: ComputedStage,
     stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
-) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
+) -> Result<(Vec<StageCheckpoint>, Option<Unwritten>), RunError> {
     if context.project.has_packs() {
         return write_pack(context, pair, first, stages).await;
     }
     let (mut batch, mut next) = (Vec::new(), Some(first));
     while let Some((mut stage, files)) = next {
         stage.written = std::time::Instant::now();
-        if !write_files(context, pair, stage.stage, files).await? {
-            return Ok((batch, false));
+        match write_files(context, pair, stage.stage, files).await {
+            Ok(true) => {}
+            Ok(false) => return Ok((batch, Some(Unwritten::Interrupted))),
+            Err(error @ ArtifactError::Blocked { .. }) => {
+                let blocked = Unwritten::Blocked(Box::new(stage), error);
+                return Ok((batch, Some(blocked)));
+            }
+            Err(error) => return Err(error.into()),
         }
         batch.push(with_times(context, stage));
         next = stages.try_recv().ok();
     }
-    Ok((batch, true))
+    Ok((batch, None))
 }
 
 /// Sets the times of a row. Must be called after the slow write, because the lease must still be valid at this point.
@@ -94,7 +108,7 @@ async fn write_pack(
     pair: &PairName,
     first: ComputedStage,
     stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
-) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
+) -> Result<(Vec<StageCheckpoint>, Option<Unwritten>), RunError> {
     let deadline = Instant::now() + PACK_WAIT;
     let (mut batch, mut files) = (vec![first.0], first.1);
     let mut counts = vec![files.len()];
@@ -122,7 +136,7 @@ async fn write_pack(
     let longest = context.stage_timeout.saturating_sub(computed);
     let longest = longest.max(SHORTEST_STORE_WAIT);
     let Some(locations) = stored_in_bucket(context, writing, longest).await? else {
-        return Ok((Vec::new(), false));
+        return Ok((Vec::new(), Some(Unwritten::Interrupted)));
     };
     let mut located = files.iter().zip(locations);
     for (stage, count) in batch.iter_mut().zip(counts) {
@@ -133,7 +147,7 @@ async fn write_pack(
         }
     }
     let batch = batch.into_iter().map(|stage| with_times(context, stage));
-    Ok((batch.collect(), true))
+    Ok((batch.collect(), None))
 }
 
 /// Runs `writing` on a thread for blocking calls, again and again while the object store is unavailable. Returns `None`

@@ -126,10 +126,12 @@ impl StageInputs {
                 ArtifactError::NoStore(_) | ArtifactError::Bucket(_) => {
                     ExecutionError::Store(error)
                 }
-                ArtifactError::Io { .. } | ArtifactError::Moved(_) => ExecutionError::Failed {
-                    failure: Failure::new(FailureClass::Io, error.to_string()),
-                    is_transient: true,
-                },
+                ArtifactError::Io { .. } | ArtifactError::Moved(_) | ArtifactError::Blocked { .. } => {
+                    ExecutionError::Failed {
+                        failure: Failure::new(FailureClass::Io, error.to_string()),
+                        is_transient: !matches!(error, ArtifactError::Blocked { .. }),
+                    }
+                }
             })
     }
 

@@ -7,7 +7,8 @@
 use std::path::PathBuf;
 
 use super::Project;
-use super::artifacts::{ArtifactError, NewArtifact};
+use super::artifact_error::ArtifactError;
+use super::artifacts::NewArtifact;
 use super::packed::of_bucket;
 use super::remote::{Bucket, ProjectStorage};
 use crate::domain::{ArtifactRef, ContentHash};
@@ -40,8 +41,10 @@ impl Project {
         let storage = self.storage()?;
         let bucket = storage.artifacts()?;
         let key = artifact.stored_path()?;
-        // The artifacts of a project that used no object store before stay in its folder.
-        (!self.dir().join(&key).exists()).then_some((storage, bucket, key))
+        // The artifacts of a project that used no object store before stay in its folder. A file that cannot be looked at
+        // counts as being there, so that it is reported as unreadable, not as missing in the store.
+        let is_in_folder = self.dir().join(&key).try_exists().unwrap_or(true);
+        (!is_in_folder).then_some((storage, bucket, key))
     }
 
     /// Reads an artifact that is an object of its own, past local copies, and checks its hash.

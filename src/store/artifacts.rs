@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
+use super::artifact_error::ArtifactError;
 use super::atomic_write::{set_modified_now, write_synced};
 use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
 use super::parent_folder::{parent_folder, sync_folder};
-use super::remote::BucketError;
 use crate::domain::{ArtifactRef, ContentHash};
 use crate::platform::rename;
 
@@ -54,62 +54,6 @@ impl NewArtifact {
     /// Returns its content.
     pub(super) fn bytes(&self) -> &[u8] {
         &self.bytes
-    }
-}
-
-/// Why an artifact could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum ArtifactError {
-    /// A row names it, but the file is missing.
-    #[error("artifact {0} is missing")]
-    Missing(PathBuf),
-    /// The file was changed after it was written.
-    #[error("artifact {0} was changed: its bytes do not match its name")]
-    Changed(PathBuf),
-    /// The project's directory was renamed or removed.
-    #[error(
-        "{0} was renamed, moved or removed during this command, so nothing more was written there; run the command again with the new path"
-    )]
-    Moved(PathBuf),
-    /// A row names a pack in an object store, but the settings name no store.
-    #[error("artifact {0} is in an object store; set storage.artifacts to its address")]
-    NoStore(String),
-    /// A request to the object store failed.
-    #[error("artifact: {0}")]
-    Bucket(BucketError),
-    /// A file operation failed.
-    #[error("artifact {path}: {source}")]
-    Io {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-}
-
-impl ArtifactError {
-    /// Returns whether an object store did not answer, so that the same request may succeed later.
-    pub const fn is_unavailable(&self) -> bool {
-        matches!(self, Self::Bucket(BucketError::Unavailable { .. }))
-    }
-
-    fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Io { path, source }
-    }
-}
-
-impl From<InputError> for ArtifactError {
-    fn from(error: InputError) -> Self {
-        match error {
-            InputError::NotThere(path) => Self::Missing(path),
-            InputError::NotAFile { path, .. }
-            | InputError::Changed(path)
-            | InputError::TooLarge { path, .. } => Self::Changed(path),
-            InputError::Denied(path) => Self::io(&path)(ErrorKind::PermissionDenied.into()),
-            InputError::Object(error) | InputError::Store(error) => Self::Bucket(error),
-            InputError::Io { path, source } => Self::Io { path, source },
-        }
     }
 }
 
@@ -223,24 +167,6 @@ impl Project {
         Ok(())
     }
 
-    /// Returns whether the folder of artifacts is missing or holds none. Returns `false` if artifacts are in an object
-    /// store, or if the folder cannot be read.
-    pub fn has_no_artifacts(&self) -> bool {
-        if self
-            .storage()
-            .is_some_and(|storage| storage.artifacts().is_some())
-        {
-            return false;
-        }
-        match std::fs::read_dir(self.artifacts_dir()) {
-            Ok(entries) => {
-                let temporary = self.temporary_dir();
-                entries.flatten().all(|entry| entry.path() == temporary)
-            }
-            Err(error) => error.kind() == ErrorKind::NotFound,
-        }
-    }
-
     /// Removes the temporary files of killed processes. No process may write artifacts during this call.
     ///
     /// # Errors
@@ -273,11 +199,15 @@ impl Project {
 
     /// Creates a folder in the artifacts folder, and the artifacts folder, if they are missing. Never creates the
     /// project's directory: after a renaming, that would leave a second, incomplete project at the old path.
-    fn make_folder(&self, folder: &Path) -> Result<(), ArtifactError> {
+    pub(super) fn make_folder(&self, folder: &Path) -> Result<(), ArtifactError> {
         self.check_in_place()?;
         for folder in [&self.artifacts_dir(), folder] {
             match std::fs::create_dir(folder) {
-                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                    if let Some(error) = ArtifactError::blocked_folder(&folder.join("file")) {
+                        return Err(error);
+                    }
+                }
                 created => created.map_err(ArtifactError::io(folder))?,
             }
         }
@@ -306,7 +236,10 @@ impl Project {
                 on_written();
                 rename(&temporary, path)
             })
-            .map_err(ArtifactError::io(path));
+            .map_err(|error| match regular_metadata(path) {
+                Err(blocked @ InputError::NotAFile { .. }) => blocked.into(),
+                _ => ArtifactError::io(path)(error),
+            });
         if outcome.is_err() {
             // Free the space, because the disk may be full. A file that cannot be removed does no harm.
             let _ = std::fs::remove_file(&temporary);
@@ -424,6 +357,30 @@ mod tests {
         std::fs::remove_dir(&old).expect("removed");
         std::fs::rename(&new, &old).expect("renamed back");
         write(&project, &image(b"a"));
+    }
+
+    #[test]
+    fn a_folder_with_the_name_of_an_artifact_is_named_and_left_alone() {
+        let (_dir, project) = project();
+        let image = image(b"a");
+        let path = project.artifact_path(image.reference());
+        std::fs::create_dir_all(path.join("mine")).expect("a folder");
+        let text = format!("{} is a directory, where", path.display());
+        let files = std::slice::from_ref(&image);
+        for outcome in [
+            project.write_artifacts(files, &|| {}),
+            project.check_artifact(image.reference(), true),
+            project.read_artifact(image.reference()).map(drop),
+        ] {
+            let error = outcome.expect_err("no file can be there");
+            assert!(matches!(error, ArtifactError::Blocked { .. }), "{error}");
+            assert!(error.to_string().starts_with(&text), "{error}");
+        }
+        assert!(path.join("mine").exists());
+        write(
+            &project,
+            &NewArtifact::new("depth.png", "png", b"b".to_vec()),
+        );
     }
 
     #[test]

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::Project;
-use super::artifacts::ArtifactError;
+use super::artifact_error::ArtifactError;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
-use super::remote::{Bucket, PACKS, pack_number};
+use super::remote::{Bucket, PACKS, pack_key, pack_number};
 use crate::domain::{ARTIFACTS, ArtifactRef};
 
 /// Key of an object whose time of change is the present time of the store.
@@ -40,7 +40,8 @@ impl ReferencedArtifacts {
             let collected = self.collect_objects(bucket, age, is_idle, &mut each);
             collected.map_err(ArtifactError::Bucket)?;
         }
-        if !project.artifacts_dir().exists() {
+        let folder = project.artifacts_dir();
+        if !folder.try_exists().map_err(ArtifactError::io(&folder))? {
             return Ok(());
         }
         let aside = project.temporary_dir();
@@ -76,7 +77,10 @@ impl ReferencedArtifacts {
         let before = bucket.stat(MARKER)?.modified - age.as_millis() as i64;
         let mut found = Vec::new();
         bucket.list(PACKS, |key, stat| {
-            let number = pack_number(&key);
+            // A project whose place is below this folder has packs that are not ours.
+            let name = key.rsplit_once('/').map_or(&*key, |(_, name)| name);
+            let number =
+                pack_number(&key).filter(|_| pack_key(name.trim_end_matches(".tar")) == key);
             if number.is_none_or(|number| !self.has_pack(number)) {
                 found.push((key, stat, number.is_some()));
             }
@@ -213,6 +217,8 @@ mod tests {
             artifact
         });
         bucket.put("packs/notes.txt", b"mine");
+        let nested = format!("packs/packs/ab/{}-{:016x}.tar", "ab".repeat(32), 7);
+        bucket.put(&nested, b"a pack of a project in a folder of this one");
         let collect = |age| {
             let mut referenced = ReferencedArtifacts::default();
             referenced.add(&artifacts[0]);
@@ -225,11 +231,12 @@ mod tests {
             seen
         };
         let unknown = (UnreferencedKind::UnknownFile, false);
-        assert_eq!(collect(DAY), [(UnreferencedKind::Orphan, false), unknown]);
+        let kept = (UnreferencedKind::Orphan, false);
+        assert_eq!(collect(DAY), [kept, unknown, unknown]);
         let removed = (UnreferencedKind::Orphan, true);
-        until(|| collect(Duration::ZERO) == [removed, unknown]);
+        until(|| collect(Duration::ZERO) == [removed, unknown, unknown]);
         assert_eq!(project.read_artifact(&artifacts[0]).expect("kept"), b"same");
-        assert!(bucket.stat("packs/notes.txt").is_ok());
+        assert!(bucket.stat("packs/notes.txt").is_ok() && bucket.stat(&nested).is_ok());
     }
 
     #[test]

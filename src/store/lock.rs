@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::Project;
+use super::input_error::InputError;
 use super::open_file::open_regular;
 use crate::platform::unlock;
 
@@ -88,12 +89,13 @@ impl RunLock {
         })
     }
 
-    /// Returns whether a process is working on the project. A process may start right after the check.
+    /// Returns whether a process is working on the project, or this cannot be found out. A process may start right after
+    /// the check.
     pub fn is_held(project: &Project) -> bool {
         // A lock needs no permission to write.
         match open_regular(&project.dir().join(MEMBERS)) {
             Ok((members, _)) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
-            Err(_) => false,
+            Err(error) => !matches!(error, InputError::NotThere(_)),
         }
     }
 
@@ -225,6 +227,10 @@ mod tests {
         assert!(RunLock::is_held(&project));
         drop(owner);
         assert!(!RunLock::is_held(&project));
+        let members = dir.path().join(super::MEMBERS);
+        std::fs::remove_file(&members).expect("removed");
+        std::fs::create_dir(&members).expect("no file");
+        assert!(RunLock::is_held(&project), "nobody knows");
     }
 
     #[test]

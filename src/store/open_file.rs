@@ -62,7 +62,7 @@ fn check_regular(path: &Path, meta: &Metadata) -> Result<(), InputError> {
     }
     Err(InputError::NotAFile {
         path: path.to_owned(),
-        kind: kind(meta),
+        kind: file_kind(meta),
     })
 }
 
@@ -70,14 +70,16 @@ fn check_readable(meta: &Metadata) -> io::Result<()> {
     if meta.is_file() || is_pipe(meta.file_type()) {
         return Ok(());
     }
-    let text = format!("it is {}, not a file", kind(meta));
+    let text = format!("it is {}, not a file", file_kind(meta));
     Err(io::Error::other(text))
 }
 
-/// Returns what an entry is that is not a regular file.
-fn kind(meta: &Metadata) -> &'static str {
+/// Returns what an entry of a folder is.
+pub(super) fn file_kind(meta: &Metadata) -> &'static str {
     let file_type = meta.file_type();
-    if file_type.is_dir() {
+    if file_type.is_file() {
+        "a file"
+    } else if file_type.is_dir() {
         "a directory"
     } else if is_pipe(file_type) {
         "a pipe"

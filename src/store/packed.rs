@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use super::Project;
-use super::artifacts::{ArtifactError, NewArtifact};
+use super::artifact_error::ArtifactError;
+use super::artifacts::NewArtifact;
 use super::remote::{Bucket, BucketError, Pack, ProjectStorage, pack_key, read_from_pack};
 use crate::domain::{ArtifactRef, PackLocation};
 
@@ -93,10 +94,11 @@ impl Project {
     }
 }
 
-/// Converts an error of a bucket. A missing object is a missing artifact.
+/// Converts an error of a bucket. A missing object is a missing artifact, and a larger one is a changed one.
 pub(super) fn of_bucket(error: BucketError) -> ArtifactError {
     match error {
         BucketError::NotThere(address) => ArtifactError::Missing(address.into()),
+        BucketError::TooLarge { address, .. } => ArtifactError::Changed(address.into()),
         error => ArtifactError::Bucket(error),
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::Project;
+use super::owner_record::is_owner_record;
 use super::remote::pack_number;
 use crate::domain::{ArtifactRef, ContentHash};
 
@@ -77,6 +78,9 @@ impl ReferencedArtifacts {
     ) -> std::io::Result<()> {
         self.sort();
         for entry in Entry::list(&project.artifacts_dir())? {
+            if is_owner_record(entry.name().as_ref()) {
+                continue;
+            }
             if !entry.is_dir {
                 each(entry.unreferenced(UnreferencedKind::UnknownFile));
             } else if entry.path == project.temporary_dir() {

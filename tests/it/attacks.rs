@@ -89,7 +89,7 @@ fn command(project: &Project, args: &[&str]) -> Command {
 fn assert_whole(project: &Project) {
     let checked = mocban(project.dir(), &["check"]);
     if checked.code == 12 {
-        mocban(project.dir(), &["check", "--repair"]).expect(0);
+        mocban(project.dir(), &["check", "--repair", "--accept-missing"]).expect(0);
     } else {
         checked.expect(0);
     }
@@ -116,7 +116,7 @@ fn a_repair_survives_kills() {
         for path in artifacts.keys().step_by(2) {
             std::fs::remove_file(p.artifacts_dir().join(path)).expect("removed");
         }
-        let mut repair = command(&p, &["check", "--repair"]);
+        let mut repair = command(&p, &["check", "--repair", "--accept-missing"]);
         target.kill(&mut repair, Duration::from_millis(200));
         assert_whole(&p);
         call(&mut run(&p, &[])).expect(0);

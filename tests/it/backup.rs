@@ -52,9 +52,8 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     let blank = Project::open(&blank).expect("a project");
     let settings = std::fs::read(original.settings_path()).expect("settings");
     assert!(std::fs::read(blank.settings_path()).expect("settings") == settings);
-    let repaired = at(&blank, &["check", "--repair", "--json"])
-        .expect(0)
-        .json();
+    let accept = ["check", "--repair", "--accept-missing", "--json"];
+    let repaired = at(&blank, &accept).expect(0).json();
     assert_eq!(repaired["pairs"], 3);
     assert!(
         repaired["damage"]["file_missing"]["found"].as_u64() >= Some(1),
@@ -110,9 +109,12 @@ fn restore_finds_inputs_in_another_directory() {
             text.contains("the depth maps and masks of the results are not here"),
             "{text}"
         );
-        assert!(told.next()[0].ends_with("check --repair"), "{text}");
+        assert!(
+            told.next()[0].ends_with("check --repair --accept-missing"),
+            "{text}"
+        );
     }
-    at(&restored, &["check", "--repair"]).expect(0);
+    at(&restored, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&restored, &["run"]).expect(0);
     let told = at(&restored, &["status"]).expect(0);
     assert!(!told.out.contains("not here"), "{}", told.out);
@@ -161,12 +163,12 @@ fn check_keeps_the_results_of_pairs_whose_inputs_are_missing() {
     std::fs::remove_dir_all(project.artifacts_dir()).expect("removed");
     let before = at(&project, &["status", "--json"]).expect(0).out;
     let kept = at(&project, &["check", "--repair"]).expect(12);
-    let reason = "not queued again, because a mesh or print is missing";
+    let reason = "not queued again, because a mesh or print is missing or cannot be read";
     assert!(kept.out.contains(reason), "{}", kept.out);
     assert_eq!(at(&project, &["status", "--json"]).expect(0).out, before);
 
     std::fs::rename(&moved, &data).expect("moved back");
-    at(&project, &["check", "--repair"]).expect(0);
+    at(&project, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&project, &["run"]).expect(0);
     at(&project, &["check"]).expect(0);
 }
@@ -191,7 +193,7 @@ fn verdicts_survive_a_restore() {
     copy_folder(&project.dir().join("data"), &other.join("data"));
     restore(&file, &other);
     let restored = Project::open(&other).expect("a project");
-    at(&restored, &["check", "--repair"]).expect(0);
+    at(&restored, &["check", "--repair", "--accept-missing"]).expect(0);
     at(&restored, &["run"]).expect(0);
     at(&restored, &["check"]).expect(0);
     // The results are the same, so the verdicts apply to them again.

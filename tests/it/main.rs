@@ -75,6 +75,7 @@ mod old_snapshots;
 mod one_pair;
 mod page;
 mod parsers;
+mod place_owner;
 #[cfg(unix)]
 mod pooler;
 #[cfg(unix)]

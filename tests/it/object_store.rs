@@ -13,7 +13,7 @@ use mocban::check::{CheckOptions, check};
 use mocban::store::Project;
 
 use crate::cli::{Call, binary, call, empty, mocban};
-use crate::resume::project;
+use crate::resume::{copy_folder, project};
 use crate::s3_server::{Faults, Outage, S3Server, proxy, proxy_with_outage};
 use crate::uninterrupted::{assert_same_files, files};
 
@@ -107,13 +107,15 @@ fn a_pair_is_one_object_and_two_reads_and_the_results_are_those_of_local_files()
     let (port, requests) = proxy(remote.server.port(), GOOD);
     remote.remote(port, &["run"]).expect(0);
     let pairs: u64 = PAIRS.parse().expect("a number");
-    assert_eq!(requests.put.load(Ordering::Relaxed), pairs);
-    // One list at the start shows that each bucket can be read.
+    // One more object names the owner of the results.
+    assert_eq!(requests.put.load(Ordering::Relaxed), pairs + 1);
+    // One list at the start shows that each bucket can be read. The owner is looked for, two lists show that there are no
+    // results yet, and the owner is read again.
     assert!(
-        requests.get.load(Ordering::Relaxed) <= 2 * pairs + 2,
+        requests.get.load(Ordering::Relaxed) <= 2 * pairs + 2 + 4,
         "{requests:?}"
     );
-    assert_eq!(remote.server.list("results").len() as u64, pairs);
+    assert_eq!(remote.server.list("results/packs").len() as u64, pairs);
     remote.assert_same_results();
     // Another computer has no copies of the inputs, and nothing to do.
     let run = call(&mut remote.command(port, "other", &["run"])).expect(0);
@@ -122,9 +124,9 @@ fn a_pair_is_one_object_and_two_reads_and_the_results_are_those_of_local_files()
         "{}",
         run.err
     );
-    assert_eq!(remote.server.list("results").len() as u64, pairs);
+    assert_eq!(remote.server.list("results/packs").len() as u64, pairs);
     remote.remote(port, &["run", "--rerun", "all"]).expect(0);
-    assert_eq!(remote.server.list("results").len() as u64, 2 * pairs);
+    assert_eq!(remote.server.list("results/packs").len() as u64, 2 * pairs);
     let collected = remote.remote(port, &["check", "--collect=1"]).expect(0);
     assert!(
         collected.out.contains("removed 0 of 6 files"),
@@ -264,7 +266,7 @@ fn a_lost_pack_is_computed_again() {
     let Some(remote) = Remote::new() else { return };
     let port = remote.server.port();
     remote.remote(port, &["run"]).expect(0);
-    let packs = remote.server.list("results");
+    let packs = remote.server.list("results/packs");
     remote.server.remove(&packs[0]);
     let checked = remote.remote(port, &["check"]).expect(12);
     assert!(
@@ -398,6 +400,8 @@ async fn old_files_are_removed_while_the_same_results_are_computed_again() {
     let dir = empty();
     let local = project(dir.path(), "local", "4");
     let options = CheckOptions {
+        accept_missing: false,
+        take_over: false,
         quick: true,
         repair: false,
         in_use: true,
@@ -442,4 +446,109 @@ fn make_old(folder: &Path) {
         let changed = file.and_then(|file| file.set_modified(old));
         changed.expect("changed");
     }
+}
+
+/// A backup restored beside the original, and a copied folder, name the same bucket.
+#[test]
+fn a_bucket_belongs_to_one_catalog_until_another_takes_it_over() {
+    let Some(remote) = Remote::new() else { return };
+    let port = remote.server.port();
+    remote.remote(port, &["run"]).expect(0);
+    remote.remote(port, &["backup", "b.sqlite"]).expect(0);
+    mocban(remote.path(), &["restore", "b.sqlite", "again"]).expect(0);
+    let settings = |folder: &str| remote.path().join(folder).join("mocban.toml");
+    std::fs::copy(settings("remote"), settings("again")).expect("copied");
+    copy_folder(&remote.path().join("remote"), &remote.path().join("copy"));
+    let objects = remote.server.list("results");
+    let of = |folder: &str, args: &[&str]| {
+        let mut command = remote.command(port, "cache", &[]);
+        call(command.args(["-C", folder]).args(args))
+    };
+    for (folder, kind) in [
+        ("again", "of another catalog"),
+        ("copy", "the original or a copy"),
+    ] {
+        for args in [
+            &["check", "--repair"][..],
+            &["check", "--collect=1"],
+            &["run", "--rerun", "all"],
+            &["plan"],
+        ] {
+            let refused = of(folder, args).expect(2);
+            for wanted in [
+                "s3://mocban/results",
+                kind,
+                "remote/catalog.sqlite",
+                "--take-over",
+            ] {
+                assert!(refused.err.contains(wanted), "{wanted}: {}", refused.err);
+            }
+        }
+        assert!(of(folder, &["check"]).expect(0).err.contains("warning: "));
+    }
+    assert_eq!(remote.server.list("results"), objects);
+    // The project is moved, without a word, and another catalog takes the place over.
+    std::fs::rename(remote.path().join("remote"), remote.path().join("moved")).expect("moved");
+    let told = of("moved", &["check", "--repair"]).expect(0);
+    assert!(!told.err.contains("warning"), "{}", told.err);
+    let told = of("again", &["check", "--take-over"]).expect(0);
+    assert!(
+        told.err.contains("now belongs to this catalog"),
+        "{}",
+        told.err
+    );
+    of("again", &["check", "--repair"]).expect(0);
+    let refused = of("moved", &["run"]).expect(2);
+    assert!(
+        refused.err.contains("again/catalog.sqlite"),
+        "{}",
+        refused.err
+    );
+    of("again", &["run"]).expect(0);
+}
+
+/// Wrong settings look as if every result were gone.
+#[test]
+fn a_repair_with_a_store_that_cannot_be_read_changes_nothing() {
+    let Some(remote) = Remote::new() else { return };
+    let port = remote.server.port();
+    remote.remote(port, &["run"]).expect(0);
+    let before = remote.remote(port, &["status", "--json"]).expect(0).out;
+    let set = |setting: &str, args: &[&str]| {
+        let all = [&["--set", setting][..], args].concat();
+        call(&mut remote.command(port, "cache", &all))
+    };
+    for args in [
+        &["check"][..],
+        &["check", "--repair"],
+        &["check", "--repair", "--accept-missing"],
+    ] {
+        let refused = set("storage.artifacts=s3://no-such-bucket/x", args).expect(1);
+        let reason = "there is no such bucket";
+        assert_eq!(refused.err.matches(reason).count(), 1, "{}", refused.err);
+        assert!(refused.out.is_empty(), "{}", refused.out);
+    }
+    // Another folder has no results.
+    let kept = set(
+        "storage.artifacts=s3://mocban/other",
+        &["check", "--repair"],
+    )
+    .expect(12);
+    assert!(kept.out.contains("no result file is there"), "{}", kept.out);
+    let away = call(
+        remote
+            .command(1, "cache", &["check", "--repair"])
+            .env("MOCBAN_STORE_TIME_SCALE", "240"),
+    )
+    .expect(1);
+    assert!(
+        away.err.contains("does not answer properly"),
+        "{}",
+        away.err
+    );
+    assert_eq!(
+        remote.remote(port, &["status", "--json"]).expect(0).out,
+        before
+    );
+    remote.assert_same_results();
 }

@@ -84,6 +84,8 @@ impl Catalog {
             error => error,
         })?;
         conn.close().await.map_err(unreadable)?;
+        let renewed = renew_identity(file).await;
+        renewed.map_err(|error| disk_error(file, error))?;
         let taken = take_settings(file).await;
         let settings = taken.map_err(|error| disk_error(file, error))?;
         verify(file).await?;
@@ -125,6 +127,15 @@ async fn store_settings(file: &Path, settings: Option<&[u8]>) -> sqlx::Result<()
             .execute(&mut copy)
             .await?;
     }
+    copy.close().await
+}
+
+/// Gives a restored catalog an identity of its own, so that it does not own the artifacts of the original.
+async fn renew_identity(file: &Path) -> sqlx::Result<()> {
+    let mut copy = open_copy(file).await?;
+    sqlx::query("UPDATE catalog_identity SET id = randomblob(16)")
+        .execute(&mut copy)
+        .await?;
     copy.close().await
 }
 

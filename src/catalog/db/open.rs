@@ -113,6 +113,10 @@ async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identit
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
         Ok(meta) if meta.len() > 0 => Err(CatalogError::NotCheckpointed(log)),
+        // Results that are only in a log that cannot be looked at would be missing.
+        Err(source) if source.kind() != ErrorKind::NotFound => {
+            Err(CatalogError::Io { path: log, source })
+        }
         Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
         Ok(_) | Err(_) => pool(options(path).read_only(true).immutable(true))
             .await

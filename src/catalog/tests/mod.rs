@@ -8,6 +8,7 @@ mod claim_order;
 mod control_points;
 mod guards;
 mod histories;
+mod identity;
 mod import;
 mod model;
 mod place;

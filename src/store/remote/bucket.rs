@@ -10,7 +10,7 @@ use std::sync::mpsc;
 
 use futures_util::TryStreamExt as _;
 use object_store::path::Path;
-use object_store::{GetOptions, ObjectStore, ObjectStoreExt as _, PutPayload};
+use object_store::{GetOptions, ObjectStore, ObjectStoreExt as _, PutMode, PutPayload};
 
 use super::bucket_error::BucketError;
 use super::client::LazyClient;
@@ -166,6 +166,38 @@ impl Bucket {
         })
     }
 
+    /// Stores an object unless there is one of this name. Returns whether it was stored. Of several processes that call this at
+    /// the same time, one stores its object; a store without conditional requests keeps the last one.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn create(&self, key: &str, bytes: Vec<u8>) -> Result<bool, BucketError> {
+        self.request(key, |store, path| async move {
+            let payload = PutPayload::from(bytes);
+            let created = store
+                .put_opts(&path, payload.clone(), PutMode::Create.into())
+                .await;
+            match created {
+                Err(object_store::Error::AlreadyExists { .. }) => Ok(false),
+                Err(object_store::Error::NotImplemented { .. }) => {
+                    store.put(&path, payload).await.map(|_| true)
+                }
+                created => created.map(|_| true),
+            }
+        })
+    }
+
+    /// Returns whether there is no object below `folder`.
+    ///
+    /// # Errors
+    /// Returns an error if the request fails.
+    pub(in crate::store) fn is_empty(&self, folder: &str) -> Result<bool, BucketError> {
+        self.request(folder, |store, path| async move {
+            let first = store.list(Some(&path)).try_next().await;
+            first.map(|first| first.is_none())
+        })
+    }
+
     /// Removes an object. Does nothing if there is none.
     ///
     /// # Errors
@@ -239,7 +271,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(super) fn check(&self) -> Result<(), BucketError> {
+    pub(in crate::store) fn check(&self) -> Result<(), BucketError> {
         let store = self.client.for_first_request();
         let store = store.map_err(|reason| self.unusable(&reason))?;
         let prefix = self.prefix.clone();
@@ -341,6 +373,11 @@ mod tests {
                 ("packs/cd/chữ 2.zip".to_owned(), 20)
             ]
         );
+        let create = |bytes: &[u8]| bucket.create("owner", bytes.to_vec()).expect("created");
+        assert!(bucket.is_empty("owner").expect("known"));
+        assert!(create(b"one") && !create(b"two"));
+        assert_eq!(bucket.read("owner", 100).expect("read"), b"one");
+        assert!(!bucket.is_empty("packs").expect("known"));
         bucket.remove("packs/ab/1.zip").expect("removed");
         bucket.remove("packs/ab/1.zip").expect("nothing to remove");
         let gone = bucket.read("packs/ab/1.zip", 100);

@@ -32,6 +32,16 @@ pub enum BucketError {
         /// What was tried, without the reply of the store.
         reason: String,
     },
+    /// The server has no certificate for its address that this computer accepts.
+    #[error(
+        "{address}: the certificate of the object store is not accepted ({reason}); check the host name in AWS_ENDPOINT_URL, the clock of this computer, and that it knows the authority (a file named by SSL_CERT_FILE)"
+    )]
+    Certificate {
+        /// Which object or folder.
+        address: String,
+        /// Why it is not accepted.
+        reason: String,
+    },
     /// The store refuses the request for another reason, which will be the same next time.
     #[error("{address}: the object store refuses the request ({reason})")]
     Failed {
@@ -127,6 +137,9 @@ impl BucketError {
             let reason = reason.to_owned();
             return Self::Failed { address, reason };
         }
+        if let Some(reason) = certificate_fault(error) {
+            return Self::Certificate { address, reason };
+        }
         let status_text = status.map(|status| format!("HTTP status {status}"));
         let reason = code.map(str::to_owned).or(status_text);
         match reason {
@@ -199,6 +212,18 @@ fn code_of(error: &object_store::Error) -> Option<String> {
     (is_word && code.len() <= 64).then(|| code.to_owned())
 }
 
+/// Returns why the certificate of the server was refused, if this is the cause of an error.
+fn certificate_fault(error: &object_store::Error) -> Option<String> {
+    let mut cause: &dyn Error = error;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let text = cause.to_string();
+    let (_, reason) = text.split_once("invalid peer certificate: ")?;
+    let line = reason.lines().next()?;
+    Some(line.chars().take(300).collect())
+}
+
 /// Returns the last cause of an error in one line. Causes that quote a reply of the store are left out.
 fn innermost(error: &object_store::Error) -> String {
     let mut cause: &dyn Error = error;
@@ -233,6 +258,9 @@ mod tests {
         assert!(!text.contains("AKIA"), "{text}");
         let error = BucketError::of("s3://b", &generic("404: <Code>NoSuchBucket</Code>"));
         assert!(matches!(error, BucketError::NoBucket(_)), "{error}");
+        let refused = generic("invalid peer certificate: UnknownIssuer");
+        let error = BucketError::of("s3://b", &refused);
+        assert!(matches!(error, BucketError::Certificate { .. }), "{error}");
         let error = BucketError::of("s3://b", &generic("<html>AKIASECRET</html>"));
         assert!(error.to_string().contains("unexpected reply"), "{error}");
     }

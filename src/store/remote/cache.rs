@@ -151,7 +151,13 @@ impl ObjectCache {
             file: temporary.reopen().map_err(local)?,
             hasher: blake3::Hasher::new(),
         };
-        let Some((target, stat)) = bucket.copy_to(key, limit, unless, target)? else {
+        let copied = bucket.copy_to(key, limit, unless, target);
+        let copied = copied.map_err(|error| match error {
+            // The disk of the copies failed, not the store.
+            BucketError::Local { source, .. } => local(source),
+            error => error,
+        })?;
+        let Some((target, stat)) = copied else {
             self.confirm(address);
             return Ok(None);
         };
@@ -165,7 +171,10 @@ impl ObjectCache {
         self.make_folder(&copy).map_err(local)?;
         let opened = File::open(temporary.path()).map_err(local)?;
         let temporary = temporary.into_temp_path();
-        rename(&temporary, &copy).map_err(local)?;
+        rename(&temporary, &copy).map_err(|source| BucketError::Local {
+            path: copy.clone(),
+            source,
+        })?;
         // The file has its new name, so there is nothing to remove.
         let _ = temporary.keep();
         self.write_known(&address, &known).map_err(local)?;

@@ -1,0 +1,31 @@
+//! Makes the catalog the owner of the places of its artifacts, before anything is written or removed there.
+
+use super::compute_thread::run_blocking;
+use super::error::RunError;
+use crate::catalog::Catalog;
+use crate::store::Project;
+
+/// Results whose files are looked for in a place without the name of an owner.
+const SAMPLES: usize = 20;
+
+/// Makes the catalog the owner of the places of its artifacts, or checks that it is. With `take_over`, replaces another
+/// owner. Warns if the owner changes.
+///
+/// # Errors
+/// Returns an error if a place belongs to another catalog, or if the catalog or a place cannot be read or written.
+pub async fn claim_artifacts(
+    project: &Project,
+    catalog: &Catalog,
+    take_over: bool,
+) -> Result<(), RunError> {
+    let identity = catalog.retry_while_unavailable(async || catalog.identity().await);
+    let identity = identity.await?;
+    let known = async || catalog.first_artifacts(SAMPLES).await;
+    let known = catalog.retry_while_unavailable(known).await?;
+    let project = project.clone();
+    let claimed = run_blocking(move || project.claim_places(&identity, &known, take_over));
+    for message in claimed.await? {
+        tracing::warn!("{message}");
+    }
+    Ok(())
+}

@@ -1,0 +1,81 @@
+//! Stores the failure of a stage of a pair, and reports it.
+
+use super::error::RunError;
+use super::events::RunEvent;
+use super::policy::{self, FailedAttempt};
+use super::run_context::{PairEnd, RunContext};
+use crate::catalog::{FailureAction, InputVersions, Lease, StageFailure};
+use crate::domain::{Failure, PairName, Stage};
+
+/// A stage of a pair that failed.
+pub(super) struct FailedPair {
+    pub(super) name: PairName,
+    /// The manifest attributes as JSON.
+    pub(super) attributes: String,
+    pub(super) stage: Stage,
+    pub(super) failure: Failure,
+    /// Whether a retry may succeed.
+    pub(super) is_transient: bool,
+    /// The input files as read.
+    pub(super) inputs: InputVersions,
+    pub(super) ms: Option<u64>,
+}
+
+impl FailedPair {
+    /// Stores the failure under the lease. Returns how the pair ended.
+    ///
+    /// # Errors
+    /// Returns an error if the catalog returns one.
+    pub(super) async fn store(
+        self,
+        context: &RunContext,
+        lease: Lease,
+    ) -> Result<PairEnd, RunError> {
+        let Self { stage, failure, .. } = self;
+        let now = context.clock.now();
+        let attempt = FailedAttempt {
+            pair: lease.pair(),
+            class: failure.class,
+            is_transient: self.is_transient,
+            attempt: lease.attempt(),
+            exclusive: lease.exclusive(),
+        };
+        let action = policy::failure_action(attempt, now);
+        let record = StageFailure {
+            stage,
+            failure: failure.clone(),
+            action,
+            fingerprint: context.fingerprints.of(stage),
+            attributes: self.attributes,
+            inputs: self.inputs,
+            ms: self.ms,
+            at: now,
+            alive_since: context.alive_since(),
+        };
+        if !context.catalog.fail(lease, record).await? {
+            return Ok(PairEnd::LeaseLost);
+        }
+        let pair = self.name;
+        let wait_ms = match action {
+            FailureAction::BackOff { run_at } => (run_at - now).unsigned_abs(),
+            FailureAction::RetryExclusive => 0,
+            FailureAction::Quarantine => {
+                let skipped = (context.until.index() + 1).saturating_sub(stage.index()) as u64;
+                context.emit(RunEvent::PairFailed {
+                    pair,
+                    stage,
+                    failure,
+                    skipped,
+                });
+                return Ok(PairEnd::Failed);
+            }
+        };
+        context.emit(RunEvent::PairBackingOff {
+            pair,
+            stage,
+            failure,
+            wait_ms,
+        });
+        Ok(PairEnd::Retry)
+    }
+}
