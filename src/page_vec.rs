@@ -15,7 +15,7 @@ use std::ops::{Deref, DerefMut};
 use bytemuck::Pod;
 
 use page_cache::PageBuffer;
-pub use page_cache::keep_memory;
+pub use page_cache::{keep_few_pages, keep_memory};
 
 /// Vectors of at least this many bytes use pages.
 const MIN_PAGED_BYTES: usize = 1 << 20;

@@ -151,7 +151,7 @@ class CorrectionPage {
     this.clearButton = button("clear_points", () => this.clear());
     this.removeButton = button("remove_saved", () => this.run(() => this.removeSaved()));
     const group = (key, buttons) => element("div", { class: "block-group", role: "group", "aria-label": text(key) }, ...buttons);
-    const back = element("a", { href: "/" }, text("back_to_page"));
+    const back = element("a", { href: "./" }, text("back_to_page"));
     return element("header", { class: "block-bar" },
       element("h1", {}, this.block.block), ...(this.block.is_aligned ? [back] : []),
       ...(this.sides.length > 1 ? [group("side", this.sides)] : []), this.turnButton, group("layers", this.layers),
@@ -226,7 +226,7 @@ class CorrectionPage {
   showSide(side) {
     this.side = side;
     const { size } = this.block.sides.find((one) => one.side === side);
-    this.face.show(`/correct/face/${side}/${this.turns}`, size, { turns: this.turns });
+    this.face.show(`correct/face/${side}/${this.turns}`, size, { turns: this.turns });
     this.update();
   }
 
@@ -238,7 +238,7 @@ class CorrectionPage {
   showPage(layer) {
     const isFirst = !this.layer;
     this.layer = layer;
-    this.page.show(layer === "page" ? "/correct/page" : `/correct/overlay/${this.tried}`, this.block.page_size, { keeps: !isFirst });
+    this.page.show(layer === "page" ? "correct/page" : `correct/overlay/${this.tried}`, this.block.page_size, { keeps: !isFirst });
     this.update();
   }
 
@@ -267,7 +267,7 @@ class CorrectionPage {
     this.isTried = false;
     const points = this.complete();
     this.tell(text("trying"));
-    const { agreement, id } = await this.send("/correct/try", { side: this.side, points });
+    const { agreement, id } = await this.send("correct/try", { side: this.side, points });
     // Points may have changed meanwhile.
     if (JSON.stringify(points) !== JSON.stringify(this.complete())) return;
     [this.isTried, this.tried] = [true, id];
@@ -276,14 +276,14 @@ class CorrectionPage {
   }
 
   async save() {
-    const { next } = await this.send("/correct/save", { id: this.tried });
-    this.block.is_saved = true;
+    const { next, saved_hash: hash } = await this.send("correct/save", { id: this.tried, saved_hash: this.block.saved_hash });
+    [this.block.is_saved, this.block.saved_hash] = [true, hash];
     this.tell(text("saved", { command: next }));
   }
 
   async removeSaved() {
-    const { next } = await this.send("/correct/remove", {});
-    this.block.is_saved = false;
+    const { next } = await this.send("correct/remove", { saved_hash: this.block.saved_hash });
+    [this.block.is_saved, this.block.saved_hash] = [false, null];
     this.points = [];
     this.changed();
     this.tell(text("removed", { command: next }));
@@ -301,7 +301,7 @@ class CorrectionPage {
 document.documentElement.lang = language;
 const container = document.getElementById("block-view");
 try {
-  const response = await fetch("/correct/block.json");
+  const response = await fetch("correct/block.json");
   if (!response.ok) throw new Error((await response.json()).error);
   window.mocbanCorrection = new CorrectionPage(container, await response.json());
 } catch (error) {

@@ -78,7 +78,7 @@ class BlockPage {
     const agreement = (100 * this.block.agreement).toFixed(0);
     const summary = text("characters", { n: this.block.characters.length, agreement });
     return element("header", { class: "block-bar" },
-      element("h1", {}, this.block.block), layers, element("a", { href: "/correct" }, text("correct")), this.switch, element("div", { class: "block-group" }, ...zooms),
+      element("h1", {}, this.block.block), layers, element("a", { href: "correct" }, text("correct")), this.switch, element("div", { class: "block-group" }, ...zooms),
       element("span", { class: "block-summary" }, summary), this.legend, element("span", { class: "block-keys" }, text("keys")));
   }
 
@@ -105,7 +105,7 @@ class BlockPage {
   /** Shows a layer of the page. */
   show(layer) {
     this.layer = layer;
-    this.overview.src = `/layer/${layer}`;
+    this.overview.src = `layer/${layer}`;
     this.overview.alt = text(layer);
     this.region.hidden = true;
     for (const button of this.buttons) button.setAttribute("aria-pressed", button.dataset.layer === layer);
@@ -150,7 +150,7 @@ class BlockPage {
       return;
     }
     const part = this.camera.visible();
-    const path = `/region/${layer}/${part.x}/${part.y}/${part.width}/${part.height}`;
+    const path = `region/${layer}/${part.x}/${part.y}/${part.width}/${part.height}`;
     if (this.region.getAttribute("src") === path && !this.region.hidden) return;
     this.requested = path;
     const loaded = new Image();
@@ -208,7 +208,7 @@ class BlockPage {
     this.dialog.showModal();
     if (!one.has_scan) return this.showParts(container, one, text("no_result"));
     try {
-      const response = await fetch(`/scan/${index}`);
+      const response = await fetch(`scan/${index}`);
       if (!response.ok) throw new Error(await response.text());
       const data = await response.arrayBuffer();
       // The dialog may have been closed while the data arrived.
@@ -226,7 +226,7 @@ class BlockPage {
     const [x, y] = [box[0], box[1]].map((at) => Math.max(0, Math.floor(at - margin)));
     const [width, height] = [Math.ceil(box[2] + margin) - x, Math.ceil(box[3] + margin) - y];
     const figures = Object.keys(LAYERS).map((layer) => element("figure", {},
-      element("img", { src: `/region/${layer}/${x}/${y}/${width}/${height}`, alt: text(layer) }), element("figcaption", {}, text(layer))));
+      element("img", { src: `region/${layer}/${x}/${y}/${width}/${height}`, alt: text(layer) }), element("figcaption", {}, text(layer))));
     container.replaceChildren(element("p", { class: "block-line", role: "alert" }, why), element("div", { class: "block-parts" }, ...figures));
   }
 
@@ -251,7 +251,7 @@ class BlockPage {
 document.documentElement.lang = language;
 const container = document.getElementById("block-view");
 try {
-  const response = await fetch("/block.json");
+  const response = await fetch("block.json");
   if (!response.ok) throw new Error(await response.text());
   window.mocbanBlock = new BlockPage(container, await response.json());
 } catch (error) {

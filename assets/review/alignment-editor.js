@@ -24,7 +24,7 @@ const fromCanvas = (map) => after(after(MINUS_HALF, map), PLUS_HALF);
 export class AlignmentEditor {
   /** Loads the additional images and opens the editor. `onChange` is called after each change. */
   static async open(item, layers, viewer, onChange) {
-    const response = await fetch(`/api/alignment/${item.id}`);
+    const response = await fetch(`api/alignment/${item.id}`);
     if (!response.ok) throw new Error((await response.json()).error);
     const [start, extra] = await Promise.all([response.json(), alignmentImages(item.id)]);
     return new AlignmentEditor(item, layers, viewer, onChange, start, extra);

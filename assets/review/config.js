@@ -2,17 +2,12 @@
 
 export const language = document.documentElement.lang;
 
-let config = await load();
+const config = await load();
 
 async function load() {
-  const response = await fetch("/api/config");
+  const response = await fetch("api/config");
   if (!response.ok) throw new Error(await response.text());
   return response.json();
-}
-
-/** Loads the configuration again; a restarted server has a new CSRF token. */
-export async function reload() {
-  config = await load();
 }
 
 export const csrfToken = () => config.csrf_token;

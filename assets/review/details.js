@@ -7,7 +7,7 @@ import * as ui from "./ui.js";
 /** Announces the details of an item. They are on the server until the item is answered. */
 export async function showDetails(item) {
   if (!item?.answer) return ui.announce(translate("answer_first"));
-  const response = await fetch(`/api/details/${item.id}`);
+  const response = await fetch(`api/details/${item.id}`);
   if (!response.ok) return ui.announce(translate("answer_first"));
   const { pair, metrics, iou, dice, others } = await response.json();
   const number = (value) => localNumber(value, 3);

@@ -32,7 +32,7 @@ export async function showEnd(heading, hasItems) {
   element.replaceChildren(create("h2", heading));
   if (!hasItems) return;
   // Without a connection, or before the last answer is stored, there is no summary yet.
-  const response = await fetch("/api/summary").catch(() => null);
+  const response = await fetch("api/summary").catch(() => null);
   if (!response?.ok || element.hidden) return;
   const summary = await response.json();
   const command = (text) => create("code", `${summary.command} ${text}`);

@@ -3,7 +3,7 @@
 /** Number of items whose images are cached: the next ones, and some to go back to. */
 const CACHED_ITEMS = 12;
 
-const worker = new Worker("/assets/render-worker.js", { type: "module" });
+const worker = new Worker("assets/render-worker.js", { type: "module" });
 const pending = new Map();
 let requestCount = 0;
 

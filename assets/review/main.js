@@ -161,7 +161,7 @@ function answerBody(item, verdict, reason) {
 
 function send(item, body) {
   ui.announce(`${queue.label(item)}: ${ui.answerText(body)}`);
-  requests.push("/api/answer", body).then(() => {
+  requests.push("api/answer", body).then(() => {
     if (reviewOrder === "adjudicate") details(item);
   });
 }
@@ -173,13 +173,13 @@ function undo(pressedAt) {
   const item = queue.removeAnswer(last.event) ?? queue.items.find(({ id }) => id === last.id);
   if (item) queue.goTo(item);
   show(pressedAt);
-  requests.push("/api/undo", { event: last.event });
+  requests.push("api/undo", { event: last.event });
   ui.announce(`${translate("undone")}: ${item ? queue.label(item) : ""}`);
 }
 
 /** Reopens the item of a request that the server rejected for good, and shows why. */
 function onRejected(request, why) {
-  if (request.path === "/api/answer") queue.removeAnswer(request.body.event);
+  if (request.path === "api/answer") queue.removeAnswer(request.body.event);
   show();
   ui.alert(translate("rejected", { why }));
 }
@@ -245,7 +245,7 @@ async function saveAlignment() {
   const { item, map, scores, startScores } = editor;
   if (scores.iou < startScores.iou && !(await ui.confirmWorse(startScores.iou, scores.iou))) return;
   if (!editor || editor.item !== item) return;
-  const stored = await requests.push("/api/align", editor.body(crypto.randomUUID(), note));
+  const stored = await requests.push("api/align", editor.body(crypto.randomUUID(), note));
   item.manual_alignment = { ...stored, map };
   ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${localNumber(stored.iou, 3)}, ${translate("dice")} ${localNumber(stored.dice, 3)}`);
   closeEditor();

@@ -16,7 +16,7 @@ export class ReviewQueue {
 
   /** Loads the queue; `pending` requests that are not stored yet are applied on top. */
   async load(pending) {
-    const response = await fetch("/api/queue");
+    const response = await fetch("api/queue");
     if (!response.ok) throw new Error((await response.json()).error);
     const { items, pairs, opens_guide: opensGuide } = await response.json();
     this.opensGuide = opensGuide;
@@ -31,9 +31,9 @@ export class ReviewQueue {
   }
 
   replay(path, body) {
-    if (path === "/api/undo") this.removeAnswer(body.event);
+    if (path === "api/undo") this.removeAnswer(body.event);
     const item = this.items.find((item) => item.id === body.item);
-    if (path === "/api/answer" && item) this.answer(item, body);
+    if (path === "api/answer" && item) this.answer(item, body);
   }
 
   get current() {
@@ -105,7 +105,7 @@ export class ReviewQueue {
     if (/^#\d+$/.test(name)) return this.items[Number(name.slice(1)) - 1];
     const items = this.items.filter((item) => item.pair === name);
     if (items.length > 0) return items.find((item) => !item.answer) ?? items[0];
-    const response = await fetch(`/api/find/${encodeURIComponent(name)}`);
+    const response = await fetch(`api/find/${encodeURIComponent(name)}`);
     if (!response.ok) return undefined;
     const { id } = await response.json();
     return this.items.find((item) => item.id === id);

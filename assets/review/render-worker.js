@@ -5,7 +5,7 @@ import { derive } from "./masks.js";
 const LAYERS = ["print", "print-mask", "relief", "depth-mask", "stroke-map"];
 
 async function bitmap(id, layer) {
-  const response = await fetch(`/image/${id}/${layer}`);
+  const response = await fetch(`../image/${id}/${layer}`);
   if (!response.ok) {
     const { error } = await response.json().catch(() => ({}));
     throw new Error(error ?? String(response.status));

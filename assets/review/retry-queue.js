@@ -1,6 +1,6 @@
 // Requests to store: sent in order, and retried until the server confirms that they are on the disk.
 
-import { csrfToken, reload } from "./config.js";
+import { csrfToken } from "./config.js";
 
 const STORAGE_KEY = "mocban-pending";
 /** Number of unsaved requests at which the page accepts no more answers. */
@@ -19,7 +19,7 @@ export class RetryQueue {
     this.sending = null;
     addEventListener("online", () => this.wake?.());
     addEventListener("beforeunload", (event) => {
-      if (this.requests.length > 0) event.preventDefault();
+      if (this.requests.length > 0 && !this.isMoving) event.preventDefault();
     });
   }
 
@@ -79,14 +79,24 @@ export class RetryQueue {
       return { retry: "disconnected" };
     }
     if (response.ok) return { stored: await response.json() };
-    if (response.status === 401 || response.status === 403) {
-      // A restarted server has new secrets. The new cookie arrives when the user opens its address.
-      await reload().catch(() => {});
+    if (response.status === 401) {
+      this.moveToNewSession();
       return { retry: "restarted" };
     }
     if (response.status >= 500) return { retry: "disconnected" };
     const { error } = await response.json().catch(() => ({}));
     return { why: error ?? String(response.status) };
+  }
+
+  /**
+   * A restarted server has a new session, which the user may have opened in another tab. This page then moves there; the
+   * unsaved requests are in the session storage, and are sent from there.
+   */
+  moveToNewSession() {
+    const session = localStorage.getItem("mocban-session");
+    if (!session || location.pathname.startsWith(session)) return;
+    this.isMoving = true;
+    location.replace(session);
   }
 
   wait(ms) {

@@ -16,7 +16,7 @@ export async function openScan(item) {
   dialog.replaceChildren(container);
   dialog.showModal();
   try {
-    const [{ mountScanViewer }, response] = await Promise.all([import("./scan-viewer.js"), fetch(`/scan/${item.id}`)]);
+    const [{ mountScanViewer }, response] = await Promise.all([import("./scan-viewer.js"), fetch(`scan/${item.id}`)]);
     if (!response.ok) throw new Error((await response.json()).error);
     const data = await response.arrayBuffer();
     // The dialog may have been closed, and even opened again, while the data arrived.

@@ -7,7 +7,7 @@ const language = preferredLanguage();
 document.documentElement.lang = language;
 const container = document.getElementById("scan-viewer");
 try {
-  const response = await fetch("/scan");
+  const response = await fetch("scan");
   if (!response.ok) throw new Error(await response.text());
   await mountScanViewer(container, await response.arrayBuffer(), { language });
 } catch (error) {

@@ -34,6 +34,7 @@ pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
 pub use blocks::claim::OutstandingBlocks;
+pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
@@ -84,5 +85,6 @@ pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Show
 pub use records::review_context::ReviewContext;
 pub use records::review_rights::ReviewRights;
 pub use records::set_apart::SetApart;
+pub use records::verdict_rules::{InvalidVerdict, NOTE_CHARS, check_event, check_reviewer};
 pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};
 pub use transfer::{CatalogCopy, CopiedTable, CopyProgress};

@@ -3,9 +3,11 @@
 use tokio::runtime::Handle;
 
 use super::context::Context;
-use crate::domain::{BlockName, ControlPoints};
-use crate::export::block_view::BlockCorrection;
-use crate::view::CorrectionStore;
+use crate::catalog::{Catalog, ControlPointsChange};
+use crate::domain::{BlockName, ContentHash, ControlPoints};
+use crate::export::block_view::{BlockCorrection, replaced_file};
+use crate::store::Project;
+use crate::view::{CorrectionStore, PointsSaved};
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
 /// open does not hold it.
@@ -32,12 +34,35 @@ impl BlockPoints {
         Ok(read?)
     }
 
-    async fn store(&self, points: Option<&ControlPoints>) -> anyhow::Result<()> {
-        let (_, catalog) = self.context.open().await?;
-        let stored = catalog.set_control_points(&self.block, points).await;
+    async fn store(
+        &self,
+        read: Option<ContentHash>,
+        points: Option<&ControlPoints>,
+    ) -> anyhow::Result<PointsSaved> {
+        let (project, catalog) = self.context.open().await?;
+        let stored = self.store_in(&catalog, &project, read, points).await;
         catalog.close().await;
-        anyhow::ensure!(stored?, "block {} was removed meanwhile", self.block);
-        Ok(())
+        stored
+    }
+
+    async fn store_in(
+        &self,
+        catalog: &Catalog,
+        project: &Project,
+        read: Option<ContentHash>,
+        points: Option<&ControlPoints>,
+    ) -> anyhow::Result<PointsSaved> {
+        let block = &self.block;
+        if let Some(points) = points
+            && let Some(path) = replaced_file(catalog, project, block, points).await?
+        {
+            return Ok(PointsSaved::FileReplaced(path));
+        }
+        match catalog.set_control_points(block, read, points).await? {
+            ControlPointsChange::Stored => Ok(PointsSaved::Saved),
+            ControlPointsChange::Outdated => Ok(PointsSaved::OthersSaved),
+            ControlPointsChange::NoBlock => anyhow::bail!("block {block} was removed meanwhile"),
+        }
     }
 }
 
@@ -47,9 +72,13 @@ impl CorrectionStore for BlockPoints {
         on_thread(move || Handle::current().block_on(own.read_block())).await
     }
 
-    async fn save(&self, points: Option<ControlPoints>) -> Result<(), String> {
+    async fn save(
+        &self,
+        read: Option<ContentHash>,
+        points: Option<ControlPoints>,
+    ) -> Result<PointsSaved, String> {
         let own = self.clone();
-        on_thread(move || Handle::current().block_on(own.store(points.as_ref()))).await
+        on_thread(move || Handle::current().block_on(own.store(read, points.as_ref()))).await
     }
 
     fn next_command(&self) -> String {

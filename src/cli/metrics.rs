@@ -6,19 +6,21 @@ use axum::Router;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
+use clap::Args;
 use tokio::net::TcpListener;
 use tokio::task::AbortHandle;
 
 use super::context::Context;
 use super::exit::Refusal;
-use crate::local_server::{ConnectionLimits, listen, serve};
+use crate::local_server::{ConnectionLimits, ServedNames, listen, serve};
+use crate::platform::host_name;
 use crate::runner::RunMetrics;
 
 /// Version 0.0.4 of the text format, which every version of Prometheus reads.
 const TEXT_FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 /// Parses `PORT` or `ADDRESS:PORT`. A port alone is on 127.0.0.1.
-pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
+fn address(text: &str) -> Result<SocketAddr, String> {
     if let Ok(port) = text.parse() {
         return Ok((Ipv4Addr::LOCALHOST, port).into());
     }
@@ -26,11 +28,25 @@ pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
     text.parse().ok().ok_or_else(|| example.to_owned())
 }
 
+/// Arguments of the server of the metrics.
+#[derive(Debug, Default, Args)]
+pub(super) struct MetricsArgs {
+    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
+    /// that others can reach, such as 10.0.0.7:9464
+    #[arg(long, value_name = "PORT", value_parser = address)]
+    metrics: Option<SocketAddr>,
+    /// Answer requests for the metrics under this host name too, such as node1.lab.example; may be repeated. IP addresses,
+    /// localhost and, from other machines, names without a dot are always answered
+    #[arg(long, value_name = "NAME", requires = "metrics")]
+    metrics_host: Vec<String>,
+}
+
 /// The server of the metrics, with its port bound.
 #[derive(Debug)]
 pub(super) struct MetricsServer {
     listener: TcpListener,
     address: SocketAddr,
+    names: ServedNames,
 }
 
 /// A server that ends when this handle is dropped.
@@ -48,8 +64,8 @@ impl MetricsServer {
     ///
     /// # Errors
     /// Returns an error if the address cannot be bound, for example because another process uses the port.
-    pub(super) async fn bind(address: Option<SocketAddr>) -> Result<Option<Self>, Refusal> {
-        let Some(address) = address else {
+    pub(super) async fn bind(args: &MetricsArgs) -> Result<Option<Self>, Refusal> {
+        let Some(address) = args.metrics else {
             return Ok(None);
         };
         let failed = |error| {
@@ -59,7 +75,12 @@ impl MetricsServer {
         };
         let listener = listen(address, "metrics").await.map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        Ok(Some(Self { listener, address }))
+        let names = ServedNames::new(address, &host_name(), &args.metrics_host);
+        Ok(Some(Self {
+            listener,
+            address,
+            names,
+        }))
     }
 
     /// Serves the metrics until the handle is dropped. Prints the address.
@@ -72,6 +93,7 @@ impl MetricsServer {
             ));
         }
         let router = Router::new().route("/metrics", get(async move || text(&metrics)));
+        let router = self.names.guarded(router);
         let limits = ConnectionLimits::system();
         let serving = serve(self.listener, router, limits, std::future::pending());
         Serving(tokio::spawn(serving).abort_handle())

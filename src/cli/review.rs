@@ -15,6 +15,7 @@ use super::table::count;
 use super::verdict::reviewer_name;
 use crate::catalog::{SetApart, StatusCounts};
 use crate::domain::{ReviewOrder, ThresholdMetric};
+use crate::page_vec;
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
@@ -86,6 +87,7 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    page_vec::keep_few_pages();
     let settings = context.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;

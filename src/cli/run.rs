@@ -1,6 +1,5 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
-use std::net::SocketAddr;
 use std::time::Duration;
 
 use clap::Args;
@@ -9,7 +8,7 @@ use serde_json::{Value, json};
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::failures::Failures;
-use super::metrics::{self, MetricsServer};
+use super::metrics::{MetricsArgs, MetricsServer};
 use super::progress::ProgressReporter;
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
 use super::{missing_results, select, signals};
@@ -34,7 +33,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
     /// Print what would run and why, without running it
-    #[arg(short = 'n', long)]
+    #[arg(short = 'n', long, conflicts_with = "metrics")]
     pub(super) dry_run: bool,
     /// Join a run in another process as additional workers
     #[arg(long)]
@@ -48,10 +47,8 @@ pub(super) struct RunArgs {
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
-    /// that others can reach, such as 10.0.0.7:9464
-    #[arg(long, value_name = "PORT", value_parser = metrics::address, conflicts_with = "dry_run")]
-    pub(super) metrics: Option<SocketAddr>,
+    #[command(flatten)]
+    pub(super) metrics: MetricsArgs,
 }
 
 /// Parses which pairs to run again.
@@ -74,7 +71,7 @@ pub(super) async fn execute(
     part: RunPart,
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
-    let server = MetricsServer::bind(args.metrics).await?;
+    let server = MetricsServer::bind(&args.metrics).await?;
     let config = context.settings()?.config;
     let (project, catalog) = context.open_for_run().await?;
     let options = options(&args, &config, &catalog, part).await?;

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::context::{Context, now, shell_quoted};
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
 use super::files::{self, RefusedLine};
 use super::output;
 use super::screen::{Palette, Tone};
@@ -14,7 +14,10 @@ use super::select;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
-use crate::catalog::{Catalog, FaultyRow, NewVerdict, ReviewContext, SetApart, VerdictEvent};
+use crate::catalog::{
+    Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
+    check_reviewer,
+};
 use crate::domain::{Reason, ThresholdMetric, Verdict, one_line};
 
 /// Commands on verdicts.
@@ -78,11 +81,9 @@ pub(super) struct VerdictUndoArgs {
 }
 
 /// Parses a reviewer's name, which is one line of text.
-pub(super) fn reviewer_name(text: &str) -> Result<String, String> {
+pub(super) fn reviewer_name(text: &str) -> Result<String, InvalidVerdict> {
     let name = text.trim();
-    if name.is_empty() || name.chars().any(char::is_control) {
-        return Err("the reviewer's name must be one line of text".to_owned());
-    }
+    check_reviewer(name)?;
     Ok(name.to_owned())
 }
 
@@ -123,6 +124,8 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         },
         at: None,
     };
+    new.check(now())
+        .map_err(|error| Refusal::Usage(error.to_string()))?;
     let (text, known) = (set_text(&new), known_text(&new));
     let stored = catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
@@ -161,6 +164,7 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     };
     let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
     let rows = parse(&bytes).map_err(refused)?;
+    verdict_file::check_values(&rows, now()).map_err(refused)?;
     let rights = catalog.review_rights().await?;
     for row in &rows {
         rights.require_verdicts(&row.verdict.reviewer)?;

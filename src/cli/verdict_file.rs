@@ -49,6 +49,17 @@ pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
     Ok(rows)
 }
 
+/// Refuses rows with values that no verdict has.
+///
+/// # Errors
+/// At the first such row.
+pub(super) fn check_values(rows: &[VerdictRow], now: UnixMillis) -> Result<(), RefusedLine> {
+    rows.iter().try_for_each(|row| {
+        let checked = row.verdict.check(now);
+        checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
+    })
+}
+
 /// Refuses rows of unknown pairs.
 ///
 /// # Errors
@@ -67,6 +78,11 @@ pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Resul
 fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], RefusedLine> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
+        return Err(RefusedLine::new(1, &reason));
+    }
+    let count = |name: &str| headers.iter().filter(|header| *header == name).count();
+    if let Some(twice) = COLUMNS.iter().find(|name| count(name) > 1) {
+        let reason = format!("column {twice} is there twice");
         return Err(RefusedLine::new(1, &reason));
     }
     let positions = COLUMNS.map(|name| headers.iter().position(|header| header == name));
@@ -155,9 +171,10 @@ pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> 
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
     let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());
     let rows = lines.map(|(line, content)| {
-        let parsed: VerdictLine = serde_json::from_slice(content)
+        let mut parsed: VerdictLine = serde_json::from_slice(content)
             .map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
-        if parsed.verdict.reviewer.trim().is_empty() {
+        parsed.verdict.reviewer = parsed.verdict.reviewer.trim().to_owned();
+        if parsed.verdict.reviewer.is_empty() {
             return Err(RefusedLine::new(line, "reviewer is empty"));
         }
         Ok(parsed.undone_at.is_none().then_some(VerdictRow {
@@ -178,7 +195,7 @@ fn json_error(error: &serde_json::Error) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{parse_csv, parse_jsonl, refuse_unknown};
+    use super::{check_values, parse_csv, parse_jsonl, refuse_unknown};
     use crate::domain::{Reason, ThresholdMetric, Verdict};
 
     fn error(text: &str) -> String {
@@ -246,6 +263,62 @@ mod tests {
         assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
         assert!(error("pair,verdict,reviewer\n1,pass\n").starts_with("line 2: 2 cells"));
         assert!(error("pair,verdict,reviewer\na/b,pass,lan\n").starts_with("line 2: id"));
+    }
+
+    #[test]
+    fn values_that_no_verdict_has_are_refused_by_line() {
+        const NOW: i64 = 1_800_000_000_000;
+        let refused = |rows: Result<Vec<_>, _>| {
+            let rows = rows.expect("a list");
+            check_values(&rows, NOW).map_err(|error| error.to_string())
+        };
+        let good = "1,pass,lan,,,\n";
+        for (row, why) in [
+            (
+                "1,pass,\"lan\nminh\",,,\n",
+                "the reviewer's name must be one line",
+            ),
+            (
+                "1,pass,lan\u{1b}[2J,,,\n",
+                "the reviewer's name must be one line",
+            ),
+            ("1,pass,lan,angle,,\n", "only a fail has a reason"),
+            ("1,pass,lan,,a\0b,\n", "a note is text of at most 2000"),
+            (
+                "1,pass,lan,,,2999-01-01\n",
+                "the time of a verdict is from 1970",
+            ),
+            (
+                "1,pass,lan,,,1815-01-01\n",
+                "the time of a verdict is from 1970",
+            ),
+        ] {
+            let text = format!("pair,verdict,reviewer,reason,note,at\n{good}{row}");
+            let error = refused(parse_csv(text.as_bytes())).expect_err(row);
+            assert!(error.starts_with(&format!("line 3: {why}")), "{error}");
+        }
+        let good = r#""pair":"1","verdict":"pass","reviewer":" lan ""#;
+        for (field, why) in [
+            ("", ""),
+            (r#","at":9223372036854775807"#, "the time of a verdict"),
+            (r#","angle_read_deg":900"#, "an angle is from"),
+            (r#","shown_ms":18446744073709551615"#, "the display time"),
+            (r#","event":"a\u0000""#, "an event is 1 to 64"),
+        ] {
+            let text = format!("{{{good}{field}}}\n");
+            let checked = refused(parse_jsonl(text.as_bytes()));
+            let error = checked.err().unwrap_or_default();
+            assert!(
+                error.trim_start_matches("line 1: ").starts_with(why),
+                "{error}"
+            );
+            assert_eq!(error.is_empty(), why.is_empty(), "{field}");
+        }
+        let twice = error("pair,verdict,reviewer,pair\n1,pass,lan,2\n");
+        assert!(
+            twice.starts_with("line 1: column pair is there twice"),
+            "{twice}"
+        );
     }
 
     #[test]

@@ -17,6 +17,7 @@ use crate::catalog::Catalog;
 use crate::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
+use crate::page_vec;
 use crate::runner::{Stop, StopLevel};
 use crate::store::Project;
 use crate::view::{self, ViewServer};
@@ -38,6 +39,7 @@ pub(super) struct ViewArgs {
 }
 
 pub(super) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    page_vec::keep_few_pages();
     let (project, catalog) = context.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     if select::block(&catalog, &args.pair).await?.is_some() {

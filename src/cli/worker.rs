@@ -1,13 +1,11 @@
 //! `plan` and `worker`: the two parts of a run, for runs on several machines.
 
-use std::net::SocketAddr;
-
 use clap::Args;
 use serde_json::json;
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::metrics;
+use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use super::signals;
 use super::table::pairs_and_blocks;
@@ -42,10 +40,8 @@ pub(super) struct WorkerArgs {
     /// Run only this stage and earlier ones
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
-    /// Serve counts and times of this process to Prometheus at a port of this machine, such as 9464, or at an address
-    /// that others can reach, such as 10.0.0.7:9464
-    #[arg(long, value_name = "PORT", value_parser = metrics::address)]
-    pub(super) metrics: Option<SocketAddr>,
+    #[command(flatten)]
+    pub(super) metrics: MetricsArgs,
 }
 
 pub(super) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {

@@ -17,6 +17,9 @@ use tokio::time::Instant;
 
 use crate::platform;
 
+/// Maximum number of bytes of a request header, and of a response that waits for a slow client.
+const BUFFER_BYTES: usize = 64 * 1024;
+
 /// Limits on the connections of a server.
 #[derive(Debug, Clone, Copy)]
 pub struct ConnectionLimits {
@@ -129,6 +132,7 @@ pub(super) async fn serve_connection(
     };
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new())
+        .max_buf_size(BUFFER_BYTES)
         .header_read_timeout(limits.header);
     let served = http.serve_connection(TokioIo::new(stream), service);
     tokio::pin!(served);

@@ -1,5 +1,5 @@
 //! Checks every request before it reaches a handler. All requests need a valid `Host`, and all but the start address
-//! need the session cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token.
+//! need the session: its path and its cookie. Writes also need a valid `Origin`, a JSON body and the CSRF token.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -7,11 +7,13 @@ use std::time::Duration;
 use axum::body::to_bytes;
 use axum::extract::{Request, State};
 use axum::http::header::AsHeaderName;
+use axum::http::uri::{InvalidUri, Uri};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
-use axum::response::{IntoResponse as _, Response};
+use axum::response::{Html, IntoResponse as _, Response};
 
-use super::access_control::{AccessControl, START};
+use super::access_control::{AccessControl, SESSION_SCRIPT, START};
+use super::page_frame::closed_page;
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 const BODY_LIMIT: usize = 16 * 1024;
@@ -49,8 +51,8 @@ const WRONG_HOST: Rejection = (
     StatusCode::MISDIRECTED_REQUEST,
     "this host name is not served; open the address that the command printed",
 );
-/// The session cookie is missing or of an earlier start.
-const NO_COOKIE: Rejection = (
+/// The path or the cookie of the session is missing or of an earlier start.
+const NO_SESSION: Rejection = (
     StatusCode::UNAUTHORIZED,
     "open the address that the command printed; it works once",
 );
@@ -78,18 +80,26 @@ const TOO_SLOW: Rejection = (
     "the request took too long to arrive",
 );
 
-/// Rejects unauthorised requests and adds the security headers to every response.
-pub async fn guard(
+/// Rejects unauthorised requests and adds the security headers to every response. A request that is passed on has the
+/// path below the path of its session.
+pub(super) async fn guard(
     State(access): State<Arc<AccessControl>>,
-    request: Request,
+    mut request: Request,
     next: Next,
 ) -> Response {
+    let shows_html = text(request.headers(), header::ACCEPT).is_some_and(is_html);
     let checked = match check(&access, &request) {
-        Ok(()) => with_whole_body(request).await,
+        Ok(uri) => {
+            *request.uri_mut() = uri;
+            with_whole_body(request).await
+        }
         Err(rejection) => Err(rejection),
     };
     let mut response = match checked {
         Ok(request) => next.run(request).await,
+        Err((status, _)) if shows_html && status == NO_SESSION.0 => {
+            (status, Html(closed_page().into_string())).into_response()
+        }
         Err(rejection) => rejection.into_response(),
     };
     let headers = response.headers_mut();
@@ -99,21 +109,25 @@ pub async fn guard(
     response
 }
 
-fn check(access: &AccessControl, request: &Request) -> Result<(), Rejection> {
+/// Checks a request. Returns its address for the handlers.
+fn check(access: &AccessControl, request: &Request) -> Result<Uri, Rejection> {
     let headers = request.headers();
     let host = text(headers, header::HOST).ok_or(WRONG_HOST)?;
     if !access.hosts.iter().any(|allowed| allowed == host) {
         return Err(WRONG_HOST);
     }
     let is_read = matches!(*request.method(), Method::GET | Method::HEAD);
-    if is_read && request.uri().path() == START {
-        return Ok(());
+    let path = request.uri().path();
+    if is_read && [START, SESSION_SCRIPT].contains(&path) {
+        return Ok(request.uri().clone());
     }
+    let page = access.session.page(path).ok_or(NO_SESSION)?;
     if !text(headers, header::COOKIE).is_some_and(|cookie| access.session.has_cookie(cookie)) {
-        return Err(NO_COOKIE);
+        return Err(NO_SESSION);
     }
+    let uri = page_uri(page, request.uri().query()).map_err(|_invalid| NO_SESSION)?;
     if is_read {
-        return Ok(());
+        return Ok(uri);
     }
     let origin = text(headers, header::ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
     if origin != Some(host) {
@@ -127,7 +141,20 @@ fn check(access: &AccessControl, request: &Request) -> Result<(), Rejection> {
     if !token.is_some_and(|token| access.session.is_csrf_token(token)) {
         return Err(WRONG_TOKEN);
     }
-    Ok(())
+    Ok(uri)
+}
+
+/// Returns the address of a page with the query of a request.
+fn page_uri(page: &str, query: Option<&str>) -> Result<Uri, InvalidUri> {
+    match query {
+        Some(query) => format!("{page}?{query}").parse(),
+        None => page.parse(),
+    }
+}
+
+/// Returns whether an `Accept` header asks for a page, as browsers do for an address that a person opens.
+fn is_html(accepted: &str) -> bool {
+    accepted.contains("text/html")
 }
 
 /// Reads the whole body first, so that no handler waits for a slow client.

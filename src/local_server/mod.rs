@@ -1,19 +1,23 @@
 //! A web server for one user's browser on this machine: checked requests, limited connections, and one session.
 //!
-//! A page binds its port with [`listen`], passes every request through [`guard`], opens the session at [`START`] with
-//! [`AccessControl::start`], and serves its routes with [`serve`].
+//! A page binds its port with [`listen`], wraps its routes with [`AccessControl::guarded`], and serves them with
+//! [`serve`]. The session opens at the start address, which works once; its pages are below a secret path. A server
+//! without a session, such as that of the metrics, wraps its routes with [`ServedNames::guarded`].
 
 mod access_control;
 mod address;
 mod connection;
 mod connections;
 mod guard;
+mod host_check;
 mod page_frame;
 mod session;
+mod work_thread;
 
-pub use access_control::{AccessControl, START};
+pub use access_control::AccessControl;
 pub use address::listen;
 pub use connection::ConnectionLimits;
 pub use connections::serve;
-pub use guard::guard;
-pub use page_frame::{document, forward_page, used_token_page};
+pub use host_check::ServedNames;
+pub use page_frame::document;
+pub use work_thread::{WorkFailed, WorkThread};

@@ -1,6 +1,8 @@
-//! HTML that all pages share: the frame of a document, and the pages of the start address.
+//! HTML that all pages share: the frame of a document, and the pages without a session.
 
 use maud::{DOCTYPE, Markup, html};
+
+use super::access_control::SESSION_SCRIPT;
 
 /// Returns a whole document. `body` is the `body` element.
 pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -19,23 +21,53 @@ pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Ma
     }
 }
 
-/// Returns the page at the start address. It sends the browser on to the main page; `text` is a link to it.
-pub fn forward_page(language: &str, title: &str, text: &str) -> Markup {
-    let head = html! { meta http-equiv="refresh" content="0;url=/"; };
-    document(
-        language,
-        title,
-        &head,
-        &html! { body { p { a href="/" { (text) } } } },
-    )
+/// Returns the page at the start address. Its script remembers the path of the session and opens it.
+pub(super) fn forward_page(path: &str) -> Markup {
+    let address = format!("{path}/");
+    with_script(&html! {
+        body data-session=(address) {
+            p { a href=(address) { "Open the page" } }
+            p lang="vi" { a href=(address) { "Mở trang" } }
+        }
+    })
 }
 
-/// Returns the page for a one-time token that was used before.
-pub fn used_token_page(language: &str, title: &str, text: &str) -> Markup {
-    document(
-        language,
-        title,
-        &html! {},
-        &html! { body { h1 { (text) } } },
-    )
+/// Returns the page for a browser without a session. Its script opens the session that the browser remembers.
+pub(super) fn closed_page() -> Markup {
+    with_script(&html! {
+        body {
+            h1 { "This page is not open in this browser" }
+            p {
+                "Open the address that the command printed. It works once, in one browser. If it has been used, end the "
+                "command with Ctrl-C and run it again to get a new one: nothing is lost."
+            }
+            div lang="vi" {
+                h1 { "Trang này chưa được mở trong trình duyệt này" }
+                p {
+                    "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã "
+                    "được sử dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả."
+                }
+            }
+        }
+    })
+}
+
+fn with_script(body: &Markup) -> Markup {
+    let head = html! {
+        link rel="icon" href="data:,";
+        script type="module" src=(SESSION_SCRIPT) {}
+    };
+    document("en", "mocban", &head, body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{closed_page, forward_page};
+
+    #[test]
+    fn pages_without_a_session() {
+        let pages = [forward_page("/s/12ab"), closed_page()];
+        let pages = pages.map(|page| page.into_string().replace("><", ">\n<"));
+        insta::assert_snapshot!(pages.join("\n\n"));
+    }
 }

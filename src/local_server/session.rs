@@ -1,4 +1,4 @@
-//! Session secrets: a one-time token that opens the page, a session cookie, and a CSRF token for writes.
+//! Session secrets: a one-time token that opens the session, the path of its pages, its cookie, and a CSRF token.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,11 +7,19 @@ use rand::rngs::SysRng;
 
 use crate::domain::ContentHash;
 
+/// Start of the paths of all sessions.
+const PATHS: &str = "/s/";
+
 /// Secrets of one start of the server.
+///
+/// A request needs both the cookie and the path. Browsers share cookies among all ports of a host, but they tell the
+/// path of a page to no other server. The path also is in the history of the browser, which has no cookies.
 #[derive(Debug)]
 pub(super) struct Session {
     /// The one-time token of the start address.
     pub(super) token: String,
+    /// Path below which the pages are, without a slash at the end.
+    pub(super) path: String,
     cookie: String,
     pub(super) csrf_token: String,
     cookie_name: String,
@@ -26,9 +34,9 @@ impl Session {
     pub(super) fn new(page: &str, port: u16) -> std::io::Result<Self> {
         Ok(Self {
             token: secret()?,
+            path: format!("{PATHS}{}", secret()?),
             cookie: secret()?,
             csrf_token: secret()?,
-            // Cookies are shared by all ports of a host, so the cookies of two servers need different names.
             cookie_name: format!("mocban_{page}_{port}"),
             is_opened: AtomicBool::new(false),
         })
@@ -39,10 +47,11 @@ impl Session {
         is_equal(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
     }
 
-    /// Returns the value of the `Set-Cookie` header.
+    /// Returns the value of the `Set-Cookie` header. The browser sends the cookie only with the path of the session, so
+    /// other ports do not get it.
     pub(super) fn set_cookie(&self) -> String {
-        let (name, value) = (&self.cookie_name, &self.cookie);
-        format!("{name}={value}; HttpOnly; SameSite=Strict; Path=/")
+        let (name, value, path) = (&self.cookie_name, &self.cookie, &self.path);
+        format!("{name}={value}; HttpOnly; SameSite=Strict; Path={path}")
     }
 
     /// Returns whether a `Cookie` header contains the session cookie.
@@ -51,6 +60,12 @@ impl Session {
             .split(';')
             .filter_map(|pair| pair.trim().split_once('='));
         pairs.any(|(name, value)| name == self.cookie_name && is_equal(value, &self.cookie))
+    }
+
+    /// Returns the part of a path below the path of the session; `None` for any other path.
+    pub(super) fn page<'p>(&self, path: &'p str) -> Option<&'p str> {
+        let (prefix, page) = path.split_at_checked(self.path.len())?;
+        (page.starts_with('/') && is_equal(prefix, &self.path)).then_some(page)
     }
 
     /// Returns whether the CSRF token is right.
@@ -77,9 +92,13 @@ fn is_equal(a: &str, b: &str) -> bool {
 mod tests {
     use super::Session;
 
+    fn session() -> Session {
+        Session::new("review", 8000).expect("secrets")
+    }
+
     #[test]
     fn token_opens_once_and_only_itself() {
-        let session = Session::new("review", 8000).expect("secrets");
+        let session = session();
         assert!(!session.open("") && !session.open("guess"));
         let token = session.token.clone();
         assert_eq!(token.len(), 64);
@@ -89,17 +108,38 @@ mod tests {
 
     #[test]
     fn cookie_is_found_among_others_and_by_its_port() {
-        let session = Session::new("review", 8000).expect("secrets");
+        let session = session();
         let set = session.set_cookie();
         let ours = set.split(';').next().expect("name and value");
         assert!(set.contains("HttpOnly") && set.contains("SameSite=Strict"));
         assert!(session.has_cookie(&format!("a=b; {ours}; c=d")));
         assert!(!session.has_cookie("mocban_review_8000=; x"));
         assert!(!session.has_cookie(&ours.replace("8000", "8001")));
+        assert!(!self::session().has_cookie(ours));
+    }
+
+    #[test]
+    fn only_paths_below_the_secret_one_are_pages() {
+        let session = session();
+        let below = |rest: &str| format!("{}{rest}", session.path);
+        assert_eq!(session.page(&below("/")), Some("/"));
+        assert_eq!(session.page(&below("/api/queue")), Some("/api/queue"));
+        let other = format!("{}/", self::session().path);
+        for wrong in [
+            "",
+            "/",
+            "/s/",
+            "/api/queue",
+            "/ữ",
+            &below(""),
+            &below("x/"),
+            &other,
+        ] {
+            assert_eq!(session.page(wrong), None, "{wrong}");
+        }
         assert!(
-            !Session::new("review", 8000)
-                .expect("secrets")
-                .has_cookie(ours)
+            session.set_cookie().ends_with(&below("")),
+            "no other port gets it"
         );
     }
 }

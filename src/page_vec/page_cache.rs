@@ -7,6 +7,8 @@ use memmap2::MmapMut;
 
 /// The cache of the process holds at most this many bytes.
 const MAX_CACHED_BYTES: usize = 128 << 20;
+/// The same for a process that keeps few pages.
+const MAX_CACHED_OF_SERVER: usize = 8 << 20;
 /// A vector uses cached pages of at most this many times its size.
 const MAX_OVERSIZE: usize = 4;
 /// Before a new allocation, cached pages are freed only if they and the new pages need more bytes than this.
@@ -104,6 +106,11 @@ impl DerefMut for PageBuffer {
     fn deref_mut(&mut self) -> &mut [u8] {
         self.0.as_deref_mut().unwrap_or_default()
     }
+}
+
+/// Makes the process keep few freed pages. For programs that read a scan now and then and otherwise wait.
+pub fn keep_few_pages() {
+    cache().max_bytes = MAX_CACHED_OF_SERVER;
 }
 
 /// Makes the process keep freed memory between pairs. Cached pages take at most an eighth of `limit` bytes.

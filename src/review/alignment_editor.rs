@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::answer::{InvalidInput, check_event, check_note};
+use super::answer::{InvalidInput, check_note};
 use super::item::ReviewItem;
 use super::item_images::{IMAGE_SIDE, ItemImages};
 use crate::catalog::ManualAlignment;
+use crate::catalog::check_event;
 use crate::domain::Affine2;
 use crate::report::ManualCorrection;
 

@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn every_imported_module_exists() {
         for (name, _, text) in ASSETS {
-            let with_id = ["from \"./", "import(\"./", "Worker(\"/assets/"].into_iter();
+            let with_id = ["from \"./", "import(\"./", "Worker(\"assets/"].into_iter();
             for after in with_id.flat_map(|start| text.split(start).skip(1)) {
                 let module = after.split('"').next().unwrap_or_default();
                 assert!(super::find(module).is_some(), "{name} imports {module}");

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use tokio::sync::OnceCell;
 
-/// Maximum number of bytes of the cached images. Most items have 100 to 500 KB.
-const MAX_CACHED_BYTES: usize = 64 << 20;
+/// Maximum number of bytes of the cached images. Most items have 100 to 500 KB, and the page keeps the newest ones itself.
+const MAX_CACHED_BYTES: usize = 32 << 20;
 
 /// Values that are created once per item.
 pub(super) type Slot<T> = Arc<OnceCell<Arc<T>>>;
@@ -79,13 +79,13 @@ mod tests {
     }
 
     #[test]
-    fn cached_images_need_at_most_256_mib() {
+    fn cached_images_need_at_most_64_mib() {
         let mut slots = CacheSlots::<()>::default();
         for number in 0..1000 {
             let id = number.to_string();
             slots.entry(&id).set(Arc::new(())).expect("a new entry");
             slots.add(&id, 1 << 20);
-            assert!(slots.slots.len() <= 256, "{} MiB", slots.slots.len());
+            assert!(slots.slots.len() <= 64, "{} MiB", slots.slots.len());
         }
         assert!(!slots.slots.is_empty());
     }

@@ -2,6 +2,7 @@
 
 use crate::catalog::CatalogError;
 use crate::export::{PictureError, SourcePrintError};
+use crate::local_server::WorkFailed;
 use crate::report::pair_artifacts::PairArtifactsError;
 
 /// Why the images of an item cannot be rendered.
@@ -22,6 +23,6 @@ pub(super) enum ImageError {
     /// The scan cannot be shown in 3D.
     #[error(transparent)]
     Scan(#[from] PictureError),
-    #[error("rendering stopped: {0}")]
-    Stopped(#[from] tokio::task::JoinError),
+    #[error(transparent)]
+    Stopped(#[from] WorkFailed),
 }

@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use axum::body::Bytes;
 use serde::Deserialize;
 use tokio::sync::{Mutex, Semaphore};
 
@@ -17,6 +18,7 @@ use crate::domain::{Affine2, Stage};
 use crate::export::pictures::PrintView;
 use crate::export::scan_view::ScanView;
 use crate::export::{InputFileLimits, SourcePrint};
+use crate::local_server::WorkThread;
 use crate::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::stages::normalize::PrintMasks;
@@ -57,11 +59,11 @@ pub(super) struct ItemImages {
     pub(super) canvas_from_print: Affine2,
     /// Scores of the alignment that the item shows.
     pub(super) scores: MaskOverlap,
-    print: Vec<u8>,
-    print_mask: Vec<u8>,
-    relief: Vec<u8>,
-    depth_mask: Vec<u8>,
-    stroke_map: Vec<u8>,
+    print: Bytes,
+    print_mask: Bytes,
+    relief: Bytes,
+    depth_mask: Bytes,
+    stroke_map: Bytes,
 }
 
 impl ItemImages {
@@ -85,11 +87,11 @@ impl ItemImages {
             view,
             canvas_from_print: inputs.canvas_from_print,
             scores: inputs.mask_overlap(print_from_depth),
-            print,
-            print_mask: png_mask(&print_mask),
-            relief: png_rgb8(&view.relief(&inputs.depth, print_from_depth)),
-            depth_mask: png_mask(&view.mask(&inputs.strokes, print_from_depth)),
-            stroke_map: stroke_map(&view, &inputs, &masks, item),
+            print: print.into(),
+            print_mask: png_mask(&print_mask).into(),
+            relief: png_rgb8(&view.relief(&inputs.depth, print_from_depth)).into(),
+            depth_mask: png_mask(&view.mask(&inputs.strokes, print_from_depth)).into(),
+            stroke_map: stroke_map(&view, &inputs, &masks, item).into(),
         })
     }
 
@@ -131,18 +133,25 @@ pub(super) struct ImageCache {
     project: Project,
     limits: InputFileLimits,
     slots: Mutex<CacheSlots<ItemImages>>,
-    /// Permits one item at a time to read its print or its artifacts.
-    reading: Arc<Semaphore>,
+    /// Permits one item at a time to read its results, its print or its artifacts.
+    reading: Semaphore,
+    work: Arc<WorkThread>,
 }
 
 impl ImageCache {
-    pub(super) fn new(catalog: Catalog, project: Project, limits: InputFileLimits) -> Self {
+    pub(super) fn new(
+        catalog: Catalog,
+        project: Project,
+        limits: InputFileLimits,
+        work: Arc<WorkThread>,
+    ) -> Self {
         Self {
             catalog,
             project,
             limits,
             slots: Mutex::default(),
-            reading: Arc::new(Semaphore::new(1)),
+            reading: Semaphore::new(1),
+            work,
         }
     }
 
@@ -154,16 +163,20 @@ impl ImageCache {
         &self,
         item: &Arc<ReviewItem>,
         layer: ImageLayer,
-    ) -> Result<Vec<u8>, ImageError> {
+    ) -> Result<Bytes, ImageError> {
         Ok(match layer {
             ImageLayer::Print => self.of(item).await?.print.clone(),
             ImageLayer::PrintMask => self.of(item).await?.print_mask.clone(),
             ImageLayer::Relief => self.of(item).await?.relief.clone(),
             ImageLayer::DepthMask => self.of(item).await?.depth_mask.clone(),
             ImageLayer::StrokeMap => self.of(item).await?.stroke_map.clone(),
-            ImageLayer::DepthFrameRelief => self.alignment_inputs(item).await?.relief(),
-            ImageLayer::DepthFrameMask => png_mask(&self.alignment_inputs(item).await?.strokes),
-            ImageLayer::CanvasMask => png_mask(&self.alignment_inputs(item).await?.canvas_mask),
+            ImageLayer::DepthFrameRelief => self.alignment_inputs(item).await?.relief().into(),
+            ImageLayer::DepthFrameMask => {
+                png_mask(&self.alignment_inputs(item).await?.strokes).into()
+            }
+            ImageLayer::CanvasMask => {
+                png_mask(&self.alignment_inputs(item).await?.canvas_mask).into()
+            }
         })
     }
 
@@ -251,26 +264,22 @@ impl ImageCache {
         self.read(item, read).await
     }
 
-    /// Calls `read` with the current results of the item's pair, on another thread. Only one call runs at a time.
+    /// Calls `read` with the current results of the item's pair, on the thread for long work. Only one call runs at a time.
     async fn read<T: Send + 'static>(
         &self,
         item: &Arc<ReviewItem>,
         read: impl FnOnce(&Project, &PairResults, &ReviewItem) -> Result<T, ImageError> + Send + 'static,
     ) -> Result<T, ImageError> {
-        let permit = Arc::clone(&self.reading).acquire_owned().await;
-        let permit = permit.map_err(|_closed| ImageError::Gone)?;
+        let permit = self.reading.acquire().await;
+        let _permit = permit.map_err(|_closed| ImageError::Gone)?;
         let found = self.catalog.pair(&item.pair).await?;
         let pair = found.ok_or(ImageError::Gone)?.results;
         if pair.next_stage.is_some() {
             return Err(ImageError::Incomplete);
         }
         let (project, item) = (self.project.clone(), Arc::clone(item));
-        tokio::task::spawn_blocking(move || {
-            // The task itself holds the permit, because it continues even if the client leaves.
-            let _permit = permit;
-            read(&project, &pair, &item)
-        })
-        .await?
+        let work = move || read(&project, &pair, &item);
+        self.work.call(work).await?
     }
 }
 

@@ -6,24 +6,12 @@ use super::i18n::Language;
 use super::options::QueueOptions;
 use super::page_dialogs::{confirm, guide, help, jump};
 use crate::domain::{Reason, ReviewOrder, one_line};
-use crate::local_server::{document, forward_page, used_token_page};
+use crate::local_server::document;
 
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
 const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
-
-/// Returns the page at the start address. It sends the browser on to the review page.
-pub(super) fn forward(language: Language) -> Markup {
-    let title = language.translate("forward");
-    forward_page(language.name(), title, title)
-}
-
-/// Returns the page for a one-time token that was used before.
-pub(super) fn token_used(language: Language) -> Markup {
-    let text = language.translate("token_used");
-    used_token_page(language.name(), language.translate("title"), text)
-}
 
 /// Returns the review page.
 pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
@@ -33,10 +21,10 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
         one_line(&options.reviewer)
     );
     let head = html! {
-        link rel="stylesheet" href="/assets/review.css";
-        link rel="stylesheet" href="/assets/scan-viewer.css";
-        link rel="icon" href="/assets/icon.svg";
-        script type="module" src="/assets/main.js" {}
+        link rel="stylesheet" href="assets/review.css";
+        link rel="stylesheet" href="assets/scan-viewer.css";
+        link rel="icon" href="assets/icon.svg";
+        script type="module" src="assets/main.js" {}
     };
     let body = html! {
         a.skip href="#viewer" { (language.translate("skip")) }
@@ -84,7 +72,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             span #pace {}
             span #saved .saved role="status" { (language.translate("saved")) }
             span { (language.translate("reviewer")) ": " b { (one_line(&options.reviewer)) } }
-            a #language href={ "/?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
+            a #language href={ "?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
                 (language.translate("other_language"))
             }
             (button("guide", language))
@@ -196,7 +184,7 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::{forward, review, token_used};
+    use super::review;
     use crate::domain::ReviewOrder;
     use crate::review::{CheckRates, Language, QueueOptions};
 
@@ -230,15 +218,6 @@ mod tests {
         let options = options(ReviewOrder::LeastConfident, 0.0);
         let page = review(&options, Language::Vietnamese);
         insta::assert_snapshot!(lines(&page.into_string()));
-    }
-
-    #[test]
-    fn small_pages_in_both_languages() {
-        let pages = Language::ALL.map(|language| {
-            let pages = [forward(language), token_used(language)];
-            pages.map(|page| lines(&page.into_string())).join("\n\n")
-        });
-        insta::assert_snapshot!(pages.join("\n\n"));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use axum::extract::{Path, RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Json, Router, middleware};
+use axum::{Json, Router};
 use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
@@ -25,13 +25,11 @@ use super::summary::ReviewSummary;
 use super::{assets, examples};
 use crate::catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
 use crate::domain::{PairName, ReviewOrder, one_line};
-use crate::local_server::{START, guard};
 use crate::report::pair_artifacts::PairArtifactsError;
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
-    Router::new()
-        .route(START, get(start))
+    let pages = Router::new()
         .route("/", get(index))
         .route("/assets/{name}", get(asset))
         .route("/image/{id}/{layer}", get(image))
@@ -45,11 +43,8 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
-        .layer(middleware::from_fn_with_state(
-            Arc::clone(&state.access),
-            guard,
-        ))
-        .with_state(Arc::clone(state))
+        .with_state(Arc::clone(state));
+    state.access.guarded(pages)
 }
 
 /// Why a request fails.
@@ -112,21 +107,6 @@ impl IntoResponse for ApiError {
 }
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
-
-/// Opens the session.
-async fn start(
-    State(state): State<Arc<ServerState>>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
-) -> Response {
-    let language = language(&state, &headers);
-    let (forward, refused) = (page::forward, page::token_used);
-    state.access.start(
-        query.as_deref(),
-        || forward(language).into_string(),
-        || refused(language).into_string(),
-    )
-}
 
 async fn index(
     State(state): State<Arc<ServerState>>,

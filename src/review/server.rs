@@ -11,7 +11,7 @@ use super::options::ReviewOptions;
 use super::routes;
 use super::state::ServerState;
 use crate::catalog::{Catalog, CatalogError};
-use crate::local_server::{AccessControl, ConnectionLimits, listen, serve};
+use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
 use crate::store::Project;
 
 /// Why the server cannot start or run.
@@ -70,8 +70,11 @@ pub async fn bind(
     let name = origin_name(&project, &options.queue.reviewer);
     let listener = listen(address, &name).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
+    let work = Arc::new(WorkThread::default());
+    let images = (catalog.clone(), project.clone(), Arc::clone(&work));
     let state = ServerState {
-        images: ImageCache::new(catalog.clone(), project.clone(), options.limits),
+        images: ImageCache::new(images.0, images.1, options.limits, images.2),
+        work,
         access: Arc::new(AccessControl::new("review", address).map_err(ReviewError::Token)?),
         catalog,
         project,

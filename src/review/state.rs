@@ -8,7 +8,7 @@ use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::review_queue::{QueueError, ReviewQueue};
 use crate::catalog::Catalog;
-use crate::local_server::AccessControl;
+use crate::local_server::{AccessControl, WorkThread};
 use crate::store::Project;
 
 /// State of one reviewer's server.
@@ -19,6 +19,8 @@ pub(super) struct ServerState {
     pub(super) options: ReviewOptions,
     pub(super) access: Arc<AccessControl>,
     pub(super) images: ImageCache,
+    /// The thread for long work.
+    pub(super) work: Arc<WorkThread>,
     /// Every item served since the server started, by id. Answers to these items are accepted even if their results
     /// were replaced.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
@@ -30,7 +32,7 @@ impl ServerState {
     /// # Errors
     /// Returns an error if the catalog cannot be read, or if a blocking task fails.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
-        let queue = ReviewQueue::read(&self.catalog, &self.project, &self.options.queue).await?;
+        let queue = ReviewQueue::read(self).await?;
         let mut served = self.lock_served();
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));

@@ -16,6 +16,7 @@ use super::server::{ViewError, ViewServer, jpeg};
 use crate::domain::BlockName;
 use crate::export::block_view::{BlockView, PageLayer, PageRegion};
 use crate::export::scan_view::assets;
+use crate::local_server::WorkThread;
 
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";
@@ -55,6 +56,7 @@ const LONGEST_SIDE: usize = 3000;
 #[derive(Debug)]
 struct ShownBlock {
     view: BlockView,
+    work: Arc<WorkThread>,
     overviews: [OnceLock<Bytes>; PageLayer::ALL.len()],
 }
 
@@ -68,20 +70,22 @@ pub async fn bind_block(
     view: Option<BlockView>,
     store: impl CorrectionStore,
 ) -> Result<ViewServer, ViewError> {
+    let work = Arc::new(WorkThread::default());
     let pages = match view {
-        Some(view) => page_routes(view),
-        None => Router::new().route("/", get(async || Redirect::to("/correct"))),
+        Some(view) => page_routes(view, Arc::clone(&work)),
+        None => Router::new().route("/", get(async || Redirect::to("correct"))),
     };
     let pages = pages
         .route("/assets/{name}", get(asset))
-        .merge(correction_server::routes(block.clone(), store));
+        .merge(correction_server::routes(block.clone(), store, work));
     ViewServer::open(address, block.as_str(), pages).await
 }
 
 /// Returns the routes of the page of a block that is aligned.
-fn page_routes(view: BlockView) -> Router {
+fn page_routes(view: BlockView, work: Arc<WorkThread>) -> Router {
     let shown = ShownBlock {
         view,
+        work,
         overviews: PageLayer::ALL.map(|_| OnceLock::new()),
     };
     Router::new()
@@ -135,7 +139,8 @@ async fn overview(State(shown): State<Arc<ShownBlock>>, Path(layer): Path<String
     let Ok(layer) = layer.parse::<PageLayer>() else {
         return StatusCode::NOT_FOUND.into_response();
     };
-    jpeg(move || Some(shown.overview(layer))).await
+    let work = Arc::clone(&shown.work);
+    jpeg(&work, move || Some(shown.overview(layer))).await
 }
 
 async fn region(
@@ -149,14 +154,19 @@ async fn region(
     let part = region.within(shown.view.layers.size());
     match (layer.parse::<PageLayer>(), part) {
         (Ok(layer), Some(part)) => {
-            jpeg(move || Some(shown.picture(layer, part, LONGEST_SIDE))).await
+            let work = Arc::clone(&shown.work);
+            jpeg(&work, move || {
+                Some(shown.picture(layer, part, LONGEST_SIDE))
+            })
+            .await
         }
         _ => StatusCode::NOT_FOUND.into_response(),
     }
 }
 
 async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) -> Response {
-    let read = tokio::task::spawn_blocking(move || shown.view.scan(index));
+    let work = Arc::clone(&shown.work);
+    let read = work.call(move || shown.view.scan(index));
     let failed = |why: String| (StatusCode::INTERNAL_SERVER_ERROR, why).into_response();
     match read.await {
         Ok(Ok(Some(bytes))) => {

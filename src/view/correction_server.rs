@@ -1,5 +1,6 @@
 //! The page on which a person chooses the same places on the relief and on the page of a block.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use axum::body::Bytes;
@@ -14,29 +15,43 @@ use serde_json::json;
 
 use super::page;
 use super::server::jpeg;
-use crate::domain::{BlockName, BlockSide, ControlPoints};
+use crate::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
 use crate::export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
-use crate::local_server::AccessControl;
+use crate::local_server::{AccessControl, WorkThread};
 
 /// Reads a block for its correction, and stores the control points.
 pub trait CorrectionStore: Send + Sync + 'static {
     /// Reads the block. Returns a sentence if that fails.
     fn read(&self) -> impl Future<Output = Result<BlockCorrection, String>> + Send;
 
-    /// Stores control points, or removes the stored ones. Returns a sentence if that fails.
+    /// Stores control points, or removes the stored ones, if these still have the hash `read`. Returns a sentence if that
+    /// fails.
     fn save(
         &self,
+        read: Option<ContentHash>,
         points: Option<ControlPoints>,
-    ) -> impl Future<Output = Result<(), String>> + Send;
+    ) -> impl Future<Output = Result<PointsSaved, String>> + Send;
 
     /// Returns the command that aligns the block again.
     fn next_command(&self) -> String;
+}
+
+/// What became of points that were to be saved.
+#[derive(Debug)]
+pub enum PointsSaved {
+    /// They are saved.
+    Saved,
+    /// Another page, which may belong to another process, has saved points since this one was opened.
+    OthersSaved,
+    /// The block has another file than the one on which the points were tried.
+    FileReplaced(PathBuf),
 }
 
 /// The state of the page.
 struct CorrectionState<S> {
     block: BlockName,
     store: S,
+    work: Arc<WorkThread>,
     /// The block, which is read when the page is opened.
     shown: tokio::sync::Mutex<Option<Arc<BlockCorrection>>>,
     /// The last alignment that was tried and accepted, with its number.
@@ -51,20 +66,33 @@ struct PointsBody {
     points: Vec<PicturePoint>,
 }
 
-/// The alignment whose points are stored.
+/// The alignment whose points are stored, and the hash of the stored points that the page has shown.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SaveBody {
     id: u64,
+    saved_hash: Option<ContentHash>,
+}
+
+/// The hash of the stored points that the page has shown, which are removed.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RemoveBody {
+    saved_hash: Option<ContentHash>,
 }
 
 type CorrectionPage<S> = State<Arc<CorrectionState<S>>>;
 
 /// Returns the routes of the page of a block.
-pub(super) fn routes<S: CorrectionStore>(block: BlockName, store: S) -> Router {
+pub(super) fn routes<S: CorrectionStore>(
+    block: BlockName,
+    store: S,
+    work: Arc<WorkThread>,
+) -> Router {
     let state = CorrectionState {
         block,
         store,
+        work,
         shown: tokio::sync::Mutex::default(),
         tried: Mutex::default(),
     };
@@ -107,11 +135,28 @@ impl<S: CorrectionStore> CorrectionState<S> {
     }
 
     /// Stores points, and responds.
-    async fn store_points(&self, points: Option<ControlPoints>) -> Response {
-        match self.store.save(points).await {
-            Ok(()) => {
+    async fn store_points(
+        &self,
+        read: Option<ContentHash>,
+        points: Option<ControlPoints>,
+    ) -> Response {
+        let saved_hash = points.as_ref().map(ControlPoints::hash);
+        match self.store.save(read, points).await {
+            Ok(PointsSaved::Saved) => {
                 *self.shown.lock().await = None;
-                Json(json!({"next": self.store.next_command()})).into_response()
+                let next = self.store.next_command();
+                Json(json!({"next": next, "saved_hash": saved_hash})).into_response()
+            }
+            Ok(PointsSaved::OthersSaved) => refused(
+                StatusCode::CONFLICT,
+                "the points of this block were changed since this page was opened: reload the page to see them",
+            ),
+            Ok(PointsSaved::FileReplaced(path)) => {
+                let path = path.display();
+                let why = format!(
+                    "{path} was replaced since this page was opened: reload the page, and choose the points again"
+                );
+                refused(StatusCode::CONFLICT, &why)
             }
             Err(why) => unavailable(&why),
         }
@@ -175,7 +220,7 @@ async fn try_points<S: CorrectionStore>(
         Err(failed) => return failed,
     };
     let tried = move || shown.try_points(body.side, &body.points);
-    match tokio::task::spawn_blocking(tried).await {
+    match state.work.call(tried).await {
         Ok(Ok(tried)) => {
             let agreement = tried.agreement;
             let id = state.set_tried(Some(tried));
@@ -194,12 +239,15 @@ async fn save<S: CorrectionStore>(
     State(state): CorrectionPage<S>,
     body: Result<Json<SaveBody>, JsonRejection>,
 ) -> Response {
-    let id = match body {
-        Ok(Json(body)) => body.id,
+    let SaveBody { id, saved_hash } = match body {
+        Ok(Json(body)) => body,
         Err(rejection) => return refused(rejection.status(), &rejection.to_string()),
     };
     match state.tried(id) {
-        Some(tried) => state.store_points(Some(tried.points.clone())).await,
+        Some(tried) => {
+            let points = Some(tried.points.clone());
+            state.store_points(saved_hash, points).await
+        }
         None => refused(
             StatusCode::CONFLICT,
             "other points were tried meanwhile: try these again before saving them",
@@ -207,9 +255,17 @@ async fn save<S: CorrectionStore>(
     }
 }
 
-async fn remove<S: CorrectionStore>(State(state): CorrectionPage<S>) -> Response {
-    state.set_tried(None);
-    state.store_points(None).await
+async fn remove<S: CorrectionStore>(
+    State(state): CorrectionPage<S>,
+    body: Result<Json<RemoveBody>, JsonRejection>,
+) -> Response {
+    match body {
+        Ok(Json(body)) => {
+            state.set_tried(None);
+            state.store_points(body.saved_hash, None).await
+        }
+        Err(rejection) => refused(rejection.status(), &rejection.to_string()),
+    }
 }
 
 /// Reads the block, and responds with an image that is drawn from it.
@@ -221,7 +277,7 @@ async fn image<S: CorrectionStore>(
         Ok(shown) => shown,
         Err(failed) => return failed,
     };
-    jpeg(move || draw(&shown).map(Bytes::from)).await
+    jpeg(&state.work, move || draw(&shown).map(Bytes::from)).await
 }
 
 fn refused(status: StatusCode, why: &str) -> Response {

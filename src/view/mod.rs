@@ -6,5 +6,5 @@ mod page;
 mod server;
 
 pub use block_server::bind_block;
-pub use correction_server::CorrectionStore;
+pub use correction_server::{CorrectionStore, PointsSaved};
 pub use server::{ViewError, ViewServer, bind};

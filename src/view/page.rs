@@ -2,20 +2,17 @@
 
 use maud::html;
 
-use crate::local_server::{document, forward_page, used_token_page};
+use crate::local_server::document;
 
 /// Language of the page before its script translates it.
 const LANGUAGE: &str = "en";
-/// Shown if the one-time address was used before.
-const REFUSED: &str =
-    "This address has already been used. Run the view command again to get a new one.";
 
 /// Returns the page of a pair. Its script loads the data and creates the controls.
 pub(super) fn view(pair: &str) -> String {
     let head = html! {
-        link rel="stylesheet" href="/assets/scan-viewer.css";
+        link rel="stylesheet" href="assets/scan-viewer.css";
         link rel="icon" href="data:,";
-        script type="module" src="/assets/view.js" {}
+        script type="module" src="assets/view.js" {}
     };
     let body = html! {
         body.scan-page {
@@ -28,18 +25,18 @@ pub(super) fn view(pair: &str) -> String {
 
 /// Returns the page of a block. Its script loads the data and creates the controls.
 pub(super) fn block(name: &str) -> String {
-    block_page(name, "/assets/block-view.js")
+    block_page(name, "assets/block-view.js")
 }
 
 /// Returns the page on which the alignment of a block is corrected.
 pub(super) fn correction(name: &str) -> String {
-    block_page(name, "/assets/block-correct.js")
+    block_page(name, "assets/block-correct.js")
 }
 
 fn block_page(name: &str, script: &str) -> String {
     let head = html! {
-        link rel="stylesheet" href="/assets/scan-viewer.css";
-        link rel="stylesheet" href="/assets/block-view.css";
+        link rel="stylesheet" href="assets/scan-viewer.css";
+        link rel="stylesheet" href="assets/block-view.css";
         link rel="icon" href="data:,";
         script type="module" src=(script) {}
     };
@@ -53,29 +50,13 @@ fn block_page(name: &str, script: &str) -> String {
     document(LANGUAGE, name, &head, &body).into_string()
 }
 
-/// Returns the page at the start address. It sends the browser on to the view.
-pub(super) fn forward() -> String {
-    forward_page(LANGUAGE, "mocban", "view").into_string()
-}
-
-/// Returns the page for a one-time token that was used before.
-pub(super) fn token_used() -> String {
-    used_token_page(LANGUAGE, "mocban", REFUSED).into_string()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{block, correction, forward, token_used, view};
+    use super::{block, correction, view};
 
     #[test]
     fn pages_load_only_from_this_server() {
-        for page in [
-            view("a<b"),
-            block("a<b"),
-            correction("a<b"),
-            forward(),
-            token_used(),
-        ] {
+        for page in [view("a<b"), block("a<b"), correction("a<b")] {
             assert!(!page.contains("//"), "{page}");
         }
         assert!(view("a<b").contains("<title>a&lt;b</title>"));

@@ -4,16 +4,16 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use axum::extract::{Path, RawQuery, State};
+use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse as _, Response};
 use axum::routing::get;
-use axum::{Extension, Router, middleware};
+use axum::{Extension, Router};
 use tokio::net::TcpListener;
 
 use super::page;
 use crate::export::scan_view::{ScanView, assets};
-use crate::local_server::{AccessControl, ConnectionLimits, START, guard, listen, serve};
+use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
 
 /// The script of the page.
 const SCRIPT: &str = include_str!("../../assets/scan-viewer/view.js");
@@ -98,18 +98,10 @@ impl ViewServer {
 
     /// Serves requests until `stop` completes, and then at most two seconds longer.
     pub async fn serve(self, stop: impl Future<Output = ()>) {
-        let access = Arc::clone(&self.access);
-        let router = Router::new()
-            .route(START, get(start))
-            .with_state(self.access)
-            .merge(self.pages.layer(Extension(Arc::clone(&access))))
-            .layer(middleware::from_fn_with_state(access, guard));
+        let access = Extension(Arc::clone(&self.access));
+        let router = self.access.guarded(self.pages.layer(access));
         serve(self.listener, router, ConnectionLimits::system(), stop).await;
     }
-}
-
-async fn start(State(access): State<Arc<AccessControl>>, RawQuery(query): RawQuery) -> Response {
-    access.start(query.as_deref(), page::forward, page::token_used)
 }
 
 async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
@@ -129,9 +121,12 @@ async fn scan(State(shown): State<Arc<ShownScan>>) -> Response {
     (kind, shown.data.clone()).into_response()
 }
 
-/// Draws an image on a thread for long work and responds with it, or that there is none.
-pub(super) async fn jpeg(draw: impl FnOnce() -> Option<Bytes> + Send + 'static) -> Response {
-    match tokio::task::spawn_blocking(draw).await {
+/// Draws an image on the thread for long work and responds with it, or that there is none.
+pub(super) async fn jpeg(
+    work: &WorkThread,
+    draw: impl FnOnce() -> Option<Bytes> + Send + 'static,
+) -> Response {
+    match work.call(draw).await {
         Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
         Ok(None) => StatusCode::NOT_FOUND.into_response(),
         Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),

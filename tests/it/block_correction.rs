@@ -117,42 +117,57 @@ fn true_points(dir: &Path, block: &Value) -> Vec<Value> {
         .to_vec()
 }
 
-/// A session of the page.
-struct Session<'a> {
-    page: &'a Page,
-    cookie: String,
+/// A page of the block whose session is open.
+struct Session {
+    page: Page,
+    token: String,
 }
 
-impl Session<'_> {
-    fn request(&self, method: &str, path: &str, token: &str, body: &Value) -> Reply {
-        let origin = format!("http://{}", self.page.host);
-        let headers = [
-            ("host", self.page.host.clone()),
-            ("cookie", self.cookie.clone()),
-            ("origin", origin),
-            ("content-type", "application/json".to_owned()),
-            ("x-csrf-token", token.to_owned()),
-        ];
-        let body = if method == "GET" {
-            String::new()
-        } else {
-            body.to_string()
-        };
-        send(self.page.address(), method, path, &headers, body.as_bytes()).expect("a reply")
+impl Session {
+    fn open(dir: &Path) -> Self {
+        let words = ["-C", "p", "--json", "view", "--no-open", "b1"];
+        let page = Page::of(binary().current_dir(dir).args(words)).entered();
+        let block = page.get("/correct/block.json").json();
+        let token = block["csrf_token"].as_str().expect("a token").to_owned();
+        Self { page, token }
     }
 
-    fn get(&self, path: &str) -> Reply {
-        self.request("GET", path, "", &json!({}))
+    fn block(&self) -> Value {
+        self.page.get("/correct/block.json").json()
     }
-}
 
-/// Opens the page as a browser does.
-fn session(page: &Page) -> Session<'_> {
-    let start = &page.url["http://".len() + page.host.len()..];
-    let reply = page.get(start);
-    let cookie = reply.header("set-cookie").expect("a cookie");
-    let cookie = cookie.split(';').next().expect("a value").to_owned();
-    Session { page, cookie }
+    /// Tries points, and returns the number of the alignment.
+    fn tried(&self, side: &Value, points: &[Value]) -> u64 {
+        let tried = self.post("/correct/try", &json!({"side": side, "points": points}));
+        tried.json()["id"].as_u64().expect("a number")
+    }
+
+    /// Saves an alignment on a page that has shown points with a hash.
+    fn save(&self, id: u64, saved_hash: &Value) -> Reply {
+        self.post(
+            "/correct/save",
+            &json!({"id": id, "saved_hash": saved_hash}),
+        )
+    }
+
+    fn post(&self, page: &str, body: &Value) -> Reply {
+        self.post_with(&self.token, page, body)
+    }
+
+    fn post_with(&self, token: &str, page: &str, body: &Value) -> Reply {
+        let mut headers = self.page.headers();
+        headers.retain(|(name, _)| *name != "x-csrf-token");
+        headers.push(("x-csrf-token", token.to_owned()));
+        let (path, body) = (format!("{}{page}", self.page.session), body.to_string());
+        send(
+            self.page.address(),
+            "POST",
+            &path,
+            &headers,
+            body.as_bytes(),
+        )
+        .expect("a reply")
+    }
 }
 
 fn error(reply: &Reply) -> String {
@@ -163,37 +178,32 @@ fn error(reply: &Reply) -> String {
 }
 
 /// Checks the routes. Stores the points at the end.
-fn check_routes(dir: &Path, page: &Page) {
-    assert_eq!(page.get("/correct/block.json").status, 401);
-    let session = session(page);
-    assert_eq!(session.get("/").header("location"), Some("/correct"));
-    let block = session.get("/correct/block.json").json();
+fn check_routes(dir: &Path) {
+    let session = Session::open(dir);
+    let page = &session.page;
+    assert_eq!(page.get_path("/correct/block.json").status, 401);
+    assert_eq!(page.get("/").header("location"), Some("correct"));
+    let block = session.block();
     let failure = block["failure"].as_str().expect("a sentence");
     assert!(
         failure.contains("does not belong to this block"),
         "{failure}"
     );
-    let token = block["csrf_token"].as_str().expect("a token");
     let shown = &block["sides"][printed_side(dir)];
     let side = &shown["side"];
     let side_name = side.as_str().expect("a side");
-    let image = session.get(&format!("/correct/face/{side_name}/1"));
+    let image = page.get(&format!("/correct/face/{side_name}/1"));
     let image = decode(&image.body, &ImageLimits::SUGGESTED).expect("an image");
     assert_eq!(
         json!([image.rgb.height(), image.rgb.width()]),
         shown["size"]
     );
     let points = true_points(dir, &block);
-    let send = |points: &[Value], token: &str| {
-        session.request(
-            "POST",
-            "/correct/try",
-            token,
-            &json!({"side": side, "points": points}),
-        )
-    };
-    assert_eq!(send(&points, "guessed").status, 403);
-    let few = send(&points[..2], token);
+    let body = |points: &[Value]| json!({"side": side, "points": points});
+    let send = |points: &[Value]| session.post("/correct/try", &body(points));
+    let guessed = session.post_with("guessed", "/correct/try", &body(&points));
+    assert_eq!(guessed.status, 403);
+    let few = send(&points[..2]);
     assert_eq!(
         (few.status, error(&few)),
         (
@@ -203,7 +213,7 @@ fn check_routes(dir: &Path, page: &Page) {
     );
     let mut beside = points.clone();
     beside[1]["face"] = json!([-5000.0, 0.0]);
-    let beside = error(&send(&beside, token));
+    let beside = error(&send(&beside));
     assert!(
         beside.starts_with("point 2 lies beside the scanned face"),
         "{beside}"
@@ -211,12 +221,12 @@ fn check_routes(dir: &Path, page: &Page) {
     let mut swapped = points.clone();
     let (a, b) = (points[0]["page"].clone(), points[1]["page"].clone());
     (swapped[0]["page"], swapped[1]["page"]) = (b, a);
-    let swapped = error(&send(&swapped, token));
+    let swapped = error(&send(&swapped));
     assert!(swapped.contains("contradict each other"), "{swapped}");
-    let save = |id: u64| session.request("POST", "/correct/save", token, &json!({ "id": id }));
+    let save = |id: u64| session.save(id, &Value::Null);
     assert_eq!(save(1).status, 409);
-    assert_eq!(session.get("/correct/overlay/1").status, 404);
-    let tried = send(&points, token);
+    assert_eq!(page.get("/correct/overlay/1").status, 404);
+    let tried = send(&points);
     assert_eq!(
         tried.status,
         200,
@@ -229,11 +239,9 @@ fn check_routes(dir: &Path, page: &Page) {
         tried.json()
     );
     let first = tried.json()["id"].as_u64().expect("a number");
-    assert!(session.get(&format!("/correct/overlay/{first}")).body.len() > 10_000);
+    assert!(page.get(&format!("/correct/overlay/{first}")).body.len() > 10_000);
     // Another tab tries points meanwhile.
-    let second = send(&points, token).json()["id"]
-        .as_u64()
-        .expect("a number");
+    let second = session.tried(side, &points);
     assert_eq!(save(first).status, 409);
     let saved = save(second);
     assert_eq!(saved.status, 200);
@@ -243,9 +251,47 @@ fn check_routes(dir: &Path, page: &Page) {
             .expect("a command")
             .ends_with("run")
     );
-    let again = session.get("/correct/block.json").json();
+    let again = session.block();
     assert_eq!(again["is_saved"], true);
+    assert_eq!(again["saved_hash"], saved.json()["saved_hash"]);
     assert_eq!(again["points"].as_array().map(Vec::len), Some(3));
+}
+
+/// Checks that a server replaces neither points of another one nor saves points of a file that was replaced.
+fn check_conflicts(dir: &Path) {
+    let [one, other] = [Session::open(dir), Session::open(dir)];
+    let [block, seen] = [&one, &other].map(Session::block);
+    let (seen, side) = (
+        &seen["saved_hash"],
+        &block["sides"][printed_side(dir)]["side"],
+    );
+    let points = true_points(dir, &block);
+    let moved = {
+        let mut points = points.clone();
+        points[0]["page"][0] = json!(points[0]["page"][0].as_f64().expect("a number") + 0.5);
+        points
+    };
+    let saved = one.save(one.tried(side, &moved), seen);
+    assert_eq!(saved.status, 200);
+    let hash = saved.json()["saved_hash"].clone();
+    let id = other.tried(side, &points);
+    let conflict = other.save(id, seen);
+    assert_eq!(conflict.status, 409);
+    assert!(error(&conflict).ends_with("reload the page to see them"));
+    let removed = other.post("/correct/remove", &json!({ "saved_hash": seen }));
+    assert_eq!(removed.status, 409);
+    let shown = other.block();
+    assert_eq!(shown["saved_hash"], hash, "those of the first server");
+    // Another image, which is the same to the eye.
+    let page = fs::read(dir.join("part.png")).expect("the page");
+    let id = other.tried(side, &points);
+    fs::write(dir.join("part.png"), [&page[..], b" "].concat()).expect("written");
+    let replaced = other.save(id, &hash);
+    assert_eq!(replaced.status, 409);
+    let why = error(&replaced);
+    assert!(why.contains("part.png was replaced"), "{why}");
+    fs::write(dir.join("part.png"), page).expect("written");
+    assert_eq!(other.save(id, &hash).status, 200);
 }
 
 /// Chooses the points as a person does.
@@ -312,7 +358,8 @@ fn a_fragment_of_a_page_is_aligned_from_points_that_a_person_chooses() {
                 .args(["-C", "p", "--json", "view", "--no-open", "b1"]),
         )
     };
-    check_routes(dir, &start());
+    check_routes(dir);
+    check_conflicts(dir);
     let show = || {
         mocban(dir, &["-C", "p", "--json", "show", "b1"])
             .expect(0)

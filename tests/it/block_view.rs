@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::{binary, mocban};
-use crate::page::{Page, send};
+use crate::page::Page;
 use crate::small_block::{demo_block, few_labels};
 
 /// Vermillion and blue of the overlays.
@@ -70,7 +70,7 @@ fn check_pictures(dir: &Path) {
 }
 
 /// Checks the routes of the page without a browser.
-fn check_routes(page: &Page) {
+fn check_routes(page: Page) {
     for path in [
         "/",
         "/block.json",
@@ -80,14 +80,8 @@ fn check_routes(page: &Page) {
     ] {
         assert_eq!(page.get(path).status, 401, "{path}");
     }
-    let start = &page.url["http://".len() + page.host.len()..];
-    let reply = page.get(start);
-    let cookie = reply.header("set-cookie").expect("a cookie");
-    let cookie = cookie.split(';').next().expect("a value").to_owned();
-    let get = |path: &str| {
-        let headers = [("host", page.host.clone()), ("cookie", cookie.clone())];
-        send(page.address(), "GET", path, &headers, b"").expect("a reply")
-    };
+    let page = page.entered();
+    let get = |path: &str| page.get(path);
     let block = get("/block.json").json();
     assert_eq!(block["characters"].as_array().map(Vec::len), Some(6));
     for one in block["characters"].as_array().expect("characters") {
@@ -188,7 +182,7 @@ fn a_block_is_drawn_and_shown_in_the_browser() {
     check_pictures(dir.path());
     let args = ["-C", "p", "--json", "view", "--no-open", "b1"];
     let start = || Page::of(binary().current_dir(dir.path()).args(args));
-    check_routes(&start());
+    check_routes(start());
     let Some(browser) = Browser::start() else {
         return;
     };

@@ -110,6 +110,7 @@ mod sample_files;
 mod scan_viewer;
 mod semi_real;
 #[cfg(target_os = "linux")]
+mod session_browser;
 mod shim;
 #[cfg(unix)]
 mod silent_server;

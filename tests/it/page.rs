@@ -73,6 +73,8 @@ pub(crate) struct Site {
     pub(crate) url: String,
     /// Host name and port.
     pub(crate) host: String,
+    /// Path below which the pages of the session are.
+    pub(crate) session: String,
     pub(crate) cookie: String,
     pub(crate) csrf_token: String,
 }
@@ -107,6 +109,7 @@ impl Page {
         let site = Site {
             host: host.to_owned(),
             url,
+            session: String::new(),
             cookie: String::new(),
             csrf_token: String::new(),
         };
@@ -118,22 +121,27 @@ impl Page {
         Self::start(project, reviewer, args).with_session()
     }
 
-    /// Opens a session as a browser does.
+    /// Opens a session as a browser does, and reads the CSRF token of a review.
     pub(crate) fn with_session(self) -> Self {
-        let mut page = self;
-        let start = page.url["http://".len() + page.host.len()..].to_owned();
-        let reply = page.get(&start);
-        let cookie = reply.header("set-cookie").expect("a cookie");
-        cookie
-            .split(';')
-            .next()
-            .expect("a value")
-            .clone_into(&mut page.site.cookie);
+        let mut page = self.entered();
         let boot = page.get("/api/config").json();
         boot["csrf_token"]
             .as_str()
             .expect("a token")
             .clone_into(&mut page.site.csrf_token);
+        page
+    }
+
+    /// Opens a session as a browser does.
+    pub(crate) fn entered(self) -> Self {
+        let mut page = self;
+        let reply = page.get_path(page.start_path());
+        let cookie = reply.header("set-cookie").expect("a cookie");
+        let cookie = cookie.split(';').next().expect("a value").to_owned();
+        let html = String::from_utf8(reply.body).expect("UTF-8");
+        let session = html.split("data-session=\"").nth(1).expect("a session");
+        let session = session.split("/\"").next().expect("a path").to_owned();
+        (page.site.cookie, page.site.session) = (cookie, session);
         page
     }
 
@@ -178,18 +186,29 @@ impl Site {
         ]
     }
 
-    pub(crate) fn get(&self, path: &str) -> Reply {
+    /// Returns path and query of the start URL.
+    pub(crate) fn start_path(&self) -> &str {
+        &self.url["http://".len() + self.host.len()..]
+    }
+
+    /// Requests a page of the session.
+    pub(crate) fn get(&self, page: &str) -> Reply {
+        self.get_path(&format!("{}{page}", self.session))
+    }
+
+    /// Requests a path with the cookie of the session.
+    pub(crate) fn get_path(&self, path: &str) -> Reply {
         let headers = [("host", self.host.clone()), ("cookie", self.cookie.clone())];
         send(self.address(), "GET", path, &headers, b"").expect("a reply")
     }
 
     /// Sends a write request of the page; fails if the server is gone.
-    pub(crate) fn post(&self, path: &str, body: &Value) -> std::io::Result<Reply> {
+    pub(crate) fn post(&self, page: &str, body: &Value) -> std::io::Result<Reply> {
         let body = body.to_string();
         send(
             self.address(),
             "POST",
-            path,
+            &format!("{}{page}", self.session),
             &self.headers(),
             body.as_bytes(),
         )

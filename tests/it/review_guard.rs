@@ -40,7 +40,13 @@ impl Target {
         }
         let body = answer("e1", &self.item, "pass").to_string();
         let to = self.page.address();
-        send(to, "POST", "/api/answer", &headers, body.as_bytes()).expect("a reply")
+        let path = self.path("/api/answer");
+        send(to, "POST", &path, &headers, body.as_bytes()).expect("a reply")
+    }
+
+    /// Returns the path of a page of the session.
+    fn path(&self, page: &str) -> String {
+        format!("{}{page}", self.page.session)
     }
 
     /// Checks that nothing was stored so far, and that a correct request is.
@@ -81,8 +87,10 @@ fn a_foreign_host_is_rejected_first() {
         "/image/a/print",
         "/scan/a",
     ] {
-        let reply = send(target.page.address(), "GET", path, &same, b"").expect("a reply");
-        assert_eq!(reply.status, 421, "{path}");
+        for path in [path, &target.path(path)] {
+            let reply = send(target.page.address(), "GET", path, &same, b"").expect("a reply");
+            assert_eq!(reply.status, 421, "{path}");
+        }
     }
     target.nothing_is_stored();
 }
@@ -92,7 +100,8 @@ fn localhost_is_an_accepted_host() {
     let target = Target::open();
     let named = format!("localhost:{}", target.page.address().port());
     let headers = [("host", named), ("cookie", target.page.cookie.clone())];
-    let reply = send(target.page.address(), "GET", "/", &headers, b"").expect("a reply");
+    let path = target.path("/");
+    let reply = send(target.page.address(), "GET", &path, &headers, b"").expect("a reply");
     assert_eq!(reply.status, 200);
 }
 
@@ -115,44 +124,92 @@ fn a_foreign_or_missing_origin_is_refused() {
 }
 
 #[test]
-fn nothing_is_served_without_the_cookie() {
+fn nothing_is_served_without_the_cookie_or_without_the_path_of_the_session() {
     let target = Target::open();
     for cookie in [None, Some("mocban_review=x"), Some("")] {
         assert_eq!(target.with("cookie", cookie).status, 401, "{cookie:?}");
     }
-    let headers = [("host", target.page.host.clone())];
+    let host = ("host", target.page.host.clone());
+    let cookie = ("cookie", target.page.cookie.clone());
+    let guessed = format!("/s/{}", "0".repeat(64));
     let image = format!(
         "/image/{}/print",
         target.item["id"].as_str().expect("an id")
     );
-    for path in [
+    for page in [
         "/",
         "/api/queue",
         "/api/config",
+        "/api/summary",
         "/assets/main.js",
         &image,
         "/scan/a",
         "/nowhere",
     ] {
-        let reply = send(target.page.address(), "GET", path, &headers, b"").expect("a reply");
-        assert_eq!(reply.status, 401, "{path}");
+        let get = |path: &str, headers: &[_]| {
+            send(target.page.address(), "GET", path, headers, b"").expect("a reply")
+        };
+        let without_cookie = get(&target.path(page), &[host.clone()]);
+        assert_eq!(without_cookie.status, 401, "{page}");
+        for session in ["", "/s", "/s/", &guessed, &target.page.session[..40]] {
+            let path = format!("{session}{page}");
+            let reply = get(&path, &[host.clone(), cookie.clone()]);
+            assert_eq!(reply.status, 401, "{path}");
+        }
     }
+    // A page of another port knows the cookie and, from a log, even the CSRF token, but not the path.
+    let body = answer("e1", &target.item, "pass").to_string();
+    let (to, headers) = (target.page.address(), target.page.headers());
+    let reply = send(to, "POST", "/api/answer", &headers, body.as_bytes()).expect("a reply");
+    assert_eq!(reply.status, 401);
     target.nothing_is_stored();
+}
+
+#[test]
+fn a_browser_without_a_session_is_told_what_to_do_and_nothing_else() {
+    let target = Target::open();
+    let headers = [
+        ("host", target.page.host.clone()),
+        ("cookie", target.page.cookie.clone()),
+        ("accept", "text/html,*/*;q=0.8".to_owned()),
+    ];
+    for path in ["/", "/start", "/start?token=guess", "/api/queue"] {
+        let reply = send(target.page.address(), "GET", path, &headers, b"").expect("a reply");
+        let text = String::from_utf8(reply.body.clone()).expect("UTF-8");
+        assert!([401, 403].contains(&reply.status), "{path}");
+        assert!(text.contains("Open the address that the command printed."));
+        assert!(text.contains("Hãy mở địa chỉ mà lệnh đã in ra."), "{text}");
+        assert!(!text.contains(&target.page.session) && !text.contains("upright"));
+        assert_eq!(reply.header("set-cookie"), None);
+    }
+    let script = target.page.get_path("/session.js");
+    assert_eq!(script.status, 200);
+    let text = String::from_utf8(script.body).expect("UTF-8");
+    assert!(!text.contains(&target.page.session));
 }
 
 #[test]
 fn the_token_opens_once() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let page = Page::start(&read_project(&dir), "lan", &[]);
-    let start = &page.url["http://".len() + page.host.len()..];
-    assert_eq!(page.get("/start?token=guess").status, 403);
-    let first = page.get(start);
+    let start = page.start_path();
+    assert_eq!(page.get_path("/start?token=guess").status, 403);
+    let headers = [("host", page.host.clone())];
+    let preview = send(page.address(), "HEAD", start, &headers, b"").expect("a reply");
+    assert_eq!(preview.status, 405, "a preview does not use up the token");
+    let first = page.get_path(start);
     assert_eq!(first.status, 200);
     let cookie = first.header("set-cookie").expect("a cookie");
-    for wanted in ["HttpOnly", "SameSite=Strict", "Path=/"] {
+    let path = cookie.split("Path=").nth(1).expect("a path");
+    assert_eq!(
+        path.len(),
+        "/s/".len() + 64,
+        "a browser sends it to no other port"
+    );
+    for wanted in ["HttpOnly", "SameSite=Strict"] {
         assert!(cookie.contains(wanted), "{cookie}");
     }
-    let second = page.get(start);
+    let second = page.get_path(start);
     assert_eq!(second.status, 403);
     assert_eq!(second.header("set-cookie"), None);
 }
@@ -220,7 +277,8 @@ fn other_methods_and_invalid_answers_are_refused() {
     let target = Target::open();
     let headers = target.page.headers();
     for method in ["PUT", "DELETE", "PATCH"] {
-        let reply = send(target.page.address(), method, "/api/answer", &headers, b"");
+        let path = target.path("/api/answer");
+        let reply = send(target.page.address(), method, &path, &headers, b"");
         assert_eq!(reply.expect("a reply").status, 405, "{method}");
     }
     let good = answer("e1", &target.item, "pass");

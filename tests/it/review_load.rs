@@ -49,7 +49,7 @@ fn begun_answer(page: &Page, body: &str) -> TcpStream {
     let headers = page.headers().into_iter();
     let headers = headers.map(|(name, value)| format!("{name}: {value}"));
     let lines = [
-        "POST /api/answer HTTP/1.1".to_owned(),
+        format!("POST {}/api/answer HTTP/1.1", page.session),
         "expect: 100-continue".to_owned(),
         format!("content-length: {}", body.len()),
     ];

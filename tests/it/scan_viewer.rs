@@ -374,7 +374,14 @@ fn only_the_browser_with_the_token_sees_the_scan() {
         let reply = send(page.address(), "GET", path, &host, b"").expect("a reply");
         assert_eq!(reply.status, 421, "{path}");
     }
-    let start = &page.url["http://".len() + page.host.len()..];
-    assert_eq!(page.get(start).status, 200);
-    assert_eq!(page.get(start).status, 403);
+    let page = page.entered();
+    assert_eq!(page.get_path(page.start_path()).status, 403);
+    for path in ["/", "/scan", "/assets/scan-viewer.js", "/assets/view.js"] {
+        assert_eq!(page.get(path).status, 200, "{path}");
+        assert_eq!(
+            page.get_path(path).status,
+            401,
+            "{path} with the cookie alone"
+        );
+    }
 }

@@ -50,9 +50,15 @@ impl HeldWorker {
         worker
     }
 
+    /// Asks for a path under a host name.
+    fn get(&self, path: &str, host: &str) -> page::Reply {
+        let host = [("host", host.to_owned())];
+        page::send(self.metrics, "GET", path, &host, b"").expect("a reply")
+    }
+
     /// Returns the value of a metric with its labels.
     fn metric(&self, name: &str) -> f64 {
-        let reply = page::send(self.metrics, "GET", "/metrics", &[], b"").expect("a reply");
+        let reply = self.get("/metrics", &self.metrics.to_string());
         assert_eq!(reply.status, 200);
         let kind = reply.header("content-type");
         assert_eq!(kind, Some("text/plain; version=0.0.4; charset=utf-8"));
@@ -142,8 +148,13 @@ fn two_workers_are_shown_while_they_run_stop_and_end() {
             let name = format!("mocban_wait_seconds_total{{for=\"{reason}\"}}");
             assert!(worker.metric(&name) > 0.0, "{reason}");
         }
-        let reply = page::send(worker.metrics, "GET", "/", &[], b"").expect("a reply");
-        assert_eq!(reply.status, 404);
+        let port = worker.metrics.port();
+        assert_eq!(worker.get("/", &format!("localhost:{port}")).status, 404);
+        for path in ["/metrics", "/"] {
+            let rebound = worker.get(path, &format!("evil.example:{port}"));
+            assert_eq!(rebound.status, 421);
+            assert!(!rebound.body.starts_with(b"mocban") && rebound.body.len() < 200);
+        }
     }
     until("the heartbeats", || hosts()["total"]["done"] == 2);
     let shown = hosts();

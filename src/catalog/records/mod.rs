@@ -18,4 +18,5 @@ pub(crate) mod review_rights;
 pub(crate) mod set_apart;
 pub(crate) mod stage_results;
 pub(crate) mod status;
+pub(crate) mod verdict_rules;
 pub(crate) mod verdicts;

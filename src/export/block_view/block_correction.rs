@@ -168,6 +168,7 @@ impl BlockCorrection {
             "points": points.unwrap_or_default(),
             "min_points": ControlPoints::MIN,
             "is_saved": self.saved.is_some(),
+            "saved_hash": self.saved.as_ref().map(ControlPoints::hash),
             "is_aligned": self.aligned.is_some(),
             "failure": self.failure,
         })

@@ -219,9 +219,13 @@ fn cell(value: &Value) -> String {
     }
 }
 
+/// First characters of a text that a spreadsheet may run as a formula, as OWASP lists them ("CSV Injection"), with their
+/// full-width forms.
+const FORMULA_STARTS: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
+
 /// Returns a text as a cell. A leading `'` keeps spreadsheets from running it as a formula.
 fn text_cell(text: &str) -> String {
-    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let is_formula = text.starts_with(FORMULA_STARTS);
     if is_formula { "'" } else { "" }.to_owned() + text
 }
 
@@ -236,4 +240,25 @@ fn rows(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
             .expect("memory takes rows of equal length");
     }
     writer.into_inner().expect("memory is written")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::cell;
+
+    #[test]
+    fn no_text_is_a_formula_and_numbers_stay_numbers() {
+        for text in [
+            "=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1", "＋1", "－1", "＠1",
+        ] {
+            assert_eq!(cell(&json!(text)), format!("'{text}"));
+        }
+        for text in ["", "1-1", "a=1", "'=1", "天"] {
+            assert_eq!(cell(&json!(text)), text);
+        }
+        assert_eq!(cell(&json!(-1.5e-7)), "-0.00000015");
+        assert_eq!(cell(&json!(-3)), "-3");
+    }
 }
