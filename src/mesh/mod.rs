@@ -5,6 +5,7 @@ mod error;
 mod format;
 mod obj;
 mod ply;
+pub(crate) mod robust_bounds;
 mod stl;
 mod text;
 mod triangle_mesh;

@@ -14,7 +14,6 @@ pub mod pipeline;
 mod pose;
 mod print;
 pub mod register;
-mod robust_bounds;
 mod scan;
 pub mod score;
 mod settings;

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use super::params::FitError;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
-use crate::stages::robust_bounds::is_in_box;
+use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
 /// A mesh without faces needs at least this many points, about 25 along a side, to show one or two strokes.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::directions::{Facet, facets, large_planes};
 use super::pca::Axes;
 use crate::mesh::Mesh;
-use crate::stages::robust_bounds::is_in_box;
+use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::scan::{of_faces, part_of};
 use crate::stages::zbuffer::IndexedSurface;
 

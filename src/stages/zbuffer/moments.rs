@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::surface::IndexedSurface;
 use super::triangle_block::{LANES, LaneArray, TriangleBlock};
+use crate::mesh::robust_bounds::Bounds;
 use crate::simd::dispatch;
-use crate::stages::robust_bounds::Bounds;
 
 /// The distinct products of two axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];

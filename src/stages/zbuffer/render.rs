@@ -6,9 +6,9 @@ use super::triangle_block::{AffineForm, LANES, TriangleBlock};
 use super::triangle_fill::pixel_range;
 use super::viewport::Viewport;
 use crate::domain::Rigid3;
+use crate::mesh::robust_bounds::bulk_along;
 use crate::raster::Grid;
 use crate::simd::{dispatch, max_f32};
-use crate::stages::robust_bounds::bulk_along;
 
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;

@@ -3,10 +3,10 @@
 use super::block_bounds::BlockBounds;
 use super::triangle_block::{AffineForm, Coordinate, LANES, LaneArray, TriangleBlock, pack_block};
 use crate::domain::Rigid3;
+use crate::mesh::robust_bounds::{Bounds, BulkRange, bulk_box};
 use crate::mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 use crate::simd::dispatch;
-use crate::stages::robust_bounds::{Bounds, BulkRange, bulk_box};
 
 /// Largest number of blocks that are sampled to decide the winding. Tens of thousands of triangles are enough.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;
