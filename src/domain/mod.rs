@@ -7,6 +7,7 @@ mod attention_check;
 mod block;
 mod box_iou;
 mod box_name;
+pub(crate) mod cancel;
 mod control_points;
 mod enum_names;
 mod failure;

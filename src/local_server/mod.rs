@@ -9,6 +9,7 @@ mod connection;
 mod connections;
 mod guard;
 mod page_frame;
+mod request_work;
 mod session;
 
 pub use access_control::{AccessControl, START};
@@ -17,3 +18,4 @@ pub use connection::ConnectionLimits;
 pub use connections::serve;
 pub use guard::guard;
 pub use page_frame::{document, forward_page, used_token_page};
+pub use request_work::run_for_request;

@@ -17,6 +17,7 @@ use crate::domain::{Affine2, Stage};
 use crate::export::pictures::PrintView;
 use crate::export::scan_view::ScanView;
 use crate::export::{InputFileLimits, SourcePrint};
+use crate::local_server::run_for_request;
 use crate::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::stages::normalize::PrintMasks;
@@ -265,8 +266,8 @@ impl ImageCache {
             return Err(ImageError::Incomplete);
         }
         let (project, item) = (self.project.clone(), Arc::clone(item));
-        tokio::task::spawn_blocking(move || {
-            // The task itself holds the permit, because it continues even if the client leaves.
+        run_for_request(move || {
+            // The work itself holds the permit, because it goes on for some milliseconds if the client leaves.
             let _permit = permit;
             read(&project, &pair, &item)
         })

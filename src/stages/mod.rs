@@ -3,6 +3,8 @@
 //! They use no files, no SQL, no async and no clock. Each stage has its own settings, errors and entry function.
 
 mod binarize;
+#[cfg(test)]
+mod cancel_tests;
 pub mod depth;
 mod face;
 pub mod fit;

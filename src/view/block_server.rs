@@ -16,6 +16,7 @@ use super::server::{ViewError, ViewServer, jpeg};
 use crate::domain::BlockName;
 use crate::export::block_view::{BlockView, PageLayer, PageRegion};
 use crate::export::scan_view::assets;
+use crate::local_server::run_for_request;
 
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";
@@ -156,7 +157,7 @@ async fn region(
 }
 
 async fn scan(State(shown): State<Arc<ShownBlock>>, Path(index): Path<usize>) -> Response {
-    let read = tokio::task::spawn_blocking(move || shown.view.scan(index));
+    let read = run_for_request(move || shown.view.scan(index));
     let failed = |why: String| (StatusCode::INTERNAL_SERVER_ERROR, why).into_response();
     match read.await {
         Ok(Ok(Some(bytes))) => {

@@ -16,7 +16,7 @@ use super::page;
 use super::server::jpeg;
 use crate::domain::{BlockName, BlockSide, ControlPoints};
 use crate::export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
-use crate::local_server::AccessControl;
+use crate::local_server::{AccessControl, run_for_request};
 
 /// Reads a block for its correction, and stores the control points.
 pub trait CorrectionStore: Send + Sync + 'static {
@@ -175,7 +175,7 @@ async fn try_points<S: CorrectionStore>(
         Err(failed) => return failed,
     };
     let tried = move || shown.try_points(body.side, &body.points);
-    match tokio::task::spawn_blocking(tried).await {
+    match run_for_request(tried).await {
         Ok(Ok(tried)) => {
             let agreement = tried.agreement;
             let id = state.set_tried(Some(tried));

@@ -13,7 +13,9 @@ use tokio::net::TcpListener;
 
 use super::page;
 use crate::export::scan_view::{ScanView, assets};
-use crate::local_server::{AccessControl, ConnectionLimits, START, guard, listen, serve};
+use crate::local_server::{
+    AccessControl, ConnectionLimits, START, guard, listen, run_for_request, serve,
+};
 
 /// The script of the page.
 const SCRIPT: &str = include_str!("../../assets/scan-viewer/view.js");
@@ -131,7 +133,7 @@ async fn scan(State(shown): State<Arc<ShownScan>>) -> Response {
 
 /// Draws an image on a thread for long work and responds with it, or that there is none.
 pub(super) async fn jpeg(draw: impl FnOnce() -> Option<Bytes> + Send + 'static) -> Response {
-    match tokio::task::spawn_blocking(draw).await {
+    match run_for_request(draw).await {
         Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg")], jpeg).into_response(),
         Ok(None) => StatusCode::NOT_FOUND.into_response(),
         Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, error.to_string()).into_response(),
