@@ -143,7 +143,7 @@
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
-//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped. After the last stage, `Checkpointer::finish` notices (a task in `storing` of `scheduler.rs`). Before that, `pair_task.rs` notices as soon as a stage finishes after the refusal (`store` returns `false`), a stage fails or times out (`fail`), or the run stops. `compute_thread.rs` ends after the stage that it has begun by then; its slot is free before that, so one more thread may compute meanwhile, even for the same pair |
+//! | checkpoint | `CheckpointOutcome::LeaseLost` | `checkpointer.rs`, `store_stages` | this and all later results are dropped. After the last stage, `Checkpointer::finish` notices (a task in `storing` of `scheduler.rs`). Before that, `pair_task.rs` notices as soon as a stage finishes after the refusal (`store` returns `false`), a stage fails or times out (`fail`), or the run stops. the stage that `compute_thread.rs` has begun by then is cancelled, and its memory is free before the slot is |
 //! | failure | `false` | `pair_task.rs`, `store_failure` | the failure is not stored; after a refused checkpoint it is not even sent |
 //! | heartbeat | `false` | `worker_session.rs`, `heartbeat`, for `scheduler.rs` | the process warns, releases the pairs that it has not started, ends its old id, registers as a new worker, and recovers the jobs of the old id; its running pairs end at their next write |
 //! | claim | no leases | not distinguished from "no pair is ready" | tried again at every poll, until the next heartbeat |
@@ -166,6 +166,15 @@
 //! fail, and its lease stays until it is recovered. An error of any other catalog call of the main loop ends the run
 //! immediately, such as of a claim, of the release of pairs that have not started, of the search for ready pairs, of a
 //! recovery, or of registering again.
+//!
+//! ## Cancellation
+//!
+//! A stage that takes too long, is stopped or has lost its lease is cancelled: inner loops poll the token of their thread
+//! (`domain/cancel.rs`) and unwind to the function that started the computation. `runner/compute_thread.rs` and
+//! `runner/block_task.rs` then wait for the end of the thread before its memory is given to others, and
+//! `local_server/request_work.rs` cancels the work of requests that nobody waits for. Code that hands work to other
+//! threads, such as those of `rayon`, takes the token along as a `ThreadToken`. A loop over vertices, triangles, pixels or
+//! rows of a file must poll, at best through `polled`.
 //!
 //! ## Why `fit` reads the print
 //!

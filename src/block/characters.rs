@@ -11,6 +11,7 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::window_images::{ShrunkRelief, WarpedInk, Window};
 use super::windows::{WindowMatch, match_window};
+use crate::domain::cancel::ThreadToken;
 
 /// Margin around a character's box whose relief and ink are compared, mm.
 const MARGIN_MM: f64 = 0.8;
@@ -125,12 +126,14 @@ fn matches(
 ) -> Vec<Option<WindowMatch>> {
     let reach = (REACH_MM / relief.pixel_mm).ceil() as usize;
     let warped = WarpedInk::of(relief, page, map, WarpedInk::border_for(reach));
+    let token = ThreadToken::current();
+    let match_box = |label: &CharacterBox| {
+        let window = relief.window(face_box(map, label.page_box), MARGIN_MM)?;
+        match_window(relief, &warped, window, reach)
+    };
     boxes
         .par_iter()
-        .map(|label| {
-            let window = relief.window(face_box(map, label.page_box), MARGIN_MM)?;
-            match_window(relief, &warped, window, reach)
-        })
+        .map(|label| token.scope(|| match_box(label)))
         .collect()
 }
 

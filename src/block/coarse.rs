@@ -9,6 +9,7 @@ use super::page_ink::PageInk;
 use super::square_fft::{SIZE, SquareFft, quarter_turned};
 use super::window_images::ShrunkRelief;
 use crate::domain::Affine2;
+use crate::domain::cancel::{ThreadToken, poll};
 use crate::raster::Grid;
 use crate::raster::blur::gaussian_blur;
 
@@ -53,31 +54,33 @@ pub(super) fn search(
     let fft = SquareFft::new();
     // All scales use the same pixel size, so the spectra of the face are computed once.
     let pixel_mm = pixel_size(face, page, range);
+    let token = ThreadToken::current();
     let spectra: Vec<FaceSpectra> = range
         .angles
         .par_iter()
-        .map(|angle| template.spectra(*angle, pixel_mm, &fft))
+        .map(|angle| token.scope(|| template.spectra(*angle, pixel_mm, &fft)))
         .collect();
+    let at_scale = |scale_at: usize, scale: &f64| {
+        let target = PageTarget::of(page, *scale, pixel_mm, &fft);
+        let mut found = Vec::with_capacity(4 * range.angles.len());
+        for (angle_at, (angle, spectra)) in range.angles.iter().zip(&spectra).enumerate() {
+            for turns in 0..4 {
+                poll();
+                let (score, shift) = target.best(spectra, turns, range.min_overlap, &fft);
+                let rotation = angle + turns as f64 * FRAC_PI_2;
+                let page_from_face = template.affine(rotation, shift, *scale, pixel_mm, &target);
+                let position = CoarsePosition {
+                    page_from_face,
+                    score,
+                };
+                found.push((position, [scale_at, angle_at, turns]));
+            }
+        }
+        found
+    };
     let results: Vec<Vec<(CoarsePosition, [usize; 3])>> = (range.scales.par_iter())
         .enumerate()
-        .map(|(scale_at, scale)| {
-            let target = PageTarget::of(page, *scale, pixel_mm, &fft);
-            let mut found = Vec::with_capacity(4 * range.angles.len());
-            for (angle_at, (angle, spectra)) in range.angles.iter().zip(&spectra).enumerate() {
-                for turns in 0..4 {
-                    let (score, shift) = target.best(spectra, turns, range.min_overlap, &fft);
-                    let rotation = angle + turns as f64 * FRAC_PI_2;
-                    let page_from_face =
-                        template.affine(rotation, shift, *scale, pixel_mm, &target);
-                    let position = CoarsePosition {
-                        page_from_face,
-                        score,
-                    };
-                    found.push((position, [scale_at, angle_at, turns]));
-                }
-            }
-            found
-        })
+        .map(|(scale_at, scale)| token.scope(|| at_scale(scale_at, scale)))
         .collect();
     let mut found: Vec<_> = results.into_iter().flatten().collect();
     found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));

@@ -8,6 +8,7 @@ use super::align::CarvedFace;
 use super::bounds::bounds;
 use super::characters::PlacedCharacter;
 use super::relief::surface_height;
+use crate::domain::cancel::{ThreadToken, poll, polled};
 use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
 
 /// Margin around a character's box, mm: ground for the plane and the threshold, but few strokes of neighbours.
@@ -17,6 +18,8 @@ const BELOW_MM: f64 = 6.0;
 const ABOVE_MM: f64 = 2.0;
 /// Cells of the grid that finds the characters of a point, mm.
 const CELL_MM: f64 = 0.5;
+/// Largest number of cells, and of characters in all cells together.
+const MAX_ENTRIES: f64 = 1.6e7;
 /// Triangles in memory before they are written to the spill file.
 const MAX_BUFFERED: usize = 1 << 19;
 /// Triangles that one task assigns.
@@ -44,6 +47,7 @@ pub struct CutPlan<'a> {
     side: &'a CarvedFace,
     boxes: Vec<[f64; 4]>,
     origin_mm: [f64; 2],
+    cell_mm: f64,
     columns: usize,
     /// First entry of each cell in `members`, and the end of the last one.
     starts: Vec<u32>,
@@ -65,7 +69,8 @@ impl<'a> CutPlan<'a> {
         let [left, top, right, bottom] =
             bounds((boxes.iter()).flat_map(|[u0, v0, u1, v1]| [[*u0, *v0], [*u1, *v1]]));
         let origin_mm = [left, top];
-        let cell = |k: usize, at: f64| ((at - origin_mm[k]) / CELL_MM) as usize;
+        let cell_mm = cell_size([right - left, bottom - top], &boxes);
+        let cell = |k: usize, at: f64| ((at - origin_mm[k]) / cell_mm) as usize;
         let columns = cell(0, right) + 1;
         let rows = cell(1, bottom) + 1;
         let cells_of = |[u0, v0, u1, v1]: [f64; 4]| {
@@ -91,6 +96,7 @@ impl<'a> CutPlan<'a> {
             side,
             boxes,
             origin_mm,
+            cell_mm,
             columns,
             starts,
             members,
@@ -103,8 +109,8 @@ impl<'a> CutPlan<'a> {
         let third = |k: usize| (triangle[0][k] + triangle[1][k] + triangle[2][k]) / 3.0;
         let map = &self.side.map;
         let [u, v, n] = map.frame.face_from_mesh([third(0), third(1), third(2)]);
-        let x = (u - self.origin_mm[0]) / CELL_MM;
-        let y = (v - self.origin_mm[1]) / CELL_MM;
+        let x = (u - self.origin_mm[0]) / self.cell_mm;
+        let y = (v - self.origin_mm[1]) / self.cell_mm;
         if !(x >= 0.0 && y >= 0.0 && x < self.columns as f64) {
             return;
         }
@@ -130,6 +136,22 @@ impl<'a> CutPlan<'a> {
             }
         }
     }
+}
+
+/// Returns the side of the cells, mm: larger than [`CELL_MM`] if boxes overlap so often or lie so far apart that the grid
+/// would be large.
+fn cell_size(size_mm: [f64; 2], boxes: &[[f64; 4]]) -> f64 {
+    let entries = |cell_mm: f64| {
+        let cells = |width: f64, height: f64| (width / cell_mm + 2.0) * (height / cell_mm + 2.0);
+        let members = boxes.iter().map(|[u0, v0, u1, v1]| cells(u1 - u0, v1 - v0));
+        cells(size_mm[0], size_mm[1]) + members.sum::<f64>()
+    };
+    let mut cell_mm = CELL_MM;
+    // With infinite cells, each box has a constant number of entries.
+    while entries(cell_mm) > MAX_ENTRIES && cell_mm.is_finite() {
+        cell_mm *= 2.0;
+    }
+    cell_mm
 }
 
 /// Triangles of characters, some of them in a temporary file.
@@ -160,6 +182,7 @@ impl<F: Read + Write + Seek> Spill<'_, F> {
             if triangles.is_empty() {
                 continue;
             }
+            poll();
             bytes.clear();
             bytes.extend(
                 triangles
@@ -185,7 +208,7 @@ impl<F: Read + Write + Seek> Spill<'_, F> {
             let mut bytes = vec![0; count * RECORD];
             self.file.seek(SeekFrom::Start(at))?;
             self.file.read_exact(&mut bytes)?;
-            for record in bytes.as_chunks::<RECORD>().0 {
+            for record in polled(bytes.as_chunks::<RECORD>().0) {
                 let (floats, _) = record.as_chunks::<8>();
                 let float = |k: usize| f64::from_le_bytes(floats[k]);
                 triangles.push([0, 3, 6].map(|k| [float(k), float(k + 1), float(k + 2)]));
@@ -216,19 +239,21 @@ pub fn cut_meshes(
         parts: vec![Vec::new(); count],
         end: 0,
     };
+    let token = ThreadToken::current();
+    let assign = |part: &[Triangle]| {
+        let mut assigned = Vec::new();
+        for triangle in part {
+            plan.characters(triangle, |number| assigned.push((number, *triangle)));
+        }
+        assigned
+    };
     let mut failed = None;
     let passed = mesh.pass(&mut |triangles| {
         let assigned: Vec<Vec<(u32, Triangle)>> = triangles
             .par_chunks(TASK)
-            .map(|part| {
-                let mut assigned = Vec::new();
-                for triangle in part {
-                    plan.characters(triangle, |number| assigned.push((number, *triangle)));
-                }
-                assigned
-            })
+            .map(|part| token.scope(|| assign(part)))
             .collect();
-        for (number, triangle) in assigned.into_iter().flatten() {
+        for (number, triangle) in polled(assigned.into_iter().flatten()) {
             if let Err(error) = spill.push(number, triangle) {
                 let kind = error.kind();
                 failed = Some(error);
@@ -273,7 +298,7 @@ mod tests {
     use std::io::Cursor;
 
     use super::super::test_world::TestWorld;
-    use super::{CUT_MARGIN_MM, CutPlan, cut_meshes};
+    use super::{CELL_MM, CUT_MARGIN_MM, CutPlan, cell_size, cut_meshes};
     use crate::block::{CharacterBox, PlacedCharacter};
     use crate::mesh::Mesh;
 
@@ -289,6 +314,27 @@ mod tests {
             shift_mm: [0.0; 2],
             support: 1.0,
             confidence: 1.0,
+        }
+    }
+
+    #[test]
+    fn the_grid_stays_small_for_boxes_far_apart_or_over_each_other() {
+        let apart = [[0.0; 4], [1e12, -1e9, 1e12, 1e9]];
+        let over = vec![[0.0, 0.0, 345.0, 230.0]; 50_000];
+        let usual: Vec<[f64; 4]> = (0..500)
+            .map(|k| [f64::from(k % 25) * 13.0, f64::from(k / 25) * 10.0])
+            .map(|[u, v]| [u, v, u + 12.0, v + 9.0])
+            .collect();
+        assert_eq!(cell_size([345.0, 230.0], &usual), CELL_MM);
+        for (boxes, size) in [(&apart[..], [1e12, 2e9]), (&over[..], [345.0, 230.0])] {
+            let cell_mm = cell_size(size, boxes);
+            let entries = boxes
+                .iter()
+                .map(|[u0, v0, u1, v1]| ((u1 - u0) / cell_mm + 2.0) * ((v1 - v0) / cell_mm + 2.0));
+            assert!(
+                cell_mm.is_finite() && entries.sum::<f64>() < 2e7,
+                "{cell_mm}"
+            );
         }
     }
 

@@ -17,6 +17,34 @@ pub enum BlockError {
         /// Triangles in the file.
         triangles: u64,
     },
+    /// The height map of the block would be too large.
+    #[error(
+        "the scan is {:.2} x {:.2} m large if a unit of it is {mm} mm, more than the {:.2} square metres of which height \
+         maps are computed{}; check the unit, or remove what does not belong to the block",
+        .size_mm[0] / 1e3, .size_mm[1] / 1e3, .limit_mm2 / 1e6,
+        if *is_of_memory { " with this --memory" } else { "" }
+    )]
+    TooLarge {
+        /// Width and height, mm.
+        size_mm: [f64; 2],
+        /// Millimetres per unit of the mesh.
+        mm: f64,
+        /// Largest area, square millimetres.
+        limit_mm2: f64,
+        /// Whether the limit follows from the memory that the run may use.
+        is_of_memory: bool,
+    },
+    /// Large triangles overlap too often to be drawn.
+    #[error(
+        "its {triangles} triangles overlap more than {limit} times, or most are slivers across the scan; remove repeated \
+         faces or remesh the scan"
+    )]
+    Overlap {
+        /// Triangles in the file.
+        triangles: u64,
+        /// How often triangles may overlap.
+        limit: u64,
+    },
     /// No side looks like a carved face.
     #[error("the scan shows no carved face: {found}; is this the scan of a whole block?")]
     NoFace {

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
+use crate::domain::cancel::poll;
 use crate::raster::components::ConnectedComponents;
 use crate::raster::{Grid, Mask};
 
@@ -10,6 +11,8 @@ use crate::raster::{Grid, Mask};
 pub(super) const FACE_CELL: usize = 4;
 /// Height of the layers in which heights are counted, mm.
 const LAYER_MM: f64 = 1.0;
+/// A scan with more layers shows no block.
+const MAX_LAYERS: usize = 1 << 16;
 /// Layers with more than this share of the heights may be the face.
 const MIN_LAYER_SHARE: f64 = 0.04;
 /// Heights that belong to the face, relative to the middle of its layer, mm: carved ground, bow and twist.
@@ -69,6 +72,9 @@ fn layers(map: &HeightMap) -> Vec<f32> {
         return Vec::new();
     }
     let layer = |height: f32| (f64::from(height - low) / LAYER_MM) as usize;
+    if layer(high) >= MAX_LAYERS {
+        return Vec::new();
+    }
     let mut counts = vec![0_usize; layer(high) + 1];
     for height in heights() {
         counts[layer(*height)] += 1;
@@ -114,6 +120,7 @@ fn spread(cells: &Grid<bool>, reach: usize, outside: bool) -> Grid<bool> {
     let along_rows = |cells: &Grid<bool>| {
         let mut result = Grid::new(cells.width(), cells.height(), false);
         for y in 0..cells.height() {
+            poll();
             let row = cells.row(y);
             // Distance to the last set cell on the left, then on the right.
             let start = if outside { 0 } else { reach };
@@ -157,7 +164,10 @@ pub(super) fn face_angle(face: &Mask) -> f64 {
     };
     let angle = |step: usize| (step as f64 / ANGLE_STEPS as f64 - 0.5) * FRAC_PI_2;
     (0..ANGLE_STEPS)
-        .map(|step| (angle(step), area(angle(step))))
+        .map(|step| {
+            poll();
+            (angle(step), area(angle(step)))
+        })
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0.0, |(angle, _)| angle)
 }
@@ -241,6 +251,13 @@ mod tests {
         let found = area(&cracked);
         let crack = 20 * 400 / (FACE_CELL * FACE_CELL);
         assert!(found.abs_diff(FACE - crack) < FACE / 50, "{found} {FACE}");
+    }
+
+    #[test]
+    fn heights_as_far_apart_as_no_block_have_no_face() {
+        for far in [1e6, 1e30, f32::MAX] {
+            assert!(find_face(&map(0.0, |_, _| far)).is_none());
+        }
     }
 
     #[test]

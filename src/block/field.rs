@@ -4,6 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::windows::WindowMatch;
+use crate::domain::cancel::ThreadToken;
 
 /// Windows below this correlation are left out.
 pub(super) const MIN_NCC: f64 = 0.35;
@@ -99,7 +100,9 @@ impl ShiftField {
 
     /// Returns the shifts at many points, mm.
     pub(super) fn at_all(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        points.par_iter().map(|point| self.at(*point)).collect()
+        let token = ThreadToken::current();
+        let shift = |point: &[f64; 2]| token.scope(|| self.at(*point));
+        points.par_iter().map(shift).collect()
     }
 
     /// Returns the shift at a point, mm.

@@ -1,15 +1,29 @@
 //! Height maps of both sides of a block, from one pass over its triangles.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+use super::error::BlockError;
 use super::orientation::Orientation;
-use crate::mesh::{MeshReadError, Triangle, TriangleStream};
+use super::scan_sums::ScanPart;
+use crate::domain::cancel::{ThreadToken, poll};
+use crate::mesh::{Triangle, TriangleStream};
 use crate::raster::Grid;
 
 /// Spacing of height maps, mm. Strokes are about 1 mm wide; scans have points every 0.1 to 0.3 mm.
 pub const HEIGHT_STEP_MM: f64 = 0.15;
+/// Largest height map, in pixels: 0.75 square metres. Drawing both sides takes 8 bytes a pixel, and their faces later less
+/// than twice as much.
+pub const MAX_MAP_PIXELS: usize = 1 << 25;
+/// Wide triangles may be tested at this many pixels for each pixel of a map, for each triangle, and in any case.
+const TESTS_PER_PIXEL: u64 = 64;
+const TESTS_PER_TRIANGLE: u64 = 8;
+const FREE_TESTS: u64 = 1 << 26;
+/// If a triangle spans more columns than this, its rows are clipped before their pixels are tested.
+const MAX_UNCLIPPED_COLUMNS: f32 = 32.0;
+/// Columns that are tested beyond the edges of a clipped triangle.
+const COLUMN_MARGIN: f32 = 3.0;
 /// Triangles that one task draws.
 const TASK: usize = 8192;
 /// The height of a pixel that no triangle covers.
@@ -92,9 +106,10 @@ struct BothSides {
 }
 
 impl BothSides {
-    /// Draws a triangle with corners in pixels and mm: on the front its heights, on the back their negatives.
+    /// Draws a triangle with corners in pixels and mm: on the front its heights, on the back their negatives. Returns the
+    /// number of pixels that were tested, or 0 for a small triangle.
     #[inline]
-    fn draw(&self, [a, b, c]: [[f32; 3]; 3]) {
+    fn draw(&self, [a, b, c]: [[f32; 3]; 3]) -> u64 {
         let low = |k: usize| a[k].min(b[k]).min(c[k]).ceil().max(0.0);
         let high = |k: usize| a[k].max(b[k]).max(c[k]).floor();
         let (left, top) = (low(0), low(1));
@@ -102,20 +117,27 @@ impl BothSides {
         let bottom = high(1).min(self.front.height as f32 - 1.0);
         // Most triangles of a fine scan contain no pixel centre.
         if left > right || top > bottom {
-            return;
+            return 0;
         }
         let [ab, ac] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
         let area = ab[0] * ac[1] - ab[1] * ac[0];
         if area == 0.0 {
-            return;
+            return 0;
         }
         let (ux, uy) = (ac[1] / area, -ac[0] / area);
         let (vx, vy) = (-ab[1] / area, ab[0] / area);
         // Pixels on an edge belong to both triangles; a rounding error must leave no gap.
         let inside = -1e-4_f32;
+        let is_wide = right - left > MAX_UNCLIPPED_COLUMNS;
+        let mut tests = 0;
         let mut y = top;
         while y <= bottom {
-            let mut x = left;
+            let [mut x, mut right] = [left, right];
+            if is_wide {
+                poll();
+                [x, right] = clipped_columns([a, b, c], y, [left, right]);
+                tests += (right - x + 1.0).max(0.0) as u64;
+            }
             while x <= right {
                 let (dx, dy) = (x - a[0], y - a[1]);
                 let (s, t) = (ux * dx + uy * dy, vx * dx + vy * dy);
@@ -129,21 +151,68 @@ impl BothSides {
             }
             y += 1.0;
         }
+        tests
     }
 }
 
-/// Draws the height maps of the front (along n) and of the back of a block.
+/// Returns the first and the last column to test in a row of a wide triangle, between `left` and `right`. Because pixels
+/// up to a rounding error outside the triangle count, the columns between the rows above and below are tested.
+fn clipped_columns(corners: [[f32; 3]; 3], y: f32, [left, right]: [f32; 2]) -> [f32; 2] {
+    let [a, b, c] = corners;
+    let (mut first, mut last) = (f32::INFINITY, f32::NEG_INFINITY);
+    let mut reach = |x: f32| (first, last) = (first.min(x), last.max(x));
+    for (p, q) in [(a, b), (b, c), (c, a)] {
+        let [low, high] = [p[1].min(q[1]), p[1].max(q[1])];
+        let [from, to] = [low.max(y - 1.0), high.min(y + 1.0)];
+        if from > to {
+            continue;
+        }
+        if low == high {
+            reach(p[0]);
+            reach(q[0]);
+            continue;
+        }
+        for at in [from, to] {
+            reach(p[0] + (at - p[1]) / (q[1] - p[1]) * (q[0] - p[0]));
+        }
+    }
+    [
+        (first - COLUMN_MARGIN).ceil().max(left),
+        (last + COLUMN_MARGIN).floor().min(right),
+    ]
+}
+
+/// Returns the pixels from the centre of the maps to their edges along u and v.
+fn map_cells(frame: &Orientation, max_pixels: usize) -> Result<[usize; 2], BlockError> {
+    let [half_u, half_v, _] = frame.half_extent_mm;
+    let cells = [half_u, half_v].map(|half| (half / HEIGHT_STEP_MM).ceil());
+    let max_pixels = max_pixels.min(MAX_MAP_PIXELS);
+    let pixels = cells.map(|cells| 2.0 * cells + 1.0);
+    if pixels[0] * pixels[1] <= max_pixels as f64 {
+        return Ok(cells.map(|cells| cells as usize));
+    }
+    Err(BlockError::TooLarge {
+        size_mm: [2.0 * half_u, 2.0 * half_v],
+        mm: frame.mm,
+        limit_mm2: max_pixels as f64 * HEIGHT_STEP_MM * HEIGHT_STEP_MM,
+        is_of_memory: max_pixels < MAX_MAP_PIXELS,
+    })
+}
+
+/// Draws the height maps of the front (along n) and of the back of a part of a scan. `max_pixels` limits their size.
 ///
 /// # Errors
-/// Returns an error if the mesh cannot be read.
+/// Returns an error if the mesh cannot be read, the maps would be too large, or large triangles overlap too often.
 pub fn draw_height_maps(
     mesh: &mut dyn TriangleStream,
-    frame: &Orientation,
-) -> Result<[HeightMap; 2], MeshReadError> {
-    let [half_u, half_v, _] = frame.half_extent_mm;
-    let cells = |half: f64| (half / HEIGHT_STEP_MM).ceil() as usize;
-    let (cells_u, cells_v) = (cells(half_u), cells(half_v));
+    (frame, scan): (&Orientation, &ScanPart),
+    max_pixels: usize,
+) -> Result<[HeightMap; 2], BlockError> {
+    let [cells_u, cells_v] = map_cells(frame, max_pixels)?;
     let (width, height) = (2 * cells_u + 1, 2 * cells_v + 1);
+    let pixels = (width * height) as u64;
+    let allowed = pixels * TESTS_PER_PIXEL + frame.triangles * TESTS_PER_TRIANGLE + FREE_TESTS;
+    let tests = AtomicU64::new(0);
     let sides = BothSides {
         front: SharedHeights::new(width, height),
         back: SharedHeights::new(width, height),
@@ -156,14 +225,27 @@ pub fn draw_height_maps(
             [x as f32, y as f32, n as f32]
         })
     };
-    mesh.pass(&mut |triangles| {
-        triangles.par_chunks(TASK).for_each(|part| {
-            for triangle in part {
-                sides.draw(to_pixels(triangle));
+    let token = ThreadToken::current();
+    let draw = |part: &[Triangle]| {
+        for triangle in part.iter().filter(|triangle| scan.has(triangle)) {
+            let tested = sides.draw(to_pixels(triangle));
+            if tested > 0 && tests.fetch_add(tested, Ordering::Relaxed) > allowed {
+                return;
             }
-        });
+        }
+    };
+    mesh.pass(&mut |triangles| {
+        triangles
+            .par_chunks(TASK)
+            .for_each(|part| token.scope(|| draw(part)));
         Ok(())
     })?;
+    if tests.into_inner() > allowed {
+        return Err(BlockError::Overlap {
+            triangles: frame.triangles,
+            limit: TESTS_PER_PIXEL,
+        });
+    }
     let origin_mm = [cells_u, cells_v].map(|cells| -(cells as f64) * HEIGHT_STEP_MM);
     let front = HeightMap {
         frame: *frame,
@@ -194,8 +276,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::super::test_world::frame;
-    use super::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT, draw_height_maps};
-    use crate::block::Orientation;
+    use super::{HEIGHT_STEP_MM, HeightMap, MAX_MAP_PIXELS, NO_HEIGHT, draw_height_maps};
+    use crate::block::{BlockError, Orientation, ScanPart};
     use crate::mesh::{Mesh, Triangle};
 
     /// Triangles of any size and direction within 24 x 16 x 6 mm.
@@ -222,7 +304,8 @@ mod tests {
                 .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
                 .collect(),
         };
-        draw_height_maps(&mut &mesh, &frame).unwrap()
+        let scan = (&frame, &ScanPart::whole());
+        draw_height_maps(&mut &mesh, scan, MAX_MAP_PIXELS).unwrap()
     }
 
     /// Returns the height of a triangle at a point, and how far inside the point is.
@@ -270,6 +353,44 @@ mod tests {
             }
         }
         assert!(covered > 5_000);
+    }
+
+    fn refused(triangles: &[Triangle], half_extent_mm: [f64; 3], max_pixels: usize) -> BlockError {
+        let frame = Orientation {
+            half_extent_mm,
+            ..frame()
+        };
+        let mesh = Mesh {
+            vertices: triangles.iter().flatten().copied().collect(),
+            triangles: (0..triangles.len() as u32)
+                .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
+                .collect(),
+        };
+        let scan = (&frame, &ScanPart::whole());
+        draw_height_maps(&mut &mesh, scan, max_pixels).expect_err("a refusal")
+    }
+
+    #[test]
+    fn maps_beyond_a_limit_are_refused_before_they_take_memory() {
+        for half in [1_000.0, 1e6, 1e30, f64::INFINITY, f64::NAN] {
+            let error = refused(&triangles(1), [half, 2e3, 5.0], usize::MAX).to_string();
+            assert!(
+                error.contains("square metres") && !error.contains("--memory"),
+                "{error}"
+            );
+        }
+        let error = refused(&triangles(1), [12.0, 8.0, 5.0], 10_000).to_string();
+        assert!(error.contains("with this --memory"), "{error}");
+    }
+
+    #[test]
+    fn a_face_that_is_repeated_thousands_of_times_is_refused() {
+        let face = [[-11.0, -7.0, 0.0], [11.0, -7.0, 0.0], [0.0, 7.0, 1.0]];
+        let error = refused(&vec![face; 20_000], [12.0, 8.0, 5.0], MAX_MAP_PIXELS);
+        assert!(
+            matches!(error, BlockError::Overlap { triangles: 0, .. }),
+            "{error}"
+        );
     }
 
     #[test]

@@ -1,29 +1,25 @@
-//! The direction of the face of a block, from one pass over its triangles.
+//! The direction of the face of a block, from one or two passes over its triangles.
 //!
 //! Tops and carved ground of a face lie in a layer a few millimetres thick and look along its normal. The flanks of the
 //! strokes can have a larger area, but they are spread over the whole block. So the normal is the direction along which
 //! one thin layer contains the largest area that looks along it.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
+use super::scan_sums::{BlockSums, SampledTriangle, ScanPart};
 use crate::domain::LengthUnit;
-use crate::mesh::{MeshReadError, Triangle, TriangleStream};
+use crate::domain::cancel::poll;
+use crate::mesh::TriangleStream;
+use crate::mesh::robust_bounds::{bulk_box, is_in_box};
 
-/// Triangles that one task sums. Sums are added in a fixed order, so they do not depend on the number of threads.
-const TASK: usize = 4096;
 /// Typical long side of a block, mm. The unit is the one that brings the long side nearest to it.
 const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
 /// Ratio of the side of a uniform rectangle to its standard deviation along that side: sqrt(12).
 const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 /// Half extent of the frame, in standard deviations of the area. A uniform rectangle ends at 1.73.
 const REACH: f64 = 3.0;
-/// Every 32nd triangle is kept for the direction of the face and for the extent of the block, unless the mesh has
-/// only a few.
-const SAMPLE_STEP: usize = 32;
-const FEW_TRIANGLES: usize = 1 << 16;
 /// Margin of the extent, mm.
 const EXTENT_MARGIN_MM: f64 = 3.0;
 /// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
@@ -51,106 +47,45 @@ pub struct Orientation {
     pub triangles: u64,
 }
 
-/// Sums over the area of triangles.
-#[derive(Debug, Clone, Copy)]
-struct AreaSums {
-    /// Twice the area.
-    area: f64,
-    first: Vector3<f64>,
-    second: Matrix3<f64>,
-    normals: Matrix3<f64>,
-}
-
-/// A triangle of the sample: its first corner relative to the origin, and its normal times twice its area.
-type SampledTriangle = [Vector3<f32>; 2];
-
-impl AreaSums {
-    const fn empty() -> Self {
-        Self {
-            area: 0.0,
-            first: Vector3::new(0.0, 0.0, 0.0),
-            second: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            normals: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        }
-    }
-
-    /// Sums triangles, relative to `origin`.
-    fn of(triangles: &[Triangle], origin: Vector3<f64>) -> Self {
-        let mut sums = Self::empty();
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
-            let normal = (b - a).cross(&(c - a));
-            let area = normal.norm();
-            if area <= 0.0 {
-                continue;
-            }
-            let middle = (a + b + c) / 3.0;
-            sums.area += area;
-            sums.first += middle * area;
-            // Exact for a triangle of any size.
-            let corners = a * a.transpose() + b * b.transpose() + c * c.transpose();
-            sums.second += (corners + middle * middle.transpose() * 9.0) * (area / 12.0);
-            sums.normals += normal * normal.transpose() / area;
-        }
-        sums
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.area += other.area;
-        self.first += other.first;
-        self.second += other.second;
-        self.normals += other.normals;
-    }
-}
-
 impl Orientation {
-    /// Finds the frame of a block in one pass over its triangles. If `unit` is `None`, the unit is the one of mm, cm,
-    /// inch and m that brings the long side nearest to 320 mm.
+    /// Finds the frame of a block, and the part of the scan without specks. Passes over the triangles once, or twice if
+    /// there are specks. If `unit` is `None`, the unit is the one of mm, cm, inch and m that brings the long side nearest
+    /// to 320 mm.
     ///
     /// # Errors
-    /// Returns an error if the mesh cannot be read or has no area.
+    /// Returns an error if the mesh cannot be read, has no area or is too large to compute with.
     pub fn find(
         mesh: &mut dyn TriangleStream,
         unit: Option<LengthUnit>,
-    ) -> Result<Self, BlockError> {
-        let mut sums = AreaSums::empty();
-        let mut count = 0;
-        let mut origin = None;
-        let mut sample: Vec<SampledTriangle> = Vec::new();
-        mesh.pass(&mut |triangles| {
-            // Positions relative to the first corner keep their precision far from the origin.
-            let origin = *origin.get_or_insert_with(|| Vector3::from(triangles[0][0]));
-            let parts: Vec<AreaSums> = triangles
-                .par_chunks(TASK)
-                .map(|part| AreaSums::of(part, origin))
-                .collect();
-            for part in &parts {
-                sums.add(part);
-            }
-            let is_small = count == 0 && triangles.len() < FEW_TRIANGLES;
-            let step = if is_small { 1 } else { SAMPLE_STEP };
-            sample.extend(triangles.iter().step_by(step).map(|triangle| {
-                let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
-                [a.cast::<f32>(), (b - a).cross(&(c - a)).cast::<f32>()]
-            }));
-            count += triangles.len() as u64;
-            Ok::<(), MeshReadError>(())
-        })?;
-        let Some(origin) = origin.filter(|_| sums.area > 0.0) else {
-            return Err(BlockError::NoArea { triangles: count });
-        };
-        Ok(Self::of_sums(&sums, &sample, origin, unit, count))
+    ) -> Result<(Self, ScanPart), BlockError> {
+        let mut part = ScanPart::whole();
+        let mut sums = BlockSums::over(mesh, &part)?;
+        let triangles = sums.triangles;
+        let bulk = bulk_box(&sums.corners);
+        if sums
+            .area
+            .bounds
+            .iter()
+            .any(|corner| !is_in_box(&bulk, corner))
+        {
+            part = ScanPart(Some(bulk));
+            sums = BlockSums::over(mesh, &part)?;
+        }
+        let found = Self::of_sums(&sums, unit).ok_or(BlockError::NoArea { triangles })?;
+        Ok((Self { triangles, ..found }, part))
     }
 
-    fn of_sums(
-        sums: &AreaSums,
-        sample: &[SampledTriangle],
-        origin: Vector3<f64>,
-        unit: Option<LengthUnit>,
-        triangles: u64,
-    ) -> Self {
+    /// Returns the frame, or `None` without any area that can be computed with.
+    fn of_sums(sums: &BlockSums, unit: Option<LengthUnit>) -> Option<Self> {
+        let (triangles, sample, origin) = (sums.triangles, &sums.sample, sums.origin?);
+        let sums = &sums.area;
         let mean = sums.first / sums.area;
         let covariance = sums.second / sums.area - mean * mean.transpose();
+        // Other matrices have no eigenvalues.
+        let is_finite = |matrix: &Matrix3<f64>| matrix.iter().all(|value| value.is_finite());
+        if sums.area <= 0.0 || !is_finite(&covariance) || !is_finite(&sums.normals) {
+            return None;
+        }
         let spread = SymmetricEigen::new(covariance);
         let long_side = SIDE_BY_DEVIATION * spread.eigenvalues.max().max(0.0).sqrt();
         let normals = SymmetricEigen::new(sums.normals);
@@ -160,6 +95,7 @@ impl Orientation {
             .chain(spread.eigenvectors.column_iter());
         let n = candidates
             .map(|candidate| {
+                poll();
                 let n = refined(candidate.into_owned(), sample);
                 (n, layer_area(&n, sample, LAYER_SHARE * long_side))
             })
@@ -182,13 +118,13 @@ impl Orientation {
             let farthest = farthest + EXTENT_MARGIN_MM / mm;
             farthest.min(REACH * deviation(&axis).max(long_side / 20.0)) * mm
         });
-        Self {
+        Some(Self {
             mm,
             centre: (origin + mean).into(),
             axes: axes.map(Into::into),
             half_extent_mm,
             triangles,
-        }
+        })
     }
 
     /// Returns the coordinates u, v and n of a point of the mesh, mm.
@@ -278,7 +214,7 @@ fn with_fixed_sign(axis: Vector3<f64>) -> Vector3<f64> {
 mod tests {
     use nalgebra::{Rotation3, Vector3};
 
-    use super::Orientation;
+    use super::{Orientation, ScanPart};
     use crate::block::BlockError;
     use crate::domain::LengthUnit;
     use crate::mesh::{Mesh, Vertices};
@@ -318,7 +254,7 @@ mod tests {
     fn axes_and_unit_of_a_plate_are_found() {
         for unit in LengthUnit::ALL {
             let (mesh, rotation) = plate(unit.mm());
-            let found = Orientation::find(&mut &mesh, None).unwrap();
+            let (found, _) = Orientation::find(&mut &mesh, None).unwrap();
             assert_eq!(found.mm, unit.mm());
             let normal = Vector3::from(found.axes[2]).dot(&(rotation * Vector3::z()));
             let long = Vector3::from(found.axes[0]).dot(&(rotation * Vector3::x()));
@@ -332,8 +268,93 @@ mod tests {
     #[test]
     fn a_given_unit_is_used() {
         let (mesh, _) = plate(1.0);
-        let found = Orientation::find(&mut &mesh, Some(LengthUnit::Cm)).unwrap();
+        let (found, _) = Orientation::find(&mut &mesh, Some(LengthUnit::Cm)).unwrap();
         assert_eq!(found.mm, 10.0);
+    }
+
+    /// A carved face of 320 x 200 mm in triangles of 1.6 mm, and a part of its back.
+    fn scan() -> Mesh {
+        const SIZE: [u32; 2] = [201, 126];
+        let vertex = |k: u32| {
+            let [x, y] = [k % SIZE[0], k / SIZE[0]];
+            let height = if (x / 3 + y / 2) % 2 == 0 { 0.0 } else { -2.0 };
+            [1.6 * f64::from(x), 1.6 * f64::from(y), height]
+        };
+        let cells = (0..SIZE[0] * (SIZE[1] - 1)).filter(|k| k % SIZE[0] < SIZE[0] - 1);
+        Mesh {
+            vertices: (0..SIZE[0] * SIZE[1]).map(vertex).collect(),
+            triangles: cells
+                .flat_map(|k| {
+                    let below = k + SIZE[0];
+                    [[k, k + 1, below], [k + 1, below + 1, below]]
+                })
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn specks_far_away_change_neither_unit_nor_frame() {
+        let mut clean = scan();
+        // The same triangles as below, without those at the vertex that is moved.
+        let moved = 12_000;
+        let without: Vec<[u32; 3]> = clean
+            .triangles
+            .iter()
+            .map(|face| if face.contains(&moved) { [0; 3] } else { *face })
+            .collect();
+        clean.triangles = without.into();
+        let (usual, whole) = Orientation::find(&mut &clean, None).unwrap();
+        assert_eq!((usual.mm, whole), (1.0, ScanPart::whole()));
+        for far in [1e3, 1e6, 1e7, 1e30, 1e300] {
+            let mut vertex = scan();
+            vertex.vertices.set(moved as usize, [10.0, -far, far]);
+            let mut triangle = clean.clone();
+            let first = triangle.vertices.len() as u32;
+            triangle.vertices.extend([
+                [far, 0.0, 0.0],
+                [far, far / 3.0, 0.0],
+                [far, 0.0, far / 2.0],
+            ]);
+            triangle.triangles.push([first, first + 1, first + 2]);
+            for mesh in [vertex, triangle] {
+                let (found, part) = Orientation::find(&mut &mesh, None).unwrap();
+                assert!(!part.has(&[[10.0, -far, far]; 3]));
+                let counted = Orientation {
+                    triangles: usual.triangles,
+                    ..found
+                };
+                assert_eq!(counted, usual, "{far}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scan_that_begins_with_a_speck_keeps_its_frame() {
+        let clean = scan();
+        let mut vertices: Vec<[f64; 3]> = vec![[1e9; 3], [1e9, 0.0, 0.0], [0.0, 1e9, 0.0]];
+        vertices.extend(clean.vertices.iter());
+        let faces = clean.triangles.iter().map(|face| face.map(|k| k + 3));
+        let speck = Mesh {
+            triangles: std::iter::once([0, 1, 2]).chain(faces).collect(),
+            vertices: vertices.into(),
+        };
+        let [(usual, _), (found, _)] =
+            [clean, speck].map(|mesh| Orientation::find(&mut &mesh, None).unwrap());
+        assert_eq!(found.mm, usual.mm);
+        for k in 0..3 {
+            assert!((found.half_extent_mm[k] - usual.half_extent_mm[k]).abs() < 1.0);
+            let [a, b] = [found, usual].map(|frame| Vector3::from(frame.axes[k]));
+            assert!(a.dot(&b) > 0.999_99);
+        }
+    }
+
+    #[test]
+    fn coordinates_whose_squares_are_infinite_are_refused() {
+        let mut mesh = scan();
+        mesh.vertices
+            .map_in_place(|vertex| vertex.map(|c| c * 1e200));
+        let refused = Orientation::find(&mut &mesh, None);
+        assert!(matches!(refused, Err(BlockError::NoArea { .. })));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::error::BlockError;
+use crate::domain::cancel::ThreadToken;
 use crate::raster::blur::gaussian_blur;
 use crate::raster::otsu;
 use crate::raster::{Grid, PrintImage};
@@ -175,7 +176,8 @@ impl Sheet {
     fn darkness(&self, grey: &Grid<u8>) -> Grid<u8> {
         let width = grey.width();
         let mut dark = vec![0_u8; width * grey.height()];
-        dark.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let token = ThreadToken::current();
+        let darken = |y: usize, row: &mut [u8]| {
             let levels = self.row(y, width);
             for ((out, value), sheet) in row.iter_mut().zip(grey.row(y)).zip(&levels) {
                 let share = 1.0 - f32::from(*value) / sheet.max(1.0);
@@ -185,7 +187,10 @@ impl Sheet {
                     0
                 };
             }
-        });
+        };
+        dark.par_chunks_mut(width)
+            .enumerate()
+            .for_each(|(y, row)| token.scope(|| darken(y, row)));
         Grid::from_vec(width, grey.height(), dark).expect("one value for each pixel")
     }
 
@@ -275,13 +280,17 @@ fn threshold(darkness: &Grid<u8>) -> Result<(f64, f64), BlockError> {
 fn halved(ink: &Grid<u8>) -> Grid<u8> {
     let (width, height) = (ink.width() / 2, ink.height() / 2);
     let mut half = vec![0_u8; width * height];
-    half.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+    let token = ThreadToken::current();
+    let halve = |y: usize, row: &mut [u8]| {
         let (upper, lower) = (ink.row(2 * y), ink.row(2 * y + 1));
         for (x, out) in row.iter_mut().enumerate() {
             let sum = |row: &[u8]| u16::from(row[2 * x]) + u16::from(row[2 * x + 1]);
             *out = ((sum(upper) + sum(lower) + 2) / 4) as u8;
         }
-    });
+    };
+    half.par_chunks_mut(width)
+        .enumerate()
+        .for_each(|(y, row)| token.scope(|| halve(y, row)));
     Grid::from_vec(width, height, half).expect("one value for each pixel")
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::face_layer::{FACE_CELL, cells_of_face, face_angle};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
+use crate::domain::cancel::poll;
 use crate::raster::{Grid, Mask};
 
 /// Side of the cells whose tops are fitted, in pixels of the height map: 4.05 mm. Each contains tops where there is text.
@@ -177,6 +178,7 @@ fn soften(map: &HeightMap, face: &Mask, surface: &Grid<f32>) -> Grid<u8> {
         .map(|x| cell_at(x, surface.width()))
         .collect();
     for y in 0..heights.height() {
+        poll();
         let (row, down) = cell_at(y, surface.height());
         let next = (row + 1).min(surface.height() - 1);
         let levels: Vec<f32> = (surface.row(row).iter().zip(surface.row(next)))

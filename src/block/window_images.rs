@@ -8,6 +8,7 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
 use crate::domain::Affine2;
+use crate::domain::cancel::ThreadToken;
 use crate::raster::Grid;
 
 /// Shifts that are correlated together, one per lane.
@@ -33,18 +34,20 @@ impl ShrunkRelief {
         let (width, height) = (soft.width() / shrink, soft.height() / shrink);
         let mut means = vec![0.0_f32; width * height];
         let scale = 1.0 / (255 * shrink * shrink) as f32;
+        let token = ThreadToken::current();
+        let add_rows = |y: usize, row: &mut [f32]| {
+            for dy in 0..shrink {
+                let pixels = soft.row(y * shrink + dy).chunks_exact(shrink);
+                for (out, pixels) in row.iter_mut().zip(pixels) {
+                    let sum: u32 = pixels.iter().map(|p| u32::from(*p)).sum();
+                    *out += sum as f32 * scale;
+                }
+            }
+        };
         means
             .par_chunks_mut(width)
             .enumerate()
-            .for_each(|(y, row)| {
-                for dy in 0..shrink {
-                    let pixels = soft.row(y * shrink + dy).chunks_exact(shrink);
-                    for (out, pixels) in row.iter_mut().zip(pixels) {
-                        let sum: u32 = pixels.iter().map(|p| u32::from(*p)).sum();
-                        *out += sum as f32 * scale;
-                    }
-                }
-            });
+            .for_each(|(y, row)| token.scope(|| add_rows(y, row)));
         let cell = |at: usize| (at * shrink + shrink / 2) / FACE_CELL;
         let face =
             |x: usize, y: usize| relief.face.get(cell(x) as i64, cell(y) as i64) == Some(true);
@@ -101,18 +104,20 @@ impl WarpedInk {
         let mut ink = vec![0.0_f32; width * height];
         let mut on_page = vec![false; width * height];
         let first = |k: usize| relief.origin_mm[k] - border as f64 * relief.pixel_mm;
+        let token = ThreadToken::current();
+        let warp_row = |y: usize, ink: &mut [f32], on_page: &mut [bool]| {
+            let v = first(1) + y as f64 * relief.pixel_mm;
+            let points = map.row([first(0), v], relief.pixel_mm, width);
+            for ((ink, on_page), point) in ink.iter_mut().zip(on_page).zip(points) {
+                if let Some(value) = sampler.at(point) {
+                    (*ink, *on_page) = (value, true);
+                }
+            }
+        };
         ink.par_chunks_mut(width)
             .zip(on_page.par_chunks_mut(width))
             .enumerate()
-            .for_each(|(y, (ink, on_page))| {
-                let v = first(1) + y as f64 * relief.pixel_mm;
-                let points = map.row([first(0), v], relief.pixel_mm, width);
-                for ((ink, on_page), point) in ink.iter_mut().zip(on_page).zip(points) {
-                    if let Some(value) = sampler.at(point) {
-                        (*ink, *on_page) = (value, true);
-                    }
-                }
-            });
+            .for_each(|(y, (ink, on_page))| token.scope(|| warp_row(y, ink, on_page)));
         Self {
             border,
             ink: Grid::from_vec(width, height, ink).expect("one value for each pixel"),

@@ -6,6 +6,7 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::window_images::{ShrunkRelief, WarpedInk, Window};
 use super::window_template::WindowTemplate;
+use crate::domain::cancel::ThreadToken;
 
 /// Sizes of one round of windows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,9 +68,10 @@ pub(super) fn match_windows(
             }
         })
         .collect();
+    let token = ThreadToken::current();
     windows
         .par_iter()
-        .filter_map(|window| match_window(relief, &warped, *window, reach))
+        .filter_map(|window| token.scope(|| match_window(relief, &warped, *window, reach)))
         .collect()
 }
 

@@ -9,6 +9,9 @@ use super::files::RefusedLine;
 use crate::domain::{PairName, UniqueKeys};
 use crate::report::ground_truth::TruthRecord;
 
+/// Longest line in bytes. The values of a line take about ten times as much memory.
+const MAX_LINE_BYTES: usize = 16 << 20;
+
 /// One true alignment and its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TruthRow {
@@ -33,6 +36,12 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLin
             continue;
         }
         let refuse = |reason: String| RefusedLine::new(line, &reason);
+        if text.len() > MAX_LINE_BYTES {
+            let (bytes, limit) = (text.len(), MAX_LINE_BYTES);
+            return Err(refuse(format!(
+                "the line has {bytes} bytes; at most {limit} are read"
+            )));
+        }
         let UniqueKeys(value) =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;

@@ -8,6 +8,7 @@ mod attention_check;
 mod block;
 mod box_iou;
 mod box_name;
+pub(crate) mod cancel;
 mod catalog_identity;
 mod control_points;
 mod enum_names;

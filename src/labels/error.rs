@@ -75,12 +75,34 @@ pub enum LabelsProblem {
     #[error("the file has no boxes{}; draw at least one", of_page(.0.as_deref()))]
     NoBoxes(Option<String>),
     /// More boxes than a page can have.
-    #[error("the page has {count} boxes; at most {limit} are read")]
+    #[error("the page has more than {limit} boxes; keep only the boxes of its characters")]
     TooManyBoxes {
-        /// Number of boxes.
-        count: usize,
         /// Largest number.
         limit: usize,
+    },
+    /// An outline with more corners than a character can have.
+    #[error("{place}: the outline has more than {limit} corners; simplify it or draw a box")]
+    TooManyCorners {
+        /// The part, such as `box 3`.
+        place: String,
+        /// Largest number.
+        limit: usize,
+    },
+    /// More values than fit the memory for labels.
+    #[error("reading the JSON would take more than {} MiB of memory; save fewer pages in one file", .limit >> 20)]
+    TooManyValues {
+        /// Largest size of the values in bytes.
+        limit: usize,
+    },
+    /// The boxes overlap more often than characters can.
+    #[error(
+        "the boxes together are {times:.0} times as large as the page, more than {limit} times; keep only the boxes of its characters"
+    )]
+    Overlap {
+        /// Area of all boxes as a multiple of the area of the page.
+        times: f64,
+        /// Largest multiple.
+        limit: f64,
     },
     /// The file holds several pages, but not this one.
     #[error("no labels for {}: the file is about {}; take the labels of this page, or rename it", quoted(.page), list(.pages))]

@@ -12,6 +12,7 @@
 
 mod error;
 mod formats;
+mod json_size;
 mod message;
 mod model;
 mod page_choice;

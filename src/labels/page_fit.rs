@@ -11,6 +11,10 @@ use crate::domain::PairName;
 
 /// Maximum number of boxes of a page.
 pub const MAX_BOXES: usize = 100_000;
+/// Maximum number of corners of an outline.
+pub(super) const MAX_CORNERS: usize = 100_000;
+/// Largest area of all boxes together, as a multiple of the area of the page.
+const MAX_OVERLAP: f64 = 32.0;
 /// Largest difference of the ratio of width to height between labels and page that is scaled.
 const MAX_STRETCH: f64 = 0.01;
 /// Smallest side of a box in pixels of the page.
@@ -33,13 +37,10 @@ pub(super) fn fit_to_page(
     file: PageRegions,
     page: &PageFile<'_>,
 ) -> Result<(Vec<LabelBox>, Vec<String>), LabelsProblem> {
-    let (count, limit) = (file.regions.len(), MAX_BOXES);
-    if count == 0 {
+    if file.regions.is_empty() {
         return Err(LabelsProblem::NoBoxes(file.file_name));
     }
-    if count > limit {
-        return Err(LabelsProblem::TooManyBoxes { count, limit });
-    }
+    check_count(file.regions.len())?;
     let mut warnings = page_warnings(&file, page);
     let scale = scale(file.size, page, &mut warnings)?;
     let placed = with_area(file.regions, scale, &mut warnings);
@@ -49,6 +50,7 @@ pub(super) fn fit_to_page(
     let inside = on_page(placed, page, &mut warnings)?;
     let unique = without_repeats(inside, &mut warnings);
     check_names(&unique)?;
+    check_overlap(&unique, page)?;
     let pixel_centres = |corners: Corners| corners.into_iter().map(|[x, y]| [x - 0.5, y - 0.5]);
     let finished = unique.into_iter().map(|placed| {
         let name = placed.region.name.as_deref().map(PairName::new).transpose();
@@ -62,6 +64,30 @@ pub(super) fn fit_to_page(
         })
     });
     Ok((finished.collect::<Result<_, _>>()?, warnings))
+}
+
+/// Checks a number of boxes of a page, while they are read.
+pub(super) fn check_count(count: usize) -> Result<(), LabelsProblem> {
+    if count <= MAX_BOXES {
+        return Ok(());
+    }
+    let limit = MAX_BOXES;
+    Err(LabelsProblem::TooManyBoxes { limit })
+}
+
+/// Refuses boxes that cover the page so often that cutting all of them out would take very long.
+fn check_overlap(placed: &[PlacedRegion], page: &PageFile<'_>) -> Result<(), LabelsProblem> {
+    let area = |placed: &PlacedRegion| {
+        let [x0, y0, x1, y1] = bounds(&placed.corners);
+        (x1 - x0) * (y1 - y0)
+    };
+    let page_area = f64::from(page.width) * f64::from(page.height);
+    let times = placed.iter().map(area).sum::<f64>() / page_area;
+    let limit = MAX_OVERLAP;
+    if times > limit {
+        return Err(LabelsProblem::Overlap { times, limit });
+    }
+    Ok(())
 }
 
 /// Warns about another file name and another size in bytes.

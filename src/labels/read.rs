@@ -4,6 +4,7 @@ use serde_json::{Map, Value};
 
 use super::error::{LabelsError, LabelsProblem};
 use super::formats::{bboxes, coco, labelme, page_xml, via_csv, via_json, yolo};
+use super::json_size;
 use super::message::{list, quoted};
 use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
@@ -76,6 +77,7 @@ fn parse_json(
     text: &str,
     page: &PageFile<'_>,
 ) -> Result<(LabelFormat, PageRegions), LabelsProblem> {
+    json_size::check(text)?;
     let UniqueKeys(value) =
         serde_json::from_str(text).map_err(|error| broken_json(text, &error))?;
     match &value {

@@ -6,6 +6,8 @@ use std::thread;
 
 use tokio::sync::oneshot;
 
+use crate::domain::cancel::{CancelGuard, CancelToken};
+
 /// Runs long work on one thread, one call after another.
 ///
 /// The memory of a server then is that of one picture, however many are asked for. The allocator of glibc keeps freed
@@ -38,8 +40,8 @@ impl Default for WorkThread {
 }
 
 impl WorkThread {
-    /// Calls `work` on the thread and returns its result. Work that has not begun is left out if the caller no longer
-    /// waits, for example because a browser has closed the connection.
+    /// Calls `work` on the thread and returns its result. If the caller no longer waits, for example because a browser has
+    /// closed the connection, work that has not begun is left out, and work that has begun is cancelled.
     ///
     /// # Errors
     /// Returns an error if the work panicked.
@@ -47,15 +49,21 @@ impl WorkThread {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, WorkFailed> {
+        let token = CancelToken::default();
+        let cancels = CancelGuard(token.clone());
         let (result, returned) = oneshot::channel();
         let call = Box::new(move || {
-            if !result.is_closed() {
+            if !result.is_closed()
+                && let Ok(done) = token.run(work)
+            {
                 // Fails if the caller has left meanwhile.
-                let _ = result.send(work());
+                let _ = result.send(done);
             }
         });
         self.calls.send(call).map_err(|_ended| WorkFailed)?;
-        returned.await.map_err(|_dropped| WorkFailed)
+        let returned = returned.await.map_err(|_dropped| WorkFailed);
+        drop(cancels);
+        returned
     }
 }
 
@@ -64,6 +72,36 @@ mod tests {
     use std::sync::mpsc;
 
     use super::{WorkFailed, WorkThread};
+    use crate::domain::cancel::polled;
+
+    /// Sends a message when it is dropped.
+    struct Ended(mpsc::Sender<()>);
+
+    impl Drop for Ended {
+        fn drop(&mut self) {
+            let _ = self.0.send(());
+        }
+    }
+
+    #[tokio::test]
+    async fn work_ends_when_its_caller_leaves() {
+        let work = WorkThread::default();
+        let (started, mut start) = tokio::sync::oneshot::channel();
+        let (ended, end) = mpsc::channel();
+        let mut request = Box::pin(work.call(move || {
+            let _ended = Ended(ended);
+            started.send(()).expect("a receiver");
+            polled(std::iter::repeat(())).for_each(drop);
+        }));
+        tokio::select! {
+            biased;
+            _ = &mut request => panic!("the loop has no end"),
+            begun = &mut start => begun.expect("it starts"),
+        }
+        drop(request);
+        end.recv().expect("the work ends");
+        assert_eq!(work.call(|| 7).await, Ok(7));
+    }
 
     #[tokio::test]
     async fn all_calls_run_on_one_thread_also_after_a_panic() {

@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::triangle_mesh::Mesh;
+use crate::domain::cancel::polled;
 
 /// Cells along the longest side of the finest grid. Three coordinates of a cell fit into 64 bits.
 const MAX_CELLS: u32 = 1 << 16;
@@ -46,7 +47,7 @@ impl Mesh {
             let middle = fits.midpoint(exceeds);
             let cells = CellGrid::new(&self, middle).cells(&self);
             let left = if is_point_set {
-                cells.iter().collect::<HashSet<_>>().len()
+                polled(&cells).collect::<HashSet<_>>().len()
             } else {
                 self.triangles_left(&cells)
             };
@@ -62,7 +63,7 @@ impl Mesh {
 
     /// Counts the triangles with corners in three cells.
     fn triangles_left(&self, cells: &[u64]) -> usize {
-        let triangles = self.triangles.iter();
+        let triangles = polled(&self.triangles);
         triangles
             .filter(|triangle| {
                 let [a, b, c] = triangle.map(|corner| cells[corner as usize]);
@@ -76,7 +77,7 @@ impl Mesh {
         let mut numbers: HashMap<u64, u32> = HashMap::new();
         let mut sums: Vec<([f64; 3], f64)> = Vec::new();
         let mut number_of_vertex = Vec::with_capacity(cells.len());
-        for (vertex, cell) in self.vertices.iter().zip(cells) {
+        for (vertex, cell) in polled(self.vertices.iter()).zip(cells) {
             let number = *numbers.entry(*cell).or_insert(sums.len() as u32);
             if number as usize == sums.len() {
                 sums.push(([0.0; 3], 0.0));
@@ -89,7 +90,7 @@ impl Mesh {
             number_of_vertex.push(number);
         }
         let mut known = HashSet::new();
-        let triangles = self.triangles.iter();
+        let triangles = polled(&self.triangles);
         let triangles = triangles.map(|face| face.map(|corner| number_of_vertex[corner as usize]));
         Self {
             triangles: triangles
@@ -126,7 +127,7 @@ impl CellGrid {
     /// Creates the grid with `count` cells along the longest side of the box.
     fn new(mesh: &Mesh, count: u32) -> Self {
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for vertex in mesh.vertices.iter() {
+        for vertex in polled(mesh.vertices.iter()) {
             for k in 0..3 {
                 bounds[0][k] = bounds[0][k].min(vertex[k]);
                 bounds[1][k] = bounds[1][k].max(vertex[k]);
@@ -150,7 +151,7 @@ impl CellGrid {
                 (cell << 16) | place.clamp(0.0, self.last) as u64
             })
         };
-        mesh.vertices.iter().map(cell).collect()
+        polled(mesh.vertices.iter()).map(cell).collect()
     }
 }
 

@@ -191,6 +191,12 @@ impl MeshLimits {
     pub(super) fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
         check_count("triangles", count, self.max_triangles)
     }
+
+    /// Returns whether a mesh of this size is within the limits.
+    pub(super) fn allow(&self, vertices: usize, triangles: usize) -> bool {
+        self.check_vertices(vertices as u64).is_ok()
+            && self.check_triangles(triangles as u64).is_ok()
+    }
 }
 
 fn check_count(what: &'static str, count: u64, limit: u64) -> Result<(), MeshError> {

@@ -5,6 +5,7 @@ mod error;
 mod format;
 mod obj;
 mod ply;
+pub(crate) mod robust_bounds;
 mod stl;
 mod text;
 mod triangle_mesh;
@@ -23,6 +24,7 @@ pub use triangle_stream::{
 use std::io::Read;
 
 use crate::domain::FileKind;
+use crate::domain::cancel::PolledReader;
 use crate::page_vec::PageVec;
 use format::DetectedFormat;
 
@@ -91,6 +93,7 @@ pub fn read_from(
     limits: &MeshLimits,
 ) -> Result<Mesh, MeshReadError> {
     limits.check_bytes(about)?;
+    let mut source = PolledReader(source);
     let mut head = Vec::with_capacity(stl::HEADER);
     source
         .by_ref()
@@ -98,7 +101,7 @@ pub fn read_from(
         .read_to_end(&mut head)?;
     let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
-        return stl::read_facets(source, count, limits);
+        return stl::read_facets(&mut source, count, limits);
     }
     let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read(&bytes, name, limits)?)

@@ -14,6 +14,7 @@ mod tests;
 use super::error::{self, MeshError, MeshLimits};
 use super::text;
 use super::triangle_mesh::Mesh;
+use crate::domain::cancel::polled;
 
 /// Reads an OBJ file.
 ///
@@ -24,7 +25,7 @@ use super::triangle_mesh::Mesh;
 /// Returns an error if the file exceeds the limits, a `v` or `f` line cannot be parsed, a face refers to a missing
 /// vertex, or a used coordinate is not finite.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
-    if let Some(parsed) = parser::parse(bytes) {
+    if let Some(parsed) = parser::parse(bytes, limits) {
         limits.check_vertices(parsed.vertices.len() as u64)?;
         limits.check_triangles(parsed.triangles.len() as u64)?;
         if let Some(mesh) = parsed.into_mesh() {
@@ -36,7 +37,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     let [vertices, triangles] = count(bytes);
     limits.check_vertices(vertices)?;
     limits.check_triangles(triangles)?;
-    parser::parse(&plain_lines(bytes))
+    parser::parse(&plain_lines(bytes), limits)
         .and_then(parser::ParsedObj::into_mesh)
         .ok_or_else(|| find_fault(bytes))
 }
@@ -78,7 +79,7 @@ fn count(bytes: &[u8]) -> [u64; 2] {
 /// Joins each line that ends in a backslash with the next line. Returns `None` if no line ends in a backslash.
 fn join_continued_lines(bytes: &[u8]) -> Option<Vec<u8>> {
     let ends = |at: usize| matches!(bytes.get(at), Some(b'\n' | b'\r'));
-    let mut places = (0..bytes.len())
+    let mut places = polled(0..bytes.len())
         .filter(|at| bytes[*at] == b'\\' && ends(at + 1))
         .peekable();
     places.peek()?;

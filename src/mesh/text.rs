@@ -1,12 +1,13 @@
 //! Lines, words and numbers of text formats, without copies.
 
+use crate::domain::cancel::polled;
+
 /// Returns the trimmed lines with their line numbers, counted from 1. Lines may end in LF or CRLF, or in CR if the file
 /// has no LF.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     // Files of classic Mac OS have carriage returns only.
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-    bytes
-        .split(move |byte| *byte == end)
+    polled(bytes.split(move |byte| *byte == end))
         .map(<[u8]>::trim_ascii)
         .zip(1..)
         .map(|(line, number)| (number, line))
@@ -14,8 +15,7 @@ pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
 
 /// Returns the words between white space.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty())
+    polled(line.split(u8::is_ascii_whitespace)).filter(|word| !word.is_empty())
 }
 
 /// Parses a number. Accepts NaN and infinity, which the readers reject in vertices.

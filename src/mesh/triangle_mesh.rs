@@ -1,5 +1,6 @@
 //! Triangle meshes and their vertices.
 
+use crate::domain::cancel::polled;
 use crate::page_vec::PageVec;
 
 /// A triangle mesh in its own frame and unit. A point set is a mesh without triangles.
@@ -14,8 +15,7 @@ pub struct Mesh {
 impl Mesh {
     /// Creates a mesh in which vertices 0 to 2 form the first triangle, vertices 3 to 5 the second, and so on.
     pub(crate) fn from_soup(vertices: Vertices) -> Self {
-        let triangles = (0..vertices.len() as u32)
-            .step_by(3)
+        let triangles = polled((0..vertices.len() as u32).step_by(3))
             .map(|first| [first, first + 1, first + 2])
             .collect();
         Self {
@@ -75,7 +75,7 @@ impl Vertices {
 
     /// Applies a function to each vertex.
     pub fn map_in_place(&mut self, other: impl Fn([f64; 3]) -> [f64; 3]) {
-        for vertex in self.make_double().iter_mut() {
+        for vertex in polled(self.make_double().iter_mut()) {
             *vertex = other(*vertex);
         }
     }
@@ -83,7 +83,7 @@ impl Vertices {
     /// Converts to double precision, so that any position can be stored.
     fn make_double(&mut self) -> &mut PageVec<[f64; 3]> {
         if let Self::Single(_) = self {
-            *self = self.iter().collect();
+            *self = polled(self.iter()).collect();
         }
         match self {
             Self::Double(all) => all,

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::{Mesh, Vertices};
+use crate::domain::cancel::polled;
 
 impl Mesh {
     /// Merges vertices with exactly equal coordinates into the first of them, and removes faces that thereby have two
@@ -30,7 +31,7 @@ impl Mesh {
             triangles,
         } = self;
         let mut kept = Vec::new();
-        for (place, number) in (0..).zip(&welded) {
+        for (place, number) in (0..).zip(polled(&welded)) {
             if *number as usize == kept.len() {
                 kept.push(place);
             }
@@ -41,7 +42,7 @@ impl Mesh {
                 triangles,
             };
         }
-        let faces = triangles.iter();
+        let faces = polled(triangles.iter());
         let faces = faces.map(|face| face.map(|corner| welded[corner as usize]));
         Self {
             triangles: faces
@@ -61,14 +62,14 @@ impl Mesh {
             let next = known.len() as u32;
             *known.entry(key).or_insert(next)
         };
-        self.vertices.iter().map(number).collect()
+        polled(self.vertices.iter()).map(number).collect()
     }
 }
 
 impl Vertices {
     /// Returns the vertices at the given places, in the same precision.
     fn select(&self, places: &[u32]) -> Self {
-        let places = places.iter().map(|place| *place as usize);
+        let places = polled(places).map(|place| *place as usize);
         match self {
             Self::Single(all) => Self::Single(places.map(|place| all[place]).collect()),
             Self::Double(all) => Self::Double(places.map(|place| all[place]).collect()),

@@ -1,6 +1,7 @@
 //! Gaussian blur by three box filters (Wells 1986, doi:10.1109/TPAMI.1986.4767776).
 
 use super::Grid;
+use crate::domain::cancel::poll;
 use crate::simd::dispatch;
 
 /// Sigma below which values stay unchanged, in pixels.
@@ -50,6 +51,7 @@ fn box_blur_all_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>
     dispatch!({
         let mut left = 0;
         while left + WIDE_COLUMNS <= width {
+            poll();
             box_blur_run::<WIDE_COLUMNS>(values, width, left, radius, means);
             left += WIDE_COLUMNS;
         }

@@ -1,6 +1,7 @@
 //! Connected components of a mask, labelled by runs with union-find (4-connectivity).
 
 use super::{Grid, Mask, PixelBox};
+use crate::domain::cancel::{poll, polled};
 
 /// Components smaller than this share of an image are specks. The value is from the program of the paper's authors.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
@@ -21,6 +22,7 @@ impl ConnectedComponents {
         // Runs of the row above, a range of `runs`.
         let mut above = 0..0;
         for y in 0..height {
+            poll();
             let row_start = runs.len();
             for (begin, end) in row_runs(mask.row(y)) {
                 let place = runs.len();
@@ -44,7 +46,7 @@ impl ConnectedComponents {
         let mut labels = Grid::new(width, height, u32::MAX);
         let mut sizes: Vec<usize> = Vec::new();
         let mut numbers = Vec::with_capacity(runs.len());
-        for k in 0..runs.len() {
+        for k in polled(0..runs.len()) {
             let root = find_root(&mut runs, k);
             if root == k {
                 numbers.push(sizes.len() as u32);
@@ -93,6 +95,7 @@ impl ConnectedComponents {
     pub(crate) fn parts_of(&self, mask: &Mask) -> Vec<(PixelBox, usize)> {
         let mut parts: Vec<Option<(PixelBox, usize)>> = vec![None; self.sizes.len()];
         for y in 0..mask.height() {
+            poll();
             for (x, is_set) in mask.row(y).iter().enumerate() {
                 if let Some(label) = is_set.then(|| self.label_at(x, y)).flatten() {
                     let pixel = PixelBox {
@@ -144,6 +147,7 @@ impl ConnectedComponents {
     fn touches(&self, other: &Mask, distance: i64) -> Vec<bool> {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {
+            poll();
             for x in 0..self.labels.width() {
                 let label = self.labels.at(x, y);
                 if label == u32::MAX || touches[label as usize] {

@@ -2,6 +2,8 @@
 //!
 //! x runs to the right and y down. **(0, 0) is the centre of the top-left pixel**: pixel x covers x - 0.5..x + 0.5.
 
+use crate::domain::cancel::poll;
+
 /// Values in row-major order, top row first.
 ///
 /// ```
@@ -18,6 +20,9 @@ pub struct Grid<T> {
     height: usize,
     data: Vec<T>,
 }
+
+/// Values that are computed between two polls for a cancellation.
+const VALUES_PER_POLL: usize = 1 << 16;
 
 /// Side of the square tiles that are transposed one after another. The rows of one tile stay in the CPU cache.
 const TILE: usize = 8;
@@ -66,14 +71,19 @@ impl<T: Copy> Grid<T> {
     pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> T) -> Self {
         let mut data = Vec::with_capacity(width * height);
         for y in 0..height {
+            poll();
             data.extend((0..width).map(|x| value(x, y)));
         }
         Self::of(width, height, data)
     }
 
     /// Applies a function to each value.
-    pub fn map<U: Copy>(&self, value: impl FnMut(&T) -> U) -> Grid<U> {
-        let data = self.data.iter().map(value).collect();
+    pub fn map<U: Copy>(&self, mut value: impl FnMut(&T) -> U) -> Grid<U> {
+        let mut data = Vec::with_capacity(self.data.len());
+        for part in self.data.chunks(VALUES_PER_POLL) {
+            poll();
+            data.extend(part.iter().map(&mut value));
+        }
         Grid::of(self.width, self.height, data)
     }
 
@@ -83,8 +93,13 @@ impl<T: Copy> Grid<T> {
         other: &Grid<U>,
         mut value: impl FnMut(T, U) -> V,
     ) -> Grid<V> {
-        let pairs = self.data.iter().zip(&other.data);
-        let data = pairs.map(|(one, other)| value(*one, *other)).collect();
+        let mut data = Vec::with_capacity(self.data.len());
+        let parts = self.data.chunks(VALUES_PER_POLL);
+        for (part, other) in parts.zip(other.data.chunks(VALUES_PER_POLL)) {
+            poll();
+            let pairs = part.iter().zip(other);
+            data.extend(pairs.map(|(one, other)| value(*one, *other)));
+        }
         Grid::of(self.width, self.height, data)
     }
 
@@ -94,6 +109,7 @@ impl<T: Copy> Grid<T> {
         let (width, height) = (self.width, self.height);
         let mut data = self.data.clone();
         for top in (0..height).step_by(TILE) {
+            poll();
             let rows = &self.data[top * width..];
             for left in (0..width).step_by(TILE) {
                 let columns = &mut data[left * height..];

@@ -1,6 +1,7 @@
 //! Binary masks: which pixels are stroke.
 
 use super::Grid;
+use crate::domain::cancel::poll;
 
 /// A grid of booleans.
 pub type Mask = Grid<bool>;
@@ -192,6 +193,7 @@ impl Mask {
         let (width, height) = (self.width(), self.height());
         let mut across = self.clone();
         for (y, row) in across.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            poll();
             let from = self.row(y);
             for (grown, left) in row[1..].iter_mut().zip(from) {
                 *grown |= *left;
@@ -202,6 +204,7 @@ impl Mask {
         }
         let mut grown = across.clone();
         for (y, row) in grown.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            poll();
             for near in [y.saturating_sub(1), (y + 1).min(height - 1)] {
                 for (grown, near) in row.iter_mut().zip(across.row(near)) {
                     *grown |= *near;

@@ -1,5 +1,7 @@
 //! Otsu's threshold between two classes of values (1979, doi:10.1109/TSMC.1979.4310076).
 
+use crate::domain::cancel::{poll, polled};
+
 /// Two classes of values and the threshold between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Split {
@@ -29,10 +31,11 @@ fn split_sorted(values: &[f32]) -> Option<Split> {
     if count < 2 {
         return None;
     }
+    poll();
     let total: f64 = values.iter().map(|v| f64::from(*v)).sum();
     let all = count as f64;
     let (mut below, mut best, mut cut) = (0.0, -1.0, 1);
-    for (k, v) in values.iter().enumerate().take(count - 1) {
+    for (k, v) in polled(values.iter().enumerate().take(count - 1)) {
         below += f64::from(*v);
         let (n, m) = ((k + 1) as f64, (count - k - 1) as f64);
         // n m (below / n - (total - below) / m)^2, with one division.
@@ -68,6 +71,7 @@ fn sort(values: &mut [f32]) {
         let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
         // At first the number of keys with each digit value. Later the index in `sorted` for the next such key.
         let mut places = [0_u32; DIGIT_VALUES];
+        poll();
         for key in &keys {
             places[digit(*key)] += 1;
         }
@@ -75,10 +79,13 @@ fn sort(values: &mut [f32]) {
         for place in &mut places {
             next += std::mem::replace(place, next);
         }
-        for key in &keys {
-            let place = &mut places[digit(*key)];
-            sorted[*place as usize] = *key;
-            *place += 1;
+        for part in keys.chunks(KEYS_PER_POLL) {
+            poll();
+            for key in part {
+                let place = &mut places[digit(*key)];
+                sorted[*place as usize] = *key;
+                *place += 1;
+            }
         }
         std::mem::swap(&mut keys, &mut sorted);
     }
@@ -86,6 +93,9 @@ fn sort(values: &mut [f32]) {
         *value = of_key(key);
     }
 }
+
+/// Keys that are sorted between two polls for a cancellation.
+const KEYS_PER_POLL: usize = 1 << 16;
 
 const SIGN: u32 = 1 << 31;
 

@@ -1,6 +1,7 @@
 //! Resampling to another size along the axes: a box filter shrinks, and linear interpolation enlarges.
 
 use super::Grid;
+use crate::domain::cancel::poll;
 use crate::simd::dispatch;
 
 /// Resamples values to a grid of `to` columns and rows. Source pixel x lies at `scale * x + shift` of the result.
@@ -81,6 +82,7 @@ impl BoxFilter {
         let mut start = 0;
         dispatch!({
             for ((first, end), row) in self.each.iter().zip(&mut rows) {
+                poll();
                 let weights = &self.weights[start..*end];
                 start = *end;
                 let (fours, rest) = weights.as_chunks::<4>();

@@ -4,6 +4,7 @@ use super::minmax_pyramid::MinMaxPyramid;
 use super::supersample::{Supersampler, bilinear_cell, interpolate};
 use super::{DepthMap, Grid};
 use crate::domain::Affine2;
+use crate::domain::cancel::poll;
 
 /// Side in pixels of the square blocks of output pixels that are tested together for missing data.
 const BLOCK_PX: usize = 4;
@@ -21,6 +22,7 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     let rounded = |level: f64| level.round().clamp(1.0, 65535.0) as u16;
     let mut out = Grid::new(width, height, 0);
     for top in (0..height).step_by(BLOCK_PX) {
+        poll();
         for left in (0..width).step_by(BLOCK_PX) {
             let columns = left..(left + BLOCK_PX).min(width);
             let rows = top..(top + BLOCK_PX).min(height);

@@ -11,6 +11,7 @@ use super::minmax_pyramid::MinMaxPyramid;
 use super::supersample::{Supersampler, bilinear_cell, bilinear_cell_inside};
 use super::{Grid, Mask};
 use crate::domain::Affine2;
+use crate::domain::cancel::poll;
 use crate::simd::dispatch;
 
 /// Smallest coverage of a pixel that is set: half, less a margin for the rounding errors of the sum.
@@ -63,6 +64,7 @@ pub(super) fn warp_level_sets<T: Copy + Ord + Default + Into<f64>>(
         pending: Vec::new(),
     };
     for y in (0..height).step_by(MAX_BLOCK_PX) {
+        poll();
         for x in (0..width).step_by(MAX_BLOCK_PX) {
             warp.fill_block(x, y, MAX_BLOCK_PX, 0..levels.len());
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::input_reads::ReadItem;
 use super::memory_budget::{mesh_bytes, print_pixels};
+use crate::block::MAX_MAP_PIXELS;
 use crate::catalog::BlockAttributes;
 use crate::mesh::{STL_HEAD, binary_stl_triangles};
 use crate::raster;
@@ -18,11 +19,28 @@ const STREAMED_SHARE: u64 = 16;
 /// Bytes needed per pixel of a page. Measured: 10, with pages of 6 and 24 million pixels.
 const PAGE_PIXEL_BYTES: u64 = 16;
 
+/// Bytes for each pixel of a height map while both sides of a block are drawn and their faces are found.
+const MAP_PIXEL_BYTES: u64 = 16;
+
+/// Returns the memory for the height maps of a block in a run with a limit: a quarter of it, but not more than the
+/// largest maps take.
+pub(super) fn map_bytes(memory: Option<u64>) -> u64 {
+    let largest = MAX_MAP_PIXELS as u64 * MAP_PIXEL_BYTES;
+    memory.map_or(largest, |bytes| largest.min(bytes / 4))
+}
+
+/// Returns the size of the largest height map, in pixels, that fits the memory for it.
+pub(super) fn max_map_pixels(memory: Option<u64>) -> usize {
+    (map_bytes(memory) / MAP_PIXEL_BYTES) as usize
+}
+
 /// A block whose memory is estimated.
 pub(super) struct EstimatedBlock {
     pub(super) project: Project,
     pub(super) attributes: BlockAttributes,
     pub(super) limits: raster::ImageLimits,
+    /// Memory for its height maps, whose size is known only when its scan is read.
+    pub(super) map_bytes: u64,
 }
 
 impl ReadItem for EstimatedBlock {
@@ -33,6 +51,7 @@ impl ReadItem for EstimatedBlock {
         let page = self.project.input(&self.attributes.page_path);
         let pixels = print_pixels(&page).min(self.limits.max_pixels);
         BLOCK_BYTES
+            .max(self.map_bytes)
             .saturating_add(scan_bytes(&mesh))
             .saturating_add(pixels.saturating_mul(PAGE_PIXEL_BYTES))
     }
@@ -61,7 +80,10 @@ fn scan_bytes(scan: &Input) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{BLOCK_BYTES, EstimatedBlock, PAGE_PIXEL_BYTES, STREAMED_SHARE};
+    use super::{
+        BLOCK_BYTES, EstimatedBlock, PAGE_PIXEL_BYTES, STREAMED_SHARE, map_bytes, max_map_pixels,
+    };
+    use crate::block::MAX_MAP_PIXELS;
     use crate::raster::ImageLimits;
     use crate::runner::input_reads::ReadItem as _;
     use crate::runner::tests::values;
@@ -83,11 +105,20 @@ mod tests {
                 project: project.clone(),
                 attributes: values::block_attributes(mesh, "page.png"),
                 limits: ImageLimits::SUGGESTED,
+                map_bytes: map_bytes(Some(600 << 20)),
             };
             block.read() - BLOCK_BYTES - 60_000 * PAGE_PIXEL_BYTES
         };
         assert_eq!(estimate("scan.stl"), stl.len() as u64 / STREAMED_SHARE);
         assert_eq!(estimate("scan.ply"), 3500);
         assert_eq!(estimate("none.stl"), 0);
+    }
+
+    #[test]
+    fn height_maps_take_at_most_a_quarter_of_the_memory() {
+        assert_eq!(max_map_pixels(None), MAX_MAP_PIXELS);
+        assert_eq!(max_map_pixels(Some(u64::MAX)), MAX_MAP_PIXELS);
+        assert_eq!(max_map_pixels(Some(256 << 20)), 4 << 20);
+        assert!(map_bytes(None) > BLOCK_BYTES);
     }
 }

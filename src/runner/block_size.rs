@@ -1,7 +1,9 @@
 //! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
 
 use crate::domain::LengthUnit;
+use crate::domain::cancel::polled;
 use crate::mesh::Vertices;
+use crate::mesh::robust_bounds::{bulk_box, is_in_box};
 use crate::raster::DepthMap;
 
 /// Lengths of whole blocks, mm. Characters have 6 to 30 mm.
@@ -46,10 +48,14 @@ pub(super) fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String
     ))
 }
 
-/// Returns the longest side of the bounding box of vertices, in units of the mesh.
+/// Returns the longest side of the bounding box of vertices without distant specks, in units of the mesh.
 pub(super) fn length_of(vertices: &Vertices) -> f64 {
+    let bulk = match vertices {
+        Vertices::Single(all) => bulk_box(all),
+        Vertices::Double(all) => bulk_box(all),
+    };
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
-    for vertex in vertices.iter() {
+    for vertex in polled(vertices.iter()).filter(|vertex| is_in_box(&bulk, vertex)) {
         for (bounds, value) in bounds.iter_mut().zip(vertex) {
             *bounds = [bounds[0].min(value), bounds[1].max(value)];
         }
@@ -70,6 +76,7 @@ pub(super) fn length_of_map(depth: &DepthMap) -> f64 {
 mod tests {
     use super::{advice, length_of, wrong_unit};
     use crate::domain::LengthUnit;
+    use crate::mesh::Vertices;
 
     #[test]
     fn only_scans_as_long_as_a_block_get_the_advice() {
@@ -108,5 +115,15 @@ mod tests {
     fn the_length_is_the_longest_side_of_the_box() {
         let vertices = [[1.0, -4.0, 0.0], [3.0, 9.0, 2.0]].into_iter().collect();
         assert_eq!(length_of(&vertices), 13.0);
+    }
+
+    #[test]
+    fn a_vertex_far_away_does_not_change_the_length() {
+        let scan = |k: u32| [f64::from(k % 70), f64::from(k / 70), 0.0];
+        let mut vertices: Vertices = (0..4_900).map(scan).collect();
+        for far in [1e6, -1e30, f64::MAX] {
+            vertices.set(2_000, [3.0, far, 0.0]);
+            assert_eq!(length_of(&vertices), 69.0, "{far}");
+        }
     }
 }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use tokio::task::JoinSet;
 
-use super::block_memory::{BLOCK_BYTES, EstimatedBlock};
+use super::block_memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
 use super::block_progress::BlockEnd;
 use super::block_task::{BlockReport, process_block};
 use super::compute_thread::task_result;
 use super::error::RunError;
 use super::input_reads::{ReadLimits, read_each};
+use super::options::RunOptions;
 use super::policy;
 use super::prefetch::Prefetch;
 use super::run_context::RunContext;
@@ -31,6 +32,8 @@ pub(super) struct BlockSlot {
     /// The blocks of this run; `None` for all.
     among: Option<BlockSelection>,
     image_limits: raster::ImageLimits,
+    /// Memory for the height maps of a block.
+    map_bytes: u64,
     /// Whether a claim may find a block.
     may_find_one: bool,
     /// The next block needs memory that a running pair has to return first.
@@ -43,13 +46,14 @@ impl BlockSlot {
     pub(super) fn new(
         context: Arc<RunContext>,
         among: Option<BlockSelection>,
-        image_limits: raster::ImageLimits,
+        options: &RunOptions,
     ) -> Self {
         Self {
             context,
             may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
             among,
-            image_limits,
+            image_limits: options.image_limits,
+            map_bytes: map_bytes(options.memory),
             waits_for_memory: false,
             task: JoinSet::new(),
             counts: BlockRunCounts::default(),
@@ -112,6 +116,7 @@ impl BlockSlot {
             project: self.context.project.clone(),
             attributes: attributes.clone(),
             limits: self.image_limits,
+            map_bytes: self.map_bytes,
         };
         let limits = ReadLimits {
             timeout: self.context.timing.read_timeout(),

@@ -3,8 +3,8 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
@@ -19,6 +19,7 @@ use super::events::RunEvent;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
+use crate::domain::cancel::{CancelToken, Cancelled};
 use crate::domain::{BlockStage, BlockStageRecord, FailureClass};
 use crate::failpoint::{self, Point};
 use crate::platform::sleep_active;
@@ -196,20 +197,27 @@ async fn compute(
     }
 }
 
+/// Longest time to wait for the end of cancelled work. Only work that waits for a file takes longer.
+const LONGEST_END: Duration = Duration::from_millis(500);
+
 /// Runs blocking work on a thread of its own, with a flag that requests a stop. Waits for at most as long as one stage
-/// may take; then, and after an immediate stop of the run, sets the flag and abandons the thread.
+/// may take; then, and after an immediate stop of the run, cancels the work and waits until its memory is free.
 async fn on_thread<T: Send + 'static>(
     context: &RunContext,
     work: impl FnOnce(&AtomicBool) -> Result<T, BlockStageError> + Send + 'static,
 ) -> Result<Result<T, BlockStageError>, Interruption> {
     let failed =
         |class, text: String| Interruption::Failed(BlockStageError::failed(class, text), None);
-    let stop = Arc::new(AtomicBool::new(false));
-    let (sender, receiver) = oneshot::channel();
-    let inner = Arc::clone(&stop);
+    let token = CancelToken::default();
+    let (sender, mut receiver) = oneshot::channel();
+    let inner = token.clone();
     let thread = std::thread::Builder::new().name("block".to_owned());
     let spawned = thread.spawn(move || {
-        let outcome = catch_unwind(AssertUnwindSafe(|| work(&inner)));
+        let work = || {
+            let outcome = inner.run(|| work(inner.flag()));
+            outcome.unwrap_or_else(|Cancelled| Err(BlockStageError::Stopped))
+        };
+        let outcome = catch_unwind(AssertUnwindSafe(work));
         // The receiver is gone if the thread was abandoned.
         let _ = sender.send(outcome.map_err(|payload| panic_text(&*payload)));
     });
@@ -219,7 +227,7 @@ async fn on_thread<T: Send + 'static>(
     }
     let interruption = tokio::select! {
         biased;
-        outcome = receiver => return match outcome {
+        outcome = &mut receiver => return match outcome {
             Ok(Ok(outcome)) => Ok(outcome),
             Ok(Err(text)) => Err(failed(FailureClass::Bug, text)),
             Err(_) => Err(failed(FailureClass::Bug, "the block's thread ended without a result".to_owned())),
@@ -230,6 +238,9 @@ async fn on_thread<T: Send + 'static>(
             failed(FailureClass::Resource, format!("the stage took longer than {seconds} s (run.stage_timeout_s)"))
         }
     };
-    stop.store(true, Ordering::Relaxed);
+    token.cancel();
+    if tokio::time::timeout(LONGEST_END, receiver).await.is_err() {
+        tracing::warn!("a thread still waits for a file; its memory no longer counts for --memory");
+    }
     Err(interruption)
 }

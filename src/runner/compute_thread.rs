@@ -1,7 +1,7 @@
 //! Computes the stages of a pair one after another on the pair's own thread, and reports them to async code.
 //!
-//! Each pair has its own thread instead of one from a pool. A stage that hangs past its deadline can therefore be
-//! abandoned without blocking other pairs. All stages of a pair run on the same thread, because waking another thread
+//! Each pair has its own thread instead of one from a pool. A stage past its deadline is cancelled; if it hangs in the
+//! system, its thread can be abandoned without blocking other pairs. All stages of a pair run on the same thread, because waking another thread
 //! for each stage can leave a core idle for some milliseconds.
 
 use std::any::Any;
@@ -17,6 +17,7 @@ use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, StageCheckpoint};
+use crate::domain::cancel::{CancelGuard, CancelToken, Cancelled};
 use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::platform::sleep_active;
@@ -45,16 +46,22 @@ pub(super) enum ComputeEvent {
     StoreFailed(ArtifactError),
     /// A stage panicked; the pair's data is lost.
     Panicked(String),
-    /// A stage took too long; its thread is abandoned.
+    /// A stage took too long.
     TimedOut,
-    /// The run is to stop at once; the thread is abandoned.
+    /// The run is to stop at once.
     Stopped,
 }
 
-/// The thread that computes the stages of a pair. If this handle is dropped, the thread ends after the stage in
-/// progress.
+/// Longest time to wait for the end of a cancelled thread. Only a thread that waits for a file takes longer.
+const LONGEST_END: Duration = Duration::from_millis(500);
+
+/// The thread that computes the stages of a pair. If this handle is dropped, the computation is cancelled.
 #[derive(Debug)]
-pub(super) struct ComputeThread(mpsc::UnboundedReceiver<ComputeEvent>);
+pub(super) struct ComputeThread {
+    /// Closed when the thread has returned the pair's memory.
+    events: mpsc::UnboundedReceiver<ComputeEvent>,
+    token: CancelGuard,
+}
 
 impl ComputeThread {
     /// Starts a thread that computes a pair's stages from `first` on.
@@ -66,10 +73,26 @@ impl ComputeThread {
         first: Stage,
         pair: Box<PairContext>,
     ) -> std::io::Result<Self> {
-        let (events, receiver) = mpsc::unbounded_channel();
+        let (sender, events) = mpsc::unbounded_channel();
+        let token = CancelToken::default();
+        let inner = token.clone();
         let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
-        thread.spawn(move || run_stages(&context, first, pair, &events))?;
-        Ok(Self(receiver))
+        thread.spawn(move || run_stages(&context, first, pair, &inner, &sender))?;
+        Ok(Self {
+            events,
+            token: CancelGuard(token),
+        })
+    }
+
+    /// Cancels the computation and waits until the pair's memory is free, so that no other pair gets it before.
+    pub(super) async fn end(mut self) {
+        self.token.0.cancel();
+        let ended = async { while self.events.recv().await.is_some() {} };
+        if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
+            tracing::warn!(
+                "a thread still waits for a file; its memory no longer counts for --memory"
+            );
+        }
     }
 
     /// Waits for the next event, for at most as long as one stage may take. Time while the process is suspended does not
@@ -77,7 +100,7 @@ impl ComputeThread {
     pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
         tokio::select! {
             biased;
-            event = self.0.recv() => event.unwrap_or_else(|| {
+            event = self.events.recv() => event.unwrap_or_else(|| {
                 ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
             }),
             () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
@@ -86,11 +109,13 @@ impl ComputeThread {
     }
 }
 
-/// Computes stages until none is left, a stage fails, or the receiver of the events is closed.
+/// Computes stages until none is left, a stage fails, the computation is cancelled, or the receiver of the events is
+/// closed.
 fn run_stages(
     context: &RunContext,
     mut stage: Stage,
     mut pair: Box<PairContext>,
+    token: &CancelToken,
     events: &mpsc::UnboundedSender<ComputeEvent>,
 ) {
     let last = loop {
@@ -99,8 +124,13 @@ fn run_stages(
             return;
         }
         let begun = Instant::now();
-        let work = AssertUnwindSafe(|| run_stage(context, stage, &mut pair));
-        match catch_unwind(work) {
+        let work = || token.run(|| run_stage(context, stage, &mut pair));
+        let outcome = match catch_unwind(AssertUnwindSafe(work)) {
+            Ok(Ok(outcome)) => Ok(outcome),
+            Ok(Err(Cancelled)) => return,
+            Err(payload) => Err(payload),
+        };
+        match outcome {
             Ok(Ok(computed)) => match context.next_stage(stage) {
                 Some(next) => {
                     // A closed channel is noticed when the next stage starts.

@@ -76,6 +76,7 @@ async fn compute(
             ComputeEvent::Finished(computed, next) => {
                 if !checkpointer.store(*computed) {
                     // The lease is lost, the disk or the catalog returned an error, or the run stops at once.
+                    thread.end().await;
                     return PairOutcome::Ended(checkpointer.finish(PairEnd::LeaseLost).await);
                 }
                 match next {
@@ -107,6 +108,7 @@ async fn compute(
             }
             ComputeEvent::TimedOut => {
                 let text = timeout_text(stage, timeout, pair.file_in_use.get());
+                thread.end().await;
                 break FailedStage::without_pair(FailureClass::Resource, text);
             }
             ComputeEvent::Stopped => {

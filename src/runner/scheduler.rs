@@ -76,7 +76,7 @@ impl Scheduler {
         Self {
             session: WorkerSession::new(worker, now, context.timing.lease_ms()),
             prefetch: Prefetch::new(Arc::clone(&context), pairs, options),
-            block: BlockSlot::new(Arc::clone(&context), blocks, options.image_limits),
+            block: BlockSlot::new(Arc::clone(&context), blocks, options),
             context,
             selection,
             max_storing: options.workers.max(1) * MAX_STORING_PER_SLOT,

@@ -3,6 +3,7 @@
 mod block_kills;
 mod block_limits;
 mod blocks;
+mod cancelled;
 mod fake_blocks;
 mod fake_executor;
 mod gate;

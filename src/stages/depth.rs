@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scan;
-use super::zbuffer::{IndexedSurface, NO_HIT, Viewport};
+use super::zbuffer::{IndexedSurface, LARGEST_OVERLAP, NO_HIT, Viewport};
+use crate::domain::cancel::poll;
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
 use crate::simd::{max_f32, min_f32};
@@ -52,6 +53,12 @@ pub enum DepthError {
         /// Requested longest side in pixels.
         longest_px: f64,
     },
+    /// Large triangles overlap too often to be drawn.
+    #[error(
+        "its {0} triangles overlap more than {LARGEST_OVERLAP} times, or most are slivers across the scan; remove repeated \
+         faces or remesh the scan"
+    )]
+    Overlap(usize),
     /// No ray meets the surface.
     #[error("no ray along the plane's normal meets the mesh")]
     NothingSeen,
@@ -61,7 +68,7 @@ impl DepthError {
     /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::UnitUnknown | Self::TooLarge { .. } => FailureClass::BadInput,
+            Self::UnitUnknown | Self::TooLarge { .. } | Self::Overlap(_) => FailureClass::BadInput,
             Self::NothingSeen => FailureClass::NoSolution,
         }
     }
@@ -99,9 +106,13 @@ pub fn depth(
         .inverse()
         .ok_or(DepthError::NothingSeen)?;
     let mut heights = indexed.render(&fit.plane_from_mesh, &view);
+    if indexed.overlaps_too_often() {
+        return Err(DepthError::Overlap(scan.mesh().triangles.len()));
+    }
     if let Some(bow) = &fit.bow {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
         for (y, row) in rows.enumerate() {
+            poll();
             // Conversions from 32-bit integers to floats are vectorized.
             for (x, height) in (0_i32..).zip(row) {
                 let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
@@ -164,6 +175,7 @@ fn range(heights: &Grid<f32>) -> Option<[f32; 2]> {
     let width = heights.width();
     let (mut lows, mut highs) = (vec![f32::INFINITY; width], vec![NO_HIT; width]);
     for row in heights.data().chunks_exact(width) {
+        poll();
         for ((low, high), z) in lows.iter_mut().zip(&mut highs).zip(row) {
             *low = min_f32(if *z == NO_HIT { f32::INFINITY } else { *z }, *low);
             *high = max_f32(*z, *high);

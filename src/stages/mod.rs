@@ -3,6 +3,8 @@
 //! They use no files, no SQL, no async and no clock. Each stage has its own settings, errors and entry function.
 
 mod binarize;
+#[cfg(test)]
+mod cancel_tests;
 pub mod depth;
 mod face;
 pub mod fit;
@@ -14,7 +16,6 @@ pub mod pipeline;
 mod pose;
 mod print;
 pub mod register;
-mod robust_bounds;
 mod scan;
 pub mod score;
 mod settings;

@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use super::zbuffer::IndexedSurface;
 use crate::domain::ScanRegion;
+use crate::domain::cancel::polled;
 use crate::mesh::Mesh;
 
 /// A mesh as read, and its surface, which is indexed on first use.
@@ -41,13 +42,13 @@ impl From<Mesh> for Scan {
 
 /// Returns the faces with only corners that `keeps` accepts. For a mesh without faces, returns the accepted points.
 pub(super) fn part_of(mesh: &Mesh, keeps: impl Fn([f64; 3]) -> bool) -> Mesh {
-    let kept: Vec<bool> = mesh.vertices.iter().map(keeps).collect();
-    let faces = mesh.triangles.iter().copied();
+    let kept: Vec<bool> = polled(mesh.vertices.iter()).map(keeps).collect();
+    let faces = polled(mesh.triangles.iter().copied());
     let faces: Vec<[u32; 3]> = faces
         .filter(|face| face.iter().all(|corner| kept[*corner as usize]))
         .collect();
     if mesh.triangles.is_empty() {
-        let points = mesh.vertices.iter().zip(kept);
+        let points = polled(mesh.vertices.iter()).zip(kept);
         let points = points.filter_map(|(point, kept)| kept.then_some(point));
         return Mesh {
             vertices: points.collect::<Vec<_>>().into(),
@@ -62,7 +63,7 @@ pub(super) fn of_faces(mesh: &Mesh, faces: &[[u32; 3]]) -> Mesh {
     let mut places = vec![u32::MAX; mesh.vertices.len()];
     let mut vertices = Vec::new();
     let mut renumbered = Vec::with_capacity(faces.len());
-    for face in faces {
+    for face in polled(faces) {
         renumbered.push(face.map(|corner| {
             let place = &mut places[corner as usize];
             if *place == u32::MAX {

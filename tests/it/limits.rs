@@ -3,10 +3,14 @@
 use std::process::Stdio;
 
 use mocban::domain::{FailureClass, JobStatus};
+use mocban::mesh::write::MeshFormat;
+use mocban::mesh::{self, MeshLimits};
 use mocban::store::Project;
 
-use crate::cli::{call, shell};
+use crate::cli::{call, mocban, shell};
+use crate::crowd::watched;
 use crate::resume::{attempts, pairs, project, run};
+use crate::small_block::{demo_block, few_labels};
 
 fn status(project: &Project) -> Vec<JobStatus> {
     let all = pairs(project);
@@ -175,4 +179,28 @@ fn a_low_limit_of_open_files_is_named_as_the_reason() {
         failed += usize::from(ended.code != 0);
     }
     assert!(failed > 3, "{failed}");
+}
+
+#[test]
+fn a_vertex_far_away_neither_ends_the_run_of_a_block_nor_takes_its_memory() {
+    const LIMIT_MIB: u64 = 1024;
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let dir = dir.path();
+    demo_block(dir);
+    few_labels(dir, &dir.join("few.json"));
+    let bytes = std::fs::read(dir.join("d/data/block.ply")).expect("a scan");
+    let mut mesh = mesh::read(&bytes, "block.ply", &MeshLimits::SUGGESTED).expect("a mesh");
+    let middle = mesh.vertices.len() / 2;
+    mesh.vertices.set(middle, [1e8, -1e9, 1e7]);
+    let stray = MeshFormat::PlyLittleEndian.encode(&mesh);
+    std::fs::write(dir.join("stray.ply"), stray).expect("written");
+    let import = "-C p import --block stray.ply --page d/data/page.jpg --labels few.json --name b1";
+    mocban(dir, &import.split(' ').collect::<Vec<_>>()).expect(0);
+    let (ended, kib) = watched(dir, &["-C", "p", "-q", "run", "--memory", "1G"]);
+    ended.expect(0);
+    let status = mocban(dir, &["-C", "p", "status", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(status["blocks"]["jobs"]["done"], 1, "{status}");
+    assert!(kib >> 10 < LIMIT_MIB, "{} MiB", kib >> 10);
 }

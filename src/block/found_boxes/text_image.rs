@@ -7,6 +7,7 @@ use crate::block::face_layer::FACE_CELL;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::{PageMap, points_of_row};
+use crate::domain::cancel::ThreadToken;
 use crate::raster::Grid;
 
 /// Size of a pixel, mm: that of height maps.
@@ -108,17 +109,19 @@ impl TextImage {
         let mut relief = vec![0_u8; width * height];
         let mut ink = vec![0_u8; width * height];
         let sampler = page.sampler(map.scale() * PIXEL_MM);
+        let sample_row = |y: usize, relief: &mut [u8], ink: &mut [u8]| {
+            sample_relief(side, &frame, y, relief);
+            let points = page_points(map, &frame, y);
+            for (ink, point) in ink.iter_mut().zip(points) {
+                *ink = (sampler.at(point).unwrap_or(0.0) * 255.0 + 0.5) as u8;
+            }
+        };
+        let token = ThreadToken::current();
         relief
             .par_chunks_mut(width)
             .zip(ink.par_chunks_mut(width))
             .enumerate()
-            .for_each(|(y, (relief, ink))| {
-                sample_relief(side, &frame, y, relief);
-                let points = page_points(map, &frame, y);
-                for (ink, point) in ink.iter_mut().zip(points) {
-                    *ink = (sampler.at(point).unwrap_or(0.0) * 255.0 + 0.5) as u8;
-                }
-            });
+            .for_each(|(y, (relief, ink))| token.scope(|| sample_row(y, relief, ink)));
         let relief = Grid::from_vec(width, height, relief).expect("one value for each pixel");
         let ink = Grid::from_vec(width, height, ink).expect("one value for each pixel");
         let (columns, rows) = (width.div_ceil(TRUST_CELL), height.div_ceil(TRUST_CELL));
@@ -197,18 +200,20 @@ type Sums = [f64; 6];
 fn compare(relief: &Grid<u8>, ink: &Grid<u8>, on_page: &Grid<bool>) -> Grid<Trust> {
     let (columns, rows) = (on_page.width(), on_page.height());
     let mut cells = vec![[0.0; 6]; columns * rows];
+    let token = ThreadToken::current();
+    let add_rows = |cell_y: usize, cells: &mut [Sums]| {
+        for y in cell_y * TRUST_CELL..((cell_y + 1) * TRUST_CELL).min(relief.height()) {
+            let relief = relief.row(y).chunks(TRUST_CELL);
+            let ink = ink.row(y).chunks(TRUST_CELL);
+            for ((sums, relief), ink) in cells.iter_mut().zip(relief).zip(ink) {
+                add(sums, relief, ink);
+            }
+        }
+    };
     cells
         .par_chunks_mut(columns)
         .enumerate()
-        .for_each(|(cell_y, cells)| {
-            for y in cell_y * TRUST_CELL..((cell_y + 1) * TRUST_CELL).min(relief.height()) {
-                let relief = relief.row(y).chunks(TRUST_CELL);
-                let ink = ink.row(y).chunks(TRUST_CELL);
-                for ((sums, relief), ink) in cells.iter_mut().zip(relief).zip(ink) {
-                    add(sums, relief, ink);
-                }
-            }
-        });
+        .for_each(|(cell_y, cells)| token.scope(|| add_rows(cell_y, cells)));
     let cells = Grid::from_vec(columns, rows, cells).expect("sums of each cell");
     Grid::from_fn(columns, rows, |x, y| {
         let mut around = [0.0; 6];

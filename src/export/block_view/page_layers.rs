@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::block::{CarvedFace, PageInk, PageMap};
+use crate::domain::cancel::ThreadToken;
 use crate::domain::enum_names;
 use crate::export::pictures::{BLUE, Rgb, VERMILLION, resized, shaded};
 use crate::raster::{Grid, jpeg_rgb8};
@@ -201,11 +202,14 @@ impl FacePlaces {
         let step = region.size[0] as f64 / size[0] as f64;
         let first = region.corner.map(|at| at as f64 + step / 2.0 - 0.5);
         let [columns, rows] = size.map(|side| side / NODE_STEP + 2);
+        let token = ThreadToken::current();
         let places: Vec<[f64; 2]> = (0..columns * rows)
             .into_par_iter()
             .map(|k| {
-                let pixel = [k % columns, k / columns].map(|at| (at * NODE_STEP) as f64 * step);
-                map.face_from_page([first[0] + pixel[0], first[1] + pixel[1]])
+                token.scope(|| {
+                    let pixel = [k % columns, k / columns].map(|at| (at * NODE_STEP) as f64 * step);
+                    map.face_from_page([first[0] + pixel[0], first[1] + pixel[1]])
+                })
             })
             .collect();
         Self {
@@ -219,7 +223,8 @@ impl FacePlaces {
     /// Computes each pixel from its place on the face in mm and its place on the page in pixels.
     fn picture<T: Copy + Send>(&self, pixel: impl Fn([f64; 2], [f64; 2]) -> T + Sync) -> Grid<T> {
         let [width, height] = self.size;
-        let (row, pixel) = (|y: usize| self.row(y), &pixel);
+        let token = ThreadToken::current();
+        let (row, pixel) = (|y: usize| token.scope(|| self.row(y)), &pixel);
         let data: Vec<T> = (0..height)
             .into_par_iter()
             .flat_map_iter(|y| {

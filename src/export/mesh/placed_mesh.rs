@@ -1,6 +1,7 @@
 //! A scan in the frame of exported meshes, with the colours of the print and stroke labels.
 
 use super::placement::MeshPlacement;
+use crate::domain::cancel::polled;
 use crate::export::pictures::Rgb;
 use crate::mesh::Mesh;
 
@@ -33,7 +34,7 @@ impl PlacedMesh {
             strokes: Vec::with_capacity(count),
             source: mesh,
         };
-        for vertex in placed.source.vertices.iter() {
+        for vertex in polled(placed.source.vertices.iter()) {
             let point = placement.place(vertex);
             placed.positions.push(point.position.map(|c| c as f32));
             placed.pixels.push(point.pixel.map(|c| c as f32));

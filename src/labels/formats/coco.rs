@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use crate::labels::error::LabelsProblem;
 use crate::labels::model::PageFile;
 use crate::labels::page_choice::{PageEntry, choose_page};
+use crate::labels::page_fit::check_count;
 use crate::labels::region::{
     Corners, LabelRegion, PageRegions, class_text, coordinate, filled, name_attribute, object,
     polygon, shown, sized_box, text_attribute,
@@ -63,6 +64,7 @@ pub(in crate::labels) fn read(
     let chosen = choose_page(&entries, page)?;
     let image = images[chosen];
     let categories = categories(list("categories"));
+    check_count(of_image(image).len())?;
     let annotations = of_image(image).iter().enumerate();
     let regions = annotations.map(|(k, annotation)| read_region(k + 1, annotation, &categories));
     Ok(PageRegions {

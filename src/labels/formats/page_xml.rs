@@ -5,8 +5,10 @@ use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 use quick_xml::reader::Reader;
 
+use crate::domain::cancel::{PollCounter, polled};
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::{line_at, quoted};
+use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, checked, filled, polygon};
 
 /// Elements that may stand for characters, the smallest first.
@@ -39,7 +41,9 @@ struct PageParser {
 pub(in crate::labels) fn read(text: &str) -> Result<PageRegions, LabelsProblem> {
     let mut reader = Reader::from_str(text);
     let mut parser = PageParser::default();
+    let mut counter = PollCounter::default();
     loop {
+        counter.tick();
         let event = reader.read_event();
         let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
         let event = event.map_err(|error| match error {
@@ -140,7 +144,7 @@ impl PageParser {
                 let (x, y) = (attribute(element, "x")?, attribute(element, "y")?);
                 let point = format!("{},{}", x.unwrap_or_default(), y.unwrap_or_default());
                 let corners = self.points(&point)?;
-                self.add_corners(corners);
+                self.add_corners(corners)?;
             }
             _ => {}
         }
@@ -186,11 +190,20 @@ impl PageParser {
             let [x, y] = point(word).ok_or_else(|| format!("{} is not a point", quoted(word)))?;
             Ok([checked(x, "x")?, checked(y, "y")?])
         };
-        let points = text
-            .split_whitespace()
-            .map(point)
-            .collect::<Result<_, String>>();
+        let words = polled(text.split_whitespace()).take(MAX_CORNERS + 1);
+        let points = words.map(point).collect::<Result<Corners, String>>();
+        if points
+            .as_ref()
+            .is_ok_and(|points| points.len() > MAX_CORNERS)
+        {
+            return Err(self.too_many_corners());
+        }
         points.map_err(|reason| XmlProblem::Content(LabelsProblem::at(self.place(), reason)))
+    }
+
+    fn too_many_corners(&self) -> XmlProblem {
+        let (place, limit) = (self.place(), MAX_CORNERS);
+        XmlProblem::Content(LabelsProblem::TooManyCorners { place, limit })
     }
 
     /// Returns the innermost open element that has an id, for a message.
@@ -214,12 +227,19 @@ impl PageParser {
     }
 
     /// Adds corners to the element around the open `Coords`; points of other elements, such as baselines, are ignored.
-    fn add_corners(&mut self, corners: Corners) {
+    fn add_corners(&mut self, corners: Corners) -> Result<(), XmlProblem> {
+        let mut count = 0;
         if let [.., element, coords] = self.open.as_mut_slice()
             && coords.name == "Coords"
         {
-            element.corners.get_or_insert_default().extend(corners);
+            let all = element.corners.get_or_insert_default();
+            all.extend(corners);
+            count = all.len();
         }
+        if count > MAX_CORNERS {
+            return Err(self.too_many_corners());
+        }
+        Ok(())
     }
 
     /// Adds a part of the text inside `Unicode`, which is inside `TextEquiv` inside the element that it belongs to.
@@ -262,6 +282,7 @@ impl PageParser {
         };
         if let Some(level) = LEVELS.iter().position(|level| **level == element.name) {
             let found = &mut self.found[level];
+            check_count(found.len() + 1).map_err(XmlProblem::Content)?;
             found.push(LabelRegion {
                 number: found.len() + 1,
                 name: element.id,

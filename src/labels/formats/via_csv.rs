@@ -6,10 +6,12 @@ use csv::StringRecord;
 use serde_json::{Map, Value};
 
 use super::via_shape::region;
+use crate::domain::cancel::polled;
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::line_at;
 use crate::labels::model::PageFile;
 use crate::labels::page_choice::{PageEntry, choose_page};
+use crate::labels::page_fit::check_count;
 use crate::labels::region::PageRegions;
 
 /// Column of shapes, by which the format is recognized.
@@ -46,7 +48,7 @@ pub(in crate::labels) fn read(
     let mut images: Vec<PageEntry> = Vec::new();
     let mut rows: Vec<(usize, StringRecord)> = Vec::new();
     let mut known = HashMap::new();
-    for row in reader.records() {
+    for row in polled(reader.records()) {
         let row = row.map_err(|error| damaged(&error))?;
         if row.len() < columns.count {
             let (found, wanted) = (row.len(), columns.count);
@@ -74,7 +76,8 @@ pub(in crate::labels) fn read(
     let chosen = choose_page(&images, page)?;
     let entry = images.swap_remove(chosen);
     let mut regions = Vec::new();
-    for (_, row) in rows.iter().filter(|(image, _)| *image == chosen) {
+    for (_, row) in polled(&rows).filter(|(image, _)| *image == chosen) {
+        check_count(regions.len() + 1)?;
         let cell = |column: usize| {
             let object = cell_object(row, column);
             object.map_err(|reason| LabelsProblem::at(line_of(text, row), reason))

@@ -7,6 +7,7 @@ use crate::labels::error::LabelsProblem;
 use crate::labels::message::quoted;
 use crate::labels::model::{LabelFormat, PageFile};
 use crate::labels::page_choice::{PageEntry, choose_page};
+use crate::labels::page_fit::check_count;
 use crate::labels::region::{LabelRegion, PageRegions, object, shown};
 
 /// Key of the images in a project.
@@ -44,6 +45,7 @@ pub(in crate::labels) fn read(
             format!("regions are {found}"),
         )
     })?;
+    check_count(all.len())?;
     let mut regions = Vec::with_capacity(all.len());
     for (k, value) in all.into_iter().enumerate() {
         regions.push(read_region(k + 1, value)?);

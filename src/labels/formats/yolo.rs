@@ -1,12 +1,17 @@
 //! YOLO text: one region per line, in fractions of the page.
 
+use crate::domain::cancel::polled;
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::quoted;
 use crate::labels::model::PageFile;
+use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, box_between, polygon};
 
 /// Fractions beyond this are taken for pixels.
 const MAX_FRACTION: f64 = 2.0;
+
+/// Words of a line with the longest outline: a class, the corners and a confidence.
+const MAX_WORDS: usize = 2 * MAX_CORNERS + 2;
 
 /// Returns whether a line has at least a class and four numbers.
 pub(in crate::labels) fn is_region(line: &str) -> bool {
@@ -22,9 +27,16 @@ pub(in crate::labels) fn read(
 ) -> Result<PageRegions, LabelsProblem> {
     let mut regions = Vec::new();
     for (k, line) in text.lines().enumerate() {
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let words: Vec<&str> = polled(line.split_ascii_whitespace())
+            .take(MAX_WORDS + 1)
+            .collect();
         if words.is_empty() {
             continue;
+        }
+        check_count(regions.len() + 1)?;
+        if words.len() > MAX_WORDS {
+            let (place, limit) = (format!("line {}", k + 1), MAX_CORNERS);
+            return Err(LabelsProblem::TooManyCorners { place, limit });
         }
         let corners = corners(&words, page);
         regions.push(LabelRegion {

@@ -1,6 +1,7 @@
 //! Straightening of a page from the centres of its boxes: rotation, keystone, and columns that are bent.
 
 use super::spot::Spot;
+use crate::domain::cancel::polled;
 
 /// Largest angle that is searched, in degrees.
 const MAX_DEGREES: f64 = 6.0;
@@ -176,7 +177,7 @@ impl BendFrame {
 
     /// Returns the sum of squared counts of boxes that share a place sideways without a bend.
     fn sharpness(self, spots: &[Spot], bend: PageBend) -> f64 {
-        let places = spots.iter().map(|spot| self.straightened(spot, bend).u);
+        let places = polled(spots).map(|spot| self.straightened(spot, bend).u);
         let places: Vec<f64> = places.collect();
         let first = places.iter().copied().fold(f64::INFINITY, f64::min);
         let last = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -1,5 +1,7 @@
 //! Single-pass parser of OBJ text: `v` lines with decimal numbers, `f` lines with any form of index.
 
+use crate::domain::cancel::{PollCounter, polled};
+use crate::mesh::error::MeshLimits;
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
@@ -31,9 +33,9 @@ pub(super) struct ParsedObj {
     is_finite: bool,
 }
 
-/// Parses a file. Returns `None` if its lines end in CR only, a line is continued on the next, or a `v` or `f` line
+/// Parses a file, up to the vertex or face that exceeds the limits. Returns `None` if its lines end in CR only, a line is continued on the next, or a `v` or `f` line
 /// contains an invalid number or index.
-pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
+pub(super) fn parse(bytes: &[u8], limits: &MeshLimits) -> Option<ParsedObj> {
     // Lines of classic Mac OS end in a carriage return only.
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
         return None;
@@ -44,7 +46,9 @@ pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
         rest: bytes,
         is_finite: true,
     };
-    while !cursor.rest.is_empty() {
+    let mut counter = PollCounter::default();
+    while !cursor.rest.is_empty() && limits.allow(vertices.len(), triangles.len()) {
+        counter.tick();
         cursor.skip_space();
         match cursor.rest {
             [b'v', space, rest @ ..] if is_space(*space) => {
@@ -53,7 +57,7 @@ pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
             }
             [b'f', space, rest @ ..] if is_space(*space) => {
                 cursor.rest = rest;
-                cursor.face(vertices.len(), &mut triangles)?;
+                cursor.face(vertices.len(), &mut triangles, limits)?;
             }
             _ => {}
         }
@@ -163,12 +167,19 @@ impl LineCursor<'_> {
     }
 
     /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner.
-    /// `vertices` is the number of vertices parsed so far. Polygons of fewer than three corners add nothing.
-    fn face(&mut self, vertices: usize, triangles: &mut PageVec<[u32; 3]>) -> Option<()> {
+    /// `vertices` is the number of vertices parsed so far. Polygons of fewer than three corners add nothing. Stops at the
+    /// first triangle that exceeds the limits.
+    fn face(
+        &mut self,
+        vertices: usize,
+        triangles: &mut PageVec<[u32; 3]>,
+        limits: &MeshLimits,
+    ) -> Option<()> {
         let (mut first, mut last) = (0, 0);
-        for count in 0.. {
+        for count in polled(0..) {
             self.skip_space();
-            if let [] | [b'\n' | b'#', ..] = self.rest {
+            let is_end = matches!(self.rest, [] | [b'\n' | b'#', ..]);
+            if is_end || triangles.len() as u64 > limits.max_triangles {
                 break;
             }
             let corner = self.corner(vertices)?;
@@ -236,7 +247,7 @@ fn in_order_of_use(
     const UNUSED: u32 = u32::MAX;
     let mut new_index = vec![UNUSED; all.len()];
     let mut vertices = PageVec::with_capacity(all.len());
-    for index in triangles.as_flattened_mut() {
+    for index in polled(triangles.as_flattened_mut()) {
         let new = new_index.get_mut(*index as usize)?;
         if *new == UNUSED {
             *new = vertices.len() as u32;

@@ -243,7 +243,8 @@ fn usual_files_are_read_in_one_pass() {
             "f 4/1 2//1 -2 +1",
             "",
         ];
-        let parsed = parser::parse(lines.join(end).as_bytes()).expect("a usual file");
+        let parsed = parser::parse(lines.join(end).as_bytes(), &MeshLimits::SUGGESTED)
+            .expect("a usual file");
         let mesh = parsed.into_mesh().expect("indices in range");
         assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);

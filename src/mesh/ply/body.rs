@@ -2,6 +2,7 @@
 
 use super::header::{PlyElement, PlyHeader, PlyScalar, PlyType};
 use super::source::{BodyFault, NumberSource};
+use crate::domain::cancel::PollCounter;
 use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
@@ -27,6 +28,7 @@ pub(super) fn read(
         mesh: Mesh::default(),
         row: 0,
         values: Vec::new(),
+        counter: PollCounter::default(),
     };
     for element in &header.elements {
         body.element(element)?;
@@ -53,6 +55,7 @@ struct BodyReader<'a, S> {
     row: u64,
     /// Values of the current row.
     values: Vec<f64>,
+    counter: PollCounter,
 }
 
 impl<S: NumberSource> BodyReader<'_, S> {
@@ -126,6 +129,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
             self.packed_vertices(element.rows)?;
         }
         while self.row < element.rows {
+            self.counter.tick();
             self.read_values(element)?;
             let count = self.mesh.vertices.len() as u64 + 1;
             let position = error::check_finite(columns.map(|column| self.values[column]), count)?;
@@ -143,6 +147,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
     fn packed_vertices(&mut self, rows: u64) -> Result<(), MeshError> {
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
         while self.row < rows {
+            self.counter.add(CHUNK_ROWS as u32);
             chunk.clear();
             let most = (rows - self.row).min(CHUNK_ROWS as u64) as usize;
             self.source.packed_positions(most, &mut chunk);
@@ -199,6 +204,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
 
     fn skip_rows(&mut self, element: &PlyElement) -> Result<(), BodyFault> {
         while self.row < element.rows {
+            self.counter.tick();
             for property in &element.properties {
                 self.skip(property.shape)?;
             }
@@ -223,6 +229,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
         }
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
         while self.row < element.rows {
+            self.counter.add(CHUNK_ROWS as u32);
             chunk.clear();
             if packed.is_some() {
                 let most = (element.rows - self.row).min(CHUNK_ROWS as u64) as usize;
@@ -301,6 +308,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
     ) -> Result<(), BodyFault> {
         let mut joined = CornerJoiner::default();
         for _ in 0..self.list_length(count)? {
+            self.counter.tick();
             let index = self.source.next(item)?;
             if kind == FaceKind::Strips && index == -1.0 {
                 joined = CornerJoiner::default();

@@ -1,6 +1,7 @@
 //! Readers of the numbers in a PLY body: words of text, or bytes in either byte order.
 
 use super::header::{PlyElement, PlyScalar};
+use crate::domain::cancel::polled;
 use crate::mesh::error::MeshError;
 use crate::mesh::text;
 
@@ -64,7 +65,7 @@ impl NumberSource for AsciiSource<'_> {
     }
 
     fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault> {
-        for _ in 0..count {
+        for _ in polled(0..count) {
             self.next(kind)?;
         }
         Ok(())

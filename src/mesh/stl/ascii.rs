@@ -1,5 +1,6 @@
 //! ASCII STL: nested keywords, one a line.
 
+use crate::domain::cancel::polled;
 use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::Mesh;
@@ -100,7 +101,7 @@ impl AsciiParser {
     fn end_facet(&mut self, limits: &MeshLimits) -> Result<(), MeshError> {
         self.facets += 1;
         if let [first, rest @ ..] = self.loop_corners.as_slice() {
-            for pair in rest.windows(2) {
+            for pair in polled(rest.windows(2)) {
                 self.vertices.extend([*first, pair[0], pair[1]]);
             }
         }

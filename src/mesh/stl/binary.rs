@@ -2,6 +2,7 @@
 
 use std::io::{self, Read};
 
+use crate::domain::cancel::poll;
 use crate::mesh::error::{self, MeshError, MeshLimits, MeshReadError};
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::{PageVec, fill};
@@ -15,6 +16,8 @@ pub(crate) const FACET: usize = 50;
 /// Facets that are checked at a time, and read from a file at a time.
 const CHECKED_FACETS: usize = 128;
 const READ_FACETS: usize = 1280;
+/// Parts of [`CHECKED_FACETS`] between two polls for a cancellation.
+const PARTS_PER_POLL: usize = 128;
 
 /// Returns the count in the header; `None` if the file ends before it.
 pub(crate) fn binary_count(bytes: &[u8]) -> Option<u32> {
@@ -111,7 +114,10 @@ impl FacetBuffer {
     }
 
     fn push(&mut self, facets: &[[u8; FACET]]) -> Result<(), MeshError> {
-        for facets in facets.chunks(CHECKED_FACETS) {
+        for (part, facets) in facets.chunks(CHECKED_FACETS).enumerate() {
+            if part.is_multiple_of(PARTS_PER_POLL) {
+                poll();
+            }
             self.chunk.clear();
             for facet in facets {
                 self.chunk.extend(corners(facet));

@@ -13,6 +13,7 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::domain::FileKind;
+use crate::domain::cancel::PolledReader;
 
 use error::broken;
 use print_image::colours_on_white;
@@ -108,7 +109,7 @@ fn decode_pixels(
             DecodeError::Truncated(kind)
         }
     };
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut reader = ImageReader::with_format(PolledReader(Cursor::new(bytes)), format);
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);

@@ -2,6 +2,7 @@
 
 use image::DynamicImage;
 
+use crate::domain::cancel::{poll, polled};
 use crate::raster::Grid;
 
 /// A print in 16-bit red, green and blue. Values of 8-bit files are multiplied by 257, so that white is always 65535.
@@ -32,12 +33,23 @@ const fn widen(value: u8) -> u16 {
 
 pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let colours = match image {
-        DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [widen(p[0]); 3]).collect(),
-        DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(widen)).collect(),
+    let mut colours = Vec::with_capacity(width * height);
+    match image {
+        DynamicImage::ImageLuma8(i) => {
+            for row in i.rows() {
+                poll();
+                colours.extend(row.map(|p| [widen(p[0]); 3]));
+            }
+        }
+        DynamicImage::ImageRgb8(i) => {
+            for row in i.rows() {
+                poll();
+                colours.extend(row.map(|p| p.0.map(widen)));
+            }
+        }
         // The cost of a copy does not matter for other kinds (16 bits, transparency, floats in 0..=1), which are rare.
-        other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
-    };
+        other => colours.extend(polled(other.to_rgba16().pixels()).map(|p| on_white(p.0))),
+    }
     // An image of w x h pixels has as many colours.
     Grid::from_vec(width, height, colours).expect("one colour for each pixel")
 }

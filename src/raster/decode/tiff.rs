@@ -12,6 +12,7 @@ use super::print_image::on_white;
 use super::tiff_pages::TiffBytes;
 use super::{DecodeError, ImageLimits};
 use crate::domain::FileKind;
+use crate::domain::cancel::poll;
 use crate::raster::Grid;
 
 /// Layout of the pixels according to the tags.
@@ -217,6 +218,7 @@ fn full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeE
 fn float_full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeError> {
     let (mut least, mut most, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
     for y in 0..layout.height as usize {
+        poll();
         for x in 0..layout.width as usize {
             for value in (0..layout.colours).map(|sample| samples.at(x, y, sample)) {
                 if !value.is_finite() {
@@ -245,6 +247,7 @@ fn pixels(layout: &TiffLayout, samples: &TiffSamples) -> Result<Grid<[u16; 3]>, 
     let full = full_scale(layout, samples)?;
     let mut out = Grid::new(layout.width as usize, layout.height as usize, [0; 3]);
     for y in 0..out.height() {
+        poll();
         for x in 0..out.width() {
             let level = |sample| {
                 let share = (samples.at(x, y, sample) / full).clamp(0.0, 1.0);

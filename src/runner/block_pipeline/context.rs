@@ -17,6 +17,8 @@ pub(super) struct StageContext<'a> {
     pub(super) stop: &'a AtomicBool,
     pub(super) mesh_limits: &'a MeshLimits,
     pub(super) image_limits: &'a ImageLimits,
+    /// Largest height map, in pixels.
+    pub(super) max_map_pixels: usize,
 }
 
 impl StageContext<'_> {

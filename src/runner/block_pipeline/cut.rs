@@ -13,6 +13,7 @@ use crate::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
+use crate::domain::cancel::{ThreadToken, poll};
 use crate::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
 use crate::mesh::write::MeshFormat;
 use crate::raster::png_rgb8;
@@ -46,16 +47,18 @@ pub(super) fn cut(
         .ok_or(BlockStageError::RerunFrom(BlockStage::Boxes))?;
     let turns = map.quarter_turns();
     let margin_px = CUT_MARGIN_MM * aligned.px_per_mm;
+    let token = ThreadToken::current();
+    let cut_print_of = |character: &PlacedCharacter| -> Result<CutPrint, BlockStageError> {
+        let bounds = character.label.page_box;
+        let Some(crop) = cut_print(&page.image, bounds, margin_px, turns) else {
+            return Ok(Err("its box lies outside the page".to_owned()));
+        };
+        let role = format!("{}.png", character.label.name);
+        let print = context.artifacts.write(&role, "png", png_rgb8(&crop.rgb))?;
+        Ok(Ok((print, crop)))
+    };
     let prints: Vec<CutPrint> = (boxes.characters.par_iter())
-        .map(|character| {
-            let bounds = character.label.page_box;
-            let Some(crop) = cut_print(&page.image, bounds, margin_px, turns) else {
-                return Ok(Err("its box lies outside the page".to_owned()));
-            };
-            let role = format!("{}.png", character.label.name);
-            let print = context.artifacts.write(&role, "png", png_rgb8(&crop.rgb))?;
-            Ok(Ok((print, crop)))
-        })
+        .map(|character| token.scope(|| cut_print_of(character)))
         .collect::<Result<_, BlockStageError>>()?;
     let meshes = meshes(
         context,
@@ -117,6 +120,7 @@ fn meshes(
     let mut written = Vec::with_capacity(characters.len());
     let mut failure = None;
     let outcome = cut_meshes(&mut stream, plan, &mut spill, |number, mesh| {
+        poll();
         if mesh.triangles.len() < MIN_TRIANGLES {
             written.push(Err("the scan shows no surface at its box".to_owned()));
             return Ok(());

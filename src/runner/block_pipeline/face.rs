@@ -18,8 +18,9 @@ pub(super) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
     let scan = &context.inputs.mesh;
     let fail = |error: BlockError| failed(scan, error);
     let mut mesh = ScanStream::open(scan, context.mesh_limits, context.stop)?;
-    let frame = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
-    let maps = draw_height_maps(&mut mesh, &frame).map_err(|error| fail(error.into()))?;
+    let (frame, part) = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
+    let maps =
+        draw_height_maps(&mut mesh, (&frame, &part), context.max_map_pixels).map_err(fail)?;
     drop(mesh);
     let mut faces = Vec::new();
     for (side, map) in [BlockSide::Front, BlockSide::Back].into_iter().zip(maps) {

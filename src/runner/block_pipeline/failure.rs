@@ -25,9 +25,10 @@ pub(super) fn failed(file: &BlockFile, error: BlockError) -> BlockStageError {
         BlockError::Mesh(MeshReadError::Io(error)) if is_stop(&error) => BlockStageError::Stopped,
         BlockError::Mesh(MeshReadError::Io(error)) => file.unreadable(error),
         BlockError::Mesh(MeshReadError::Mesh(error)) => file.failed(error.class(), error),
-        BlockError::NoArea { .. } | BlockError::NoFaces { .. } => {
-            file.failed(FailureClass::BadInput, error)
-        }
+        BlockError::NoArea { .. }
+        | BlockError::NoFaces { .. }
+        | BlockError::TooLarge { .. }
+        | BlockError::Overlap { .. } => file.failed(FailureClass::BadInput, error),
         BlockError::NoFace { .. } | BlockError::NoInk { .. } | BlockError::Refused { .. } => {
             file.failed(FailureClass::NoSolution, error)
         }

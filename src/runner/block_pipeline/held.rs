@@ -16,6 +16,17 @@ pub(super) struct HeldInputs {
     page: Mutex<Option<Arc<HeldPage>>>,
 }
 
+/// Forgets the inputs when it is dropped, also if a stage is cancelled or panics.
+pub(super) struct HeldGuard<'a>(pub(super) Option<&'a HeldInputs>);
+
+impl Drop for HeldGuard<'_> {
+    fn drop(&mut self) {
+        if let Some(held) = self.0 {
+            held.clear();
+        }
+    }
+}
+
 /// The faces of a block.
 pub(super) type HeldFaces = Arc<Vec<(BlockSide, CarvedFace)>>;
 

@@ -15,7 +15,8 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use self::context::StageContext;
-use self::held::HeldInputs;
+use self::held::{HeldGuard, HeldInputs};
+use super::block_memory::max_map_pixels;
 use super::block_stages::{
     BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
 };
@@ -32,6 +33,7 @@ const REVISIONS: [u32; 4] = [1, 1, 2, 2];
 pub(super) struct BlockPipeline {
     mesh_limits: MeshLimits,
     image_limits: ImageLimits,
+    max_map_pixels: usize,
     /// Inputs of the last stage, which the next stage of the same block reads again.
     held: HeldInputs,
 }
@@ -42,6 +44,7 @@ impl BlockPipeline {
         Self {
             mesh_limits: options.mesh_limits,
             image_limits: options.image_limits,
+            max_map_pixels: max_map_pixels(options.memory),
             held: HeldInputs::default(),
         }
     }
@@ -67,15 +70,22 @@ impl BlockStages for BlockPipeline {
             stop,
             mesh_limits: &self.mesh_limits,
             image_limits: &self.image_limits,
+            max_map_pixels: self.max_map_pixels,
         };
+        let mut forgets = HeldGuard(Some(&self.held));
         let outcome = match stage {
             BlockStage::Face => face::face(&context),
             BlockStage::Align => align::align(&context, &self.held),
             BlockStage::Boxes => boxes::boxes(&context, &self.held),
             BlockStage::Cut => cut::cut(&context, &self.held),
         };
-        if stage == BlockStage::Cut || matches!(outcome, Err(BlockStageError::Failed { .. })) {
-            self.held.clear();
+        let goes_on = match &outcome {
+            Ok(_) => stage != BlockStage::Cut,
+            Err(BlockStageError::RerunFrom(_) | BlockStageError::Store(_)) => true,
+            Err(BlockStageError::Failed { .. } | BlockStageError::Stopped) => false,
+        };
+        if goes_on {
+            forgets.0 = None;
         }
         outcome
     }

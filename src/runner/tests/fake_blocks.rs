@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 
+use super::fake_executor::compute_without_end;
 use super::gate::Gate;
 use crate::domain::{BlockStage, BlockStageRecord, Failure, FailureClass};
 use crate::runner::{
@@ -24,6 +25,8 @@ pub(super) struct FakeBlocks {
     pub(super) revision: AtomicU32,
     /// Stages of some blocks wait until this is opened.
     gate: Gate,
+    /// Stages that compute without end and have not been cancelled yet.
+    pub(super) endless: Arc<AtomicUsize>,
 }
 
 impl FakeBlocks {
@@ -49,6 +52,7 @@ impl FakeBlocks {
             "loses" if stage == BlockStage::Boxes && tries == 1 => {
                 Err(BlockStageError::RerunFrom(BlockStage::Face))
             }
+            "loops" if stage == BlockStage::Align => compute_without_end(&self.endless),
             "waits" if stage == BlockStage::Align => {
                 self.gate.wait();
                 Ok(())

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use serde_json::json;
 
 use super::gate::Gate;
 use super::values;
 use crate::catalog::InputVersion;
+use crate::domain::cancel::poll;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
 use crate::runner::pair_context::PairContext;
 use crate::runner::stage_executor::StageExecutor;
@@ -27,6 +28,33 @@ pub(super) struct FakeExecutor {
     pub(super) project: OnceLock<Project>,
     /// Stages of some pairs wait until this is opened.
     gate: Gate,
+    /// Stages that compute without end and have not been cancelled yet.
+    pub(super) endless: Arc<AtomicUsize>,
+}
+
+/// Counts a computation while it goes on.
+struct Counted(Arc<AtomicUsize>);
+
+impl Counted {
+    fn new(count: &Arc<AtomicUsize>) -> Self {
+        count.fetch_add(1, Ordering::SeqCst);
+        Self(Arc::clone(count))
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Computes until it is cancelled.
+pub(super) fn compute_without_end(endless: &Arc<AtomicUsize>) -> ! {
+    let _counted = Counted::new(endless);
+    loop {
+        poll();
+        std::hint::spin_loop();
+    }
 }
 
 impl FakeExecutor {
@@ -66,6 +94,7 @@ impl FakeExecutor {
             "loses" if stage == Stage::Register && tries == 1 => {
                 Err(ExecutionError::RerunFrom(Stage::Depth))
             }
+            "loops" if stage == Stage::Fit => compute_without_end(&self.endless),
             "lasts" if stage == Stage::Register => {
                 self.gate.wait();
                 Ok(())

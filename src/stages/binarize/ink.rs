@@ -2,6 +2,7 @@
 
 use super::background::{self, NARROW, STROKE};
 use super::polarity::polarity;
+use crate::domain::cancel::poll;
 use crate::raster::components::{ConnectedComponents, remove_specks};
 use crate::raster::otsu::{self, Split};
 use crate::raster::{Grid, Mask, PrintImage};
@@ -206,8 +207,13 @@ fn binarize_even(
 
 /// Returns the values of the known pixels.
 fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
-    let pairs = grey.data().iter().zip(known.data());
-    pairs.filter(|(_, k)| **k).map(|(g, _)| *g).collect()
+    let mut values = Vec::new();
+    for (y, greys) in grey.data().chunks(grey.width().max(1)).enumerate() {
+        poll();
+        let pairs = greys.iter().zip(known.row(y));
+        values.extend(pairs.filter(|(_, k)| **k).map(|(g, _)| *g));
+    }
+    values
 }
 
 /// Returns the mask of ink and background. White areas at the border are left out, unless the background is white too.

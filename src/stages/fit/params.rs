@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::domain::FailureClass;
+use crate::stages::zbuffer::LARGEST_OVERLAP;
 
 /// Settings of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,6 +31,9 @@ pub enum FitError {
     /// Fewer than three points.
     #[error("mesh has {0} vertices, a plane needs 3")]
     TooFewPoints(usize),
+    /// Coordinates whose squares are no finite numbers.
+    #[error("the coordinates of the {0} vertices are too large to compute with; check the unit")]
+    TooLarge(usize),
     /// Every vertex at one place.
     #[error("all {0} vertices lie at one point")]
     OnePoint(usize),
@@ -42,6 +46,12 @@ pub enum FitError {
     /// Renderings of the mesh cover fewer than 16 pixels.
     #[error("mesh of {0} vertices shows no surface from either side")]
     NoSurface(usize),
+    /// Large triangles overlap too often to be drawn.
+    #[error(
+        "its {0} triangles overlap more than {LARGEST_OVERLAP} times, or most are slivers across the scan; remove repeated \
+         faces or remesh the scan"
+    )]
+    Overlap(usize),
     /// Nothing is carved.
     #[error(
         "no carving found: the likeliest side has a relief of {relief:.4} on an extent of {extent:.4} (mesh units), a \

@@ -4,8 +4,9 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::params::FitError;
 use crate::domain::Rigid3;
+use crate::domain::cancel::polled;
 use crate::mesh::Mesh;
-use crate::stages::robust_bounds::is_in_box;
+use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
 /// A mesh without faces needs at least this many points, about 25 along a side, to show one or two strokes.
@@ -24,13 +25,13 @@ impl Axes {
     pub(crate) fn of_points(points: impl Iterator<Item = ([f64; 3], f64)> + Clone) -> Self {
         let mut total = 0.0;
         let mut sum = Vector3::zeros();
-        for (p, w) in points.clone() {
+        for (p, w) in polled(points.clone()) {
             total += w;
             sum += Vector3::from(p) * w;
         }
         let centre = sum / total;
         let mut spread = Matrix3::zeros();
-        for (p, w) in points {
+        for (p, w) in polled(points) {
             let d = Vector3::from(p) - centre;
             spread += d * d.transpose() * w;
         }
@@ -47,6 +48,14 @@ impl Axes {
     }
 
     fn from_moments(centre: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
+        if !covariance.iter().all(|value| value.is_finite()) {
+            // The matrix has no eigenvalues.
+            return Self {
+                centre,
+                directions: [Vector3::x(), Vector3::y(), Vector3::z()],
+                variances: [f64::NAN; 3],
+            };
+        }
         let eigen = SymmetricEigen::new(covariance);
         let mut order = [0, 1, 2];
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
@@ -62,6 +71,9 @@ impl Axes {
         let count = mesh.vertices.len();
         let scale = self.centre.norm_squared().max(1e-300);
         let [first, second, _] = self.variances;
+        if !first.is_finite() {
+            return Err(FitError::TooLarge(count));
+        }
         if first <= scale * 1e-24 {
             return Err(FitError::OnePoint(count));
         }

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::domain::PrintOutline;
+use crate::domain::cancel::poll;
 use crate::raster::components::ConnectedComponents;
 use crate::raster::{Mask, PixelBox};
 
@@ -97,6 +98,7 @@ fn cells(ink: &Mask, bounds: PixelBox, cell: f64) -> Mask {
     let count = |side: usize| (side as f64 / cell).ceil() as usize;
     let mut cells = Mask::new(count(bounds.width()), count(bounds.height()), false);
     for y in bounds.y0..=bounds.y1 {
+        poll();
         for (x, is_ink) in ink.row(y)[bounds.x0..=bounds.x1].iter().enumerate() {
             if *is_ink {
                 let at = |k: usize| (k as f64 / cell) as usize;

@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
 use super::pca::Axes;
+use crate::domain::cancel::{PollCounter, polled};
 use crate::mesh::Mesh;
-use crate::stages::robust_bounds::is_in_box;
+use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::scan::{of_faces, part_of};
 use crate::stages::zbuffer::IndexedSurface;
 
@@ -104,7 +105,7 @@ pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
     let points = mesh.position_numbers();
     // Number of faces at each point, and how many of them are narrow there.
     let mut faces = vec![[0_u32; 2]; mesh.vertices.len()];
-    for face in &mesh.triangles {
+    for face in polled(&mesh.triangles) {
         let at = corners(mesh, face);
         let edge = |from: usize, to: usize| (at[to % 3] - at[from % 3]).norm();
         for k in 0..3 {
@@ -119,7 +120,7 @@ pub(super) fn without_spikes(mesh: &Mesh) -> Mesh {
         2 * narrow > all
     };
     let is_kept = |face: &&[u32; 3]| !face.iter().any(is_spike);
-    let kept: Vec<[u32; 3]> = mesh.triangles.iter().filter(is_kept).copied().collect();
+    let kept: Vec<[u32; 3]> = polled(&mesh.triangles).filter(is_kept).copied().collect();
     of_faces(mesh, &kept)
 }
 
@@ -131,13 +132,11 @@ fn without_debris(mesh: &Mesh, indexed: &IndexedSurface) -> Mesh {
         return inside;
     }
     let cells = Cells::of(&inside);
-    let labels: Vec<usize> = inside
-        .triangles
-        .iter()
+    let labels: Vec<usize> = polled(&inside.triangles)
         .map(|face| cells.label(&inside, face))
         .collect();
     let mut areas = vec![0.0; cells.components];
-    for (face, label) in inside.triangles.iter().zip(&labels) {
+    for (face, label) in polled(&inside.triangles).zip(&labels) {
         let [a, b, c] = corners(&inside, face);
         areas[*label] += (b - a).cross(&(c - a)).norm();
     }
@@ -170,7 +169,7 @@ impl Cells {
     fn of(mesh: &Mesh) -> Self {
         let mut low = Vector3::repeat(f64::INFINITY);
         let mut high = Vector3::repeat(f64::NEG_INFINITY);
-        for vertex in mesh.vertices.iter().map(Vector3::from) {
+        for vertex in polled(mesh.vertices.iter()).map(Vector3::from) {
             low = low.inf(&vertex);
             high = high.sup(&vertex);
         }
@@ -185,11 +184,13 @@ impl Cells {
         };
         let most_steps = (MARKS / (mesh.triangles.len() + 1) as f64).sqrt() as usize + 1;
         let mut marked = vec![false; cells.labels.len()];
+        let mut counter = PollCounter::default();
         for face in &mesh.triangles {
             let [a, b, c] = corners(mesh, face);
             let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());
             let steps = ((longest / cell).ceil() as usize).min(most_steps);
             for i in 0..=steps {
+                counter.add((steps - i + 1) as u32);
                 for j in 0..=steps - i {
                     let [u, v] = [i, j].map(|step| step as f64 / steps.max(1) as f64);
                     marked[cells.place(a + (b - a) * u + (c - a) * v)] = true;

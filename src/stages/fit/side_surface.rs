@@ -81,8 +81,8 @@ fn opposite_side(frame: &Rigid3) -> Rigid3 {
     Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
 }
 
-/// Renders the mesh along a frame's z and fits the tops. Returns `None` if the mesh is empty or covers fewer than 16
-/// pixels.
+/// Renders the mesh along a frame's z and fits the tops. Returns `None` if the mesh is empty, overlaps too often or covers
+/// fewer than 16 pixels.
 pub(super) fn fit_view(
     indexed: &IndexedSurface,
     frame: &Rigid3,
@@ -93,14 +93,11 @@ pub(super) fn fit_view(
         return None;
     }
     let view = Viewport::around(indexed.bounds(frame), effort.px, false);
-    fit_heights(
-        indexed,
-        frame,
-        &indexed.render(frame, &view),
-        view,
-        bow,
-        effort,
-    )
+    let heights = indexed.render(frame, &view);
+    if indexed.overlaps_too_often() {
+        return None;
+    }
+    fit_heights(indexed, frame, &heights, view, bow, effort)
 }
 
 /// Fits the stroke tops of a rendering. Rotates the view and fits again until the view is perpendicular to the tops, or

@@ -44,6 +44,10 @@ pub fn fit(
         scanned_face_down,
     };
     let sides = coarse_sides(indexed, &start, params.curved_blocks);
+    let too_often = || FitError::Overlap(mesh.triangles.len());
+    if indexed.overlaps_too_often() {
+        return Err(too_often());
+    }
     let usual = carved_side::choose(sides, inputs).map(|mut chosen| {
         let measured = || inks.as_ref().map(|inks| inks.agreement(&chosen.side));
         chosen.agreement = chosen.agreement.or_else(measured);
@@ -54,6 +58,9 @@ pub fn fit(
         let plane = &usual.side.plane_from_mesh;
         fit_view(indexed, plane, params.curved_blocks, FINE)
     });
+    if indexed.overlaps_too_often() {
+        return Err(too_often());
+    }
     let carved = usual
         .as_ref()
         .filter(|_| fine.as_ref().is_some_and(is_carved));

@@ -17,6 +17,7 @@ use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
 use super::scan_parts::{parts, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
+use crate::domain::cancel::polled;
 use crate::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
 use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
@@ -258,7 +259,7 @@ fn tightest_frame(mesh: &Mesh, axes: &Axes) -> Rigid3 {
 /// Returns the lowest and the highest coordinates of the vertices in a frame.
 fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for at in mesh.vertices.iter().map(|vertex| frame.apply(vertex)) {
+    for at in polled(mesh.vertices.iter()).map(|vertex| frame.apply(vertex)) {
         for k in 0..3 {
             bounds[0][k] = bounds[0][k].min(at[k]);
             bounds[1][k] = bounds[1][k].max(at[k]);

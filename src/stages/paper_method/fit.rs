@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::domain::cancel::{PollCounter, poll, polled};
 use crate::domain::{FitOutcome, SideEvidence};
 use crate::mesh::Vertices;
 use crate::stages::fit::{Axes, FitError, FitParams, frame, quantile};
@@ -35,7 +36,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
         plane.normal()
     };
     let height = |p: &[f64; 3]| (Vector3::from(*p) - plane.centre).dot(&normal);
-    let mut below: Vec<f64> = points.iter().map(|p| -height(p)).collect();
+    let mut below: Vec<f64> = polled(&points).map(|p| -height(p)).collect();
     let relief = quantile(&mut below, 0.75).max(0.0);
     if relief < params.min_relief * extent {
         return Err(FitError::NoRelief {
@@ -68,8 +69,10 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
 
 /// Returns each distinct point once, so that a triangle soup and an indexed mesh give the same plane.
 fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
-    let mut points: Vec<[f64; 3]> = vertices.iter().collect();
+    let mut points: Vec<[f64; 3]> = polled(vertices.iter()).collect();
+    let mut counter = PollCounter::default();
     points.sort_by(|a, b| {
+        counter.tick();
         let along = |axis: usize| a[axis].total_cmp(&b[axis]);
         along(0).then(along(1)).then(along(2))
     });
@@ -82,9 +85,8 @@ fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
 /// all around, while strokes stay near the middle.
 fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
     let normal = all.normal();
-    let (above, below): (Vec<_>, Vec<_>) = points
-        .iter()
-        .partition(|p| (Vector3::from(**p) - all.centre).dot(&normal) > 0.0);
+    let (above, below): (Vec<_>, Vec<_>) =
+        polled(points).partition(|p| (Vector3::from(**p) - all.centre).dot(&normal) > 0.0);
     let (up, down) = (mean_distance(&above), mean_distance(&below));
     let sureness = (up - down).abs() / (up + down).max(f64::MIN_POSITIVE);
     if up <= down {
@@ -97,7 +99,7 @@ fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f
 /// Returns the mean distance of points to their own centroid.
 fn mean_distance(points: &[[f64; 3]]) -> f64 {
     let n = points.len().max(1) as f64;
-    let vectors = || points.iter().map(|p| Vector3::from(*p));
+    let vectors = || polled(points).map(|p| Vector3::from(*p));
     let centroid = vectors().sum::<Vector3<f64>>() / n;
     vectors().map(|p| (p - centroid).norm()).sum::<f64>() / n
 }
@@ -106,12 +108,17 @@ fn mean_distance(points: &[[f64; 3]]) -> f64 {
 fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -> Vec<[f64; 3]> {
     let normal = all.normal();
     let height = |p: &[f64; 3]| (Vector3::from(*p) - all.centre).dot(&normal).abs();
-    let mut order: Vec<(f64, [f64; 3])> = upper.iter().map(|p| (height(p), *p)).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut order: Vec<(f64, [f64; 3])> = polled(upper).map(|p| (height(p), *p)).collect();
+    let mut counter = PollCounter::default();
+    order.sort_by(|a, b| {
+        counter.tick();
+        b.0.total_cmp(&a.0)
+    });
     let cell = |p: &[f64; 3]| p.map(|v| (v / spacing).floor() as i64);
     let mut near: HashMap<[i64; 3], Vec<[f64; 3]>> = HashMap::new();
     let mut taken = Vec::new();
     for (_, p) in order {
+        poll();
         if taken.len() == wanted as usize {
             break;
         }
@@ -151,6 +158,7 @@ fn ransac(
     };
     let mut best: (usize, Vector3<f64>, Vector3<f64>) = (0, point(0), Vector3::zeros());
     for _ in 0..params.ransac_draws {
+        poll();
         let [a, b, c] = [0; 3].map(|_: i32| point(rng.random_range(0..taken.len())));
         let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-300) else {
             continue;

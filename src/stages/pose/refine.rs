@@ -10,6 +10,7 @@ use super::overlap::{PlacedLevel, PoseOverlap};
 use super::pyramid::{BilinearCell, PyramidLevel};
 use super::tiebreak::tiebreak_scores;
 use crate::domain::Affine2;
+use crate::domain::cancel::poll;
 use crate::raster::Grid;
 use crate::simd::dispatch;
 
@@ -82,6 +83,7 @@ impl<'a> Refiner<'a> {
         let mut damping = 1e-3;
         let mut best: Option<(NormalEquations, Affine2)> = None;
         for _ in 0..max_steps {
+            poll();
             self.gather_correspondences(&from_fixed, &mut workspace);
             let step = NormalEquations::new(&mut workspace, start.mirrored, loss);
             if best.as_ref().is_none_or(|(best, _)| step.cost < best.cost) {

@@ -6,6 +6,7 @@ use super::PyramidLevel;
 use super::candidate::{PoseCandidate, SearchRange, prune};
 use super::fft_correlation::{FFT_SIZE, FftCorrelator, best_shift};
 use crate::domain::Affine2;
+use crate::domain::cancel::poll;
 use crate::simd::{dispatch, floor_f32, index_from_f32};
 
 /// Lanes of one SIMD vector.
@@ -53,6 +54,7 @@ pub(super) fn search(
     for step in -steps..=steps {
         let scale = SCALE_STEP.powi(step);
         for k in 0..ANGLES_PER_QUARTER {
+            poll();
             let angle = k as f64 * TAU / (4 * ANGLES_PER_QUARTER) as f64;
             let warped = warp_to_square(moving, Some((angle, scale)));
             let norm = norm(&warped);

@@ -1,6 +1,7 @@
 //! Rasterises a block of triangles. Triangles without a pixel centre are skipped. Small triangles are filled in
 //! parallel lanes, large triangles one at a time.
 
+use super::draw_effort::DrawEffort;
 use super::small_triangles::SmallTriangles;
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use super::triangle_fill::fill_triangle;
@@ -13,6 +14,7 @@ pub(super) fn fill_block(
     block: &TriangleBlock,
     [u, v, z]: &[AffineForm; 3],
     size: [usize; 2],
+    effort: &mut DrawEffort,
     emit: &mut impl FnMut(usize, f32),
 ) {
     // A local copy cannot alias memory that `emit` writes. Reads from it are therefore vectorised.
@@ -35,7 +37,7 @@ pub(super) fn fill_block(
     }
     for k in (0..LANES).filter(|k| candidates[*k] && !small.lanes[*k]) {
         let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
-        fill_triangle([corner(0), corner(1), corner(2)], size, emit);
+        fill_triangle([corner(0), corner(1), corner(2)], size, effort, emit);
     }
 }
 

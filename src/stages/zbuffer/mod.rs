@@ -4,6 +4,7 @@
 
 mod block_bounds;
 mod block_fill;
+mod draw_effort;
 mod moments;
 mod render;
 mod small_triangles;
@@ -12,6 +13,7 @@ mod triangle_block;
 mod triangle_fill;
 mod viewport;
 
+pub(super) use draw_effort::LARGEST_OVERLAP;
 pub(super) use moments::Moments;
 pub(super) use render::NO_HIT;
 pub(super) use surface::IndexedSurface;

@@ -4,13 +4,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::surface::IndexedSurface;
 use super::triangle_block::{LANES, LaneArray, TriangleBlock};
+use crate::domain::cancel::poll;
+use crate::mesh::robust_bounds::Bounds;
 use crate::simd::dispatch;
-use crate::stages::robust_bounds::Bounds;
 
 /// The distinct products of two axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 /// Number of blocks that are summed in single precision before the sum is added to a double-precision total.
 const BLOCKS_PER_SUM: usize = 32;
+/// Sums between two polls for a cancellation.
+const SUMS_PER_POLL: usize = 64;
 
 /// Centroid (mesh units) and covariance (mesh units squared) of a surface, in the mesh's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +33,9 @@ impl Moments {
         let mut sums = [0.0; SUM_COUNT];
         dispatch!({
             for (run, blocks) in surface.blocks.chunks(BLOCKS_PER_SUM).enumerate() {
+                if run.is_multiple_of(SUMS_PER_POLL) {
+                    poll();
+                }
                 let mut part = [[0.0; LANES]; SUM_COUNT];
                 for (k, block) in blocks.iter().enumerate() {
                     let first = (run * BLOCKS_PER_SUM + k) * LANES;

@@ -1,20 +1,25 @@
 //! Renders a surface: the height of the first hit of each pixel's ray.
 
 use super::block_fill::{fill_block, may_cover_centre};
+use super::draw_effort::DrawEffort;
 use super::surface::IndexedSurface;
 use super::triangle_block::{AffineForm, LANES, TriangleBlock};
 use super::triangle_fill::pixel_range;
 use super::viewport::Viewport;
 use crate::domain::Rigid3;
+use crate::domain::cancel::{poll, polled};
+use crate::mesh::robust_bounds::bulk_along;
 use crate::raster::Grid;
 use crate::simd::{dispatch, max_f32};
-use crate::stages::robust_bounds::bulk_along;
 
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
 /// Above this number of triangles per pixel, few blocks contain a pixel centre, and `fill_sparse_blocks` is used.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
+
+/// Groups of 64 triangles between two polls for a cancellation.
+const GROUPS_PER_POLL: usize = 64;
 
 /// Each point is drawn as a square. Its side is this multiple of the mean point spacing, so the squares leave no holes.
 const SPLAT_GROWTH: f64 = 1.5;
@@ -63,32 +68,53 @@ impl IndexedSurface {
     /// Calls `emit` with the index and the height of every pixel that is tested against a triangle. The height is NaN
     /// if the pixel's centre is outside that triangle.
     fn rasterize(&self, plane_from_mesh: &Rigid3, view: &Viewport, emit: impl FnMut(usize, f32)) {
+        if self.given_up.get() {
+            return;
+        }
         let rows = self.view_rows(plane_from_mesh, view);
         let size = [view.width, view.height];
+        let mut effort = DrawEffort::new(view, self.triangle_count);
         if !self.has_faces {
             self.splat_points(&rows, size, emit);
         } else if self.triangle_count / SPARSE_TRIANGLES_PER_PIXEL > size[0] * size[1] {
-            self.fill_sparse_blocks(&rows, size, emit);
+            self.fill_sparse_blocks(&rows, size, &mut effort, emit);
         } else {
-            self.fill_every_block(&rows, size, emit);
+            self.fill_every_block(&rows, size, &mut effort, emit);
+        }
+        if !effort.is_left() {
+            self.given_up.set();
         }
     }
 
-    /// Fills every block that may contain a pixel centre.
+    /// Returns whether a rendering was given up, because large triangles overlap too often. Renderings of the surface
+    /// are then incomplete.
+    pub(crate) fn overlaps_too_often(&self) -> bool {
+        self.given_up.get()
+    }
+
+    /// Fills every block that may contain a pixel centre, as long as `effort` is left.
     fn fill_every_block(
         &self,
         rows: &[AffineForm; 3],
         size: [usize; 2],
+        effort: &mut DrawEffort,
         mut emit: impl FnMut(usize, f32),
     ) {
         let [u, v, _] = rows;
         dispatch!({
-            for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
+            let groups = self.bounds.iter().zip(self.blocks.chunks(LANES));
+            for (group, (bounds, blocks)) in groups.enumerate() {
+                if group.is_multiple_of(GROUPS_PER_POLL) {
+                    poll();
+                }
+                if !effort.is_left() {
+                    return;
+                }
                 let (across, down) = (bounds.range_along(u), bounds.range_along(v));
                 let candidates = may_cover_centre([&across, &down], size);
                 for (block, candidates) in blocks.iter().zip(candidates) {
                     if candidates {
-                        fill_block(block, rows, size, &mut emit);
+                        fill_block(block, rows, size, effort, &mut emit);
                     }
                 }
             }
@@ -101,6 +127,7 @@ impl IndexedSurface {
         &self,
         rows: &[AffineForm; 3],
         size: [usize; 2],
+        effort: &mut DrawEffort,
         mut emit: impl FnMut(usize, f32),
     ) {
         const GROUPS: usize = 16;
@@ -109,6 +136,10 @@ impl IndexedSurface {
         dispatch!({
             let blocks = self.blocks.chunks(GROUPS * LANES);
             for (bounds, blocks) in self.bounds.chunks(GROUPS).zip(blocks) {
+                poll();
+                if !effort.is_left() {
+                    return;
+                }
                 few.clear();
                 for (bounds, blocks) in bounds.iter().zip(blocks.chunks(LANES)) {
                     let (across, down) = (bounds.range_along(u), bounds.range_along(v));
@@ -128,7 +159,7 @@ impl IndexedSurface {
                 }
                 std::hint::black_box(seen);
                 for block in &few {
-                    fill_block(block, rows, size, &mut emit);
+                    fill_block(block, rows, size, effort, &mut emit);
                 }
             }
         });
@@ -142,7 +173,7 @@ impl IndexedSurface {
         mut emit: impl FnMut(usize, f32),
     ) {
         let of_row = |row: &AffineForm| -> Vec<f32> {
-            let blocks = self.blocks.iter();
+            let blocks = polled(self.blocks.iter());
             blocks.flat_map(|block| row.at_lanes(&block[0])).collect()
         };
         let [xs, ys, zs] = rows.each_ref().map(of_row);
@@ -152,7 +183,7 @@ impl IndexedSurface {
         };
         let spacing_px = (length(&xs) * length(&ys) / xs.len().max(1) as f64).sqrt();
         let reach = (spacing_px * 0.5 * SPLAT_GROWTH).max(0.5) as f32;
-        for ((x, y), z) in xs.iter().zip(&ys).zip(zs) {
+        for ((x, y), z) in polled(xs.iter().zip(&ys).zip(zs)) {
             for row in pixel_range(y - reach, y + reach, size[1]) {
                 for column in pixel_range(x - reach, x + reach, size[0]) {
                     emit(row * size[0] + column, z);
@@ -166,7 +197,7 @@ impl IndexedSurface {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{IndexedSurface, NO_HIT, Viewport};
+    use super::{DrawEffort, IndexedSurface, NO_HIT, Viewport};
     use crate::domain::{Affine2, Rigid3};
     use crate::mesh::Mesh;
 
@@ -265,8 +296,10 @@ mod tests {
             let rows = surface.view_rows(&frame, &view);
             let size = [view.width, view.height];
             let mut filled = [Vec::new(), Vec::new()];
-            surface.fill_every_block(&rows, size, |place, z| filled[0].push((place, z.to_bits())));
-            surface.fill_sparse_blocks(&rows, size, |place, z| filled[1].push((place, z.to_bits())));
+            let mut effort = [0; 2].map(|_: i32| DrawEffort::new(&view, surface.triangle_count));
+            let [first, second] = &mut effort;
+            surface.fill_every_block(&rows, size, first, |place, z| filled[0].push((place, z.to_bits())));
+            surface.fill_sparse_blocks(&rows, size, second, |place, z| filled[1].push((place, z.to_bits())));
             prop_assert_eq!(&filled[0], &filled[1]);
         }
     }

@@ -173,8 +173,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::block_fill::fill_block;
+    use super::super::draw_effort::DrawEffort;
     use super::super::triangle_block::{AffineForm, LANES, TriangleBlock};
     use super::super::triangle_fill::fill_triangle;
+    use super::super::viewport::Viewport;
     use crate::simd::max_f32;
 
     const SIZE: [usize; 2] = [9, 7];
@@ -183,6 +185,11 @@ mod tests {
         AffineForm([0.0, 1.0, 0.0, 0.0]),
         AffineForm([0.0, 0.0, 1.0, 0.0]),
     ];
+
+    fn effort() -> DrawEffort {
+        let view = Viewport::around([[0.0; 2], [1.0; 2]], 8, false);
+        DrawEffort::new(&view, LANES)
+    }
 
     fn filled(by: impl FnOnce(&mut dyn FnMut(usize, f32))) -> Vec<f32> {
         let mut heights = [f32::NEG_INFINITY; SIZE[0] * SIZE[1]];
@@ -216,10 +223,10 @@ mod tests {
             let block: TriangleBlock = std::array::from_fn(|corner| {
                 std::array::from_fn(|axis| std::array::from_fn(|k| triangles[k][corner][axis]))
             });
-            let together = filled(|mut emit| fill_block(&block, &IDENTITY, SIZE, &mut emit));
+            let together = filled(|mut emit| fill_block(&block, &IDENTITY, SIZE, &mut effort(), &mut emit));
             let alone = filled(|mut emit| {
                 for corners in &triangles {
-                    fill_triangle(*corners, SIZE, &mut emit);
+                    fill_triangle(*corners, SIZE, &mut effort(), &mut emit);
                 }
             });
             prop_assert_eq!(together, alone);

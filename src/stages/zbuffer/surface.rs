@@ -1,15 +1,20 @@
 //! A mesh packed into blocks of triangles with bounding boxes, for fast rendering along any direction.
 
 use super::block_bounds::BlockBounds;
+use super::draw_effort::GivenUp;
 use super::triangle_block::{AffineForm, Coordinate, LANES, LaneArray, TriangleBlock, pack_block};
 use crate::domain::Rigid3;
+use crate::domain::cancel::{poll, polled};
+use crate::mesh::robust_bounds::{Bounds, BulkRange, bulk_box};
 use crate::mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 use crate::simd::dispatch;
-use crate::stages::robust_bounds::{Bounds, BulkRange, bulk_box};
 
 /// Largest number of blocks that are sampled to decide the winding. Tens of thousands of triangles are enough.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;
+
+/// Groups of 64 triangles between two polls for a cancellation.
+const GROUPS_PER_POLL: usize = 64;
 
 /// A surface that can be bounded and rendered along any direction.
 ///
@@ -26,6 +31,8 @@ pub(crate) struct IndexedSurface {
     /// Number of triangles (or points) in the blocks.
     pub(super) triangle_count: usize,
     pub(super) has_faces: bool,
+    /// Whether a rendering was given up.
+    pub(super) given_up: GivenUp,
 }
 
 impl IndexedSurface {
@@ -42,7 +49,7 @@ impl IndexedSurface {
         let origin = [0, 1, 2].map(|k| T::reference(f64::midpoint(low[k], high[k])));
         let points: PageVec<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
-            points = (0..vertices.len() as u32).map(|i| [i; 3]).collect();
+            points = polled(0..vertices.len() as u32).map(|i| [i; 3]).collect();
             &points
         } else {
             &mesh.triangles
@@ -52,7 +59,10 @@ impl IndexedSurface {
         let mut blocks = PageVec::with_capacity(triangles.len().div_ceil(LANES));
         let mut bounds = Vec::with_capacity(triangles.len().div_ceil(LANES * LANES));
         dispatch!({
-            for group in triangles.chunks(LANES * LANES) {
+            for (number, group) in triangles.chunks(LANES * LANES).enumerate() {
+                if number.is_multiple_of(GROUPS_PER_POLL) {
+                    poll();
+                }
                 let first = blocks.len();
                 for triangles in group.chunks(LANES) {
                     blocks.push(pack_block(triangles, vertices, origin));
@@ -67,6 +77,7 @@ impl IndexedSurface {
             bounds,
             blocks,
             has_faces: !mesh.triangles.is_empty(),
+            given_up: GivenUp::default(),
         }
     }
 
@@ -108,7 +119,11 @@ impl IndexedSurface {
         }
         let [mut low, mut high] = bulk.range();
         dispatch!({
-            for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
+            let groups = self.bounds.iter().zip(self.blocks.chunks(LANES));
+            for (group, (bounds, blocks)) in groups.enumerate() {
+                if group.is_multiple_of(GROUPS_PER_POLL) {
+                    poll();
+                }
                 let [lows, highs] = bounds.range_along(row);
                 for (k, block) in blocks.iter().enumerate() {
                     if lows[k] < low || highs[k] > high {
@@ -126,6 +141,9 @@ impl IndexedSurface {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
         dispatch!({
             for (group, bounds) in self.bounds.iter().enumerate() {
+                if group.is_multiple_of(GROUPS_PER_POLL) {
+                    poll();
+                }
                 let [lows, highs] = bounds.range_along(row);
                 for k in 0..LANES {
                     if lows[k] < low && bulk.contains(lows[k]) {

@@ -1,9 +1,14 @@
 //! Scan conversion of one triangle: finds the pixel centres in the triangle, and the triangle's height at each centre.
 
+use super::draw_effort::DrawEffort;
+use crate::domain::cancel::poll;
 use crate::simd::{max_f32, min_f32};
 
 /// If a triangle spans more columns than this, its rows are clipped before their pixels are tested.
 const MAX_UNCLIPPED_COLUMNS: usize = 12;
+
+/// Triangles that span more pixels poll for a cancellation at each row.
+const PIXELS_PER_POLL: usize = 1 << 20;
 
 /// Calls `emit` for each tested pixel, with the pixel's index and the height of the triangle at the pixel's centre. The
 /// height is NaN if the centre is outside the triangle. Edges belong to the triangle.
@@ -15,6 +20,7 @@ const MAX_UNCLIPPED_COLUMNS: usize = 12;
 pub(super) fn fill_triangle(
     corners: [[f32; 3]; 3],
     [width, height]: [usize; 2],
+    effort: &mut DrawEffort,
     emit: &mut impl FnMut(usize, f32),
 ) {
     let [a, b, c] = corners;
@@ -32,11 +38,18 @@ pub(super) fn fill_triangle(
     let columns = pixel_range(low(0), high(0), width);
     // Both windings are accepted.
     let orientation = doubled_area.signum();
-    for row in pixel_range(low(1), high(1), height) {
+    let rows = pixel_range(low(1), high(1), height);
+    let is_huge = rows.len() * columns.len() > PIXELS_PER_POLL;
+    for row in rows {
+        if is_huge {
+            poll();
+        }
         let y = row as f32;
         let down = [a, b, c].map(|corner| (corner[1] - y) * orientation);
         let z = a[2] + (y - a[1]) * dz_dy;
-        for column in clip_columns(&columns, &corners, y) {
+        let clipped = clip_columns(&columns, &corners, y);
+        effort.spend(clipped.len());
+        for column in clipped {
             let x = column as u32 as f32;
             let across = [a[0] - x, b[0] - x, c[0] - x];
             let side = |from: usize, to: usize| across[from] * down[to] - down[from] * across[to];

@@ -8,10 +8,10 @@ const SPECK_SHARE: f64 = 0.002;
 const WIDENED: f64 = 0.25;
 
 /// A box along the axes, `[low, high]`.
-pub(super) type Bounds<const N: usize> = [[f64; N]; 2];
+pub(crate) type Bounds<const N: usize> = [[f64; N]; 2];
 
 /// Returns the lowest and the highest value of the bulk. If there are no specks, these are the exact bounds.
-pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
+pub(crate) fn bulk_along(values: &[f32]) -> [f64; 2] {
     let mut bulk = BulkRange::new(values.len(), |k| values[k]);
     for lanes in values.chunks(LANES) {
         // NaN is ignored.
@@ -26,7 +26,7 @@ pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
 const LANES: usize = 8;
 
 /// Running minimum and maximum of the values of the bulk.
-pub(super) struct BulkRange {
+pub(crate) struct BulkRange {
     /// Limits of the bulk.
     least: f32,
     most: f32,
@@ -36,7 +36,7 @@ pub(super) struct BulkRange {
 
 impl BulkRange {
     /// Samples `count` values to find the limits of the bulk; adds none.
-    pub(super) fn new(count: usize, value: impl Fn(usize) -> f32) -> Self {
+    pub(crate) fn new(count: usize, value: impl Fn(usize) -> f32) -> Self {
         let [least, most] = limits(count, |k| f64::from(value(k)));
         Self {
             least: least as f32,
@@ -48,7 +48,7 @@ impl BulkRange {
 
     /// Adds values.
     #[inline]
-    pub(super) fn add(&mut self, values: [f32; LANES]) {
+    pub(crate) fn add(&mut self, values: [f32; LANES]) {
         for (k, v) in values.into_iter().enumerate() {
             // Plain comparisons are vectorized.
             let (low, high) = (self.low[k], self.high[k]);
@@ -58,12 +58,12 @@ impl BulkRange {
     }
 
     /// Returns whether a value belongs to the bulk.
-    pub(super) fn contains(&self, value: f32) -> bool {
+    pub(crate) fn contains(&self, value: f32) -> bool {
         (self.least..=self.most).contains(&value)
     }
 
     /// Of the values added so far, returns the lowest and the highest that belong to the bulk.
-    pub(super) fn range(&self) -> [f32; 2] {
+    pub(crate) fn range(&self) -> [f32; 2] {
         [
             self.low.into_iter().fold(f32::INFINITY, f32::min),
             self.high.into_iter().fold(f32::NEG_INFINITY, f32::max),
@@ -72,7 +72,7 @@ impl BulkRange {
 }
 
 /// Returns the bulk along each axis as a box. Points outside the box are specks.
-pub(super) fn bulk_box<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
+pub(crate) fn bulk_box<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
     let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis].into()));
     [0, 1].map(|end| along.map(|limits| limits[end]))
 }
@@ -109,7 +109,7 @@ fn smallest(values: impl Iterator<Item = f64>, rank: usize) -> f64 {
 }
 
 /// Returns whether a point lies in the box, borders included.
-pub(super) fn is_in_box<const N: usize>([low, high]: &Bounds<N>, point: &[f64; N]) -> bool {
+pub(crate) fn is_in_box<const N: usize>([low, high]: &Bounds<N>, point: &[f64; N]) -> bool {
     (0..N).all(|k| (low[k]..=high[k]).contains(&point[k]))
 }
 
