@@ -170,7 +170,12 @@ mod tests {
             });
             let page =
                 world.affine_page([1300, 900], &Affine2::similarity(8.0, 0.03, [60.0, 30.0]));
-            let placed = place_characters(&face, &page, (&maps[0], &support), &[label.clone()]);
+            let placed = place_characters(
+                &face,
+                &page,
+                (&maps[0], &support),
+                std::slice::from_ref(&label),
+            );
             let character = &placed.characters[0];
             let [here, there] = [&maps[0], &maps[1]]
                 .map(|map| CharacterMap::rounded(&face, map, character, px_per_mm));

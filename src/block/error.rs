@@ -10,8 +10,8 @@ pub enum BlockError {
     Mesh(#[from] MeshReadError),
     /// There are no triangles, or all are degenerate.
     #[error(
-        "the scan has no surface ({triangles} triangles with an area of zero): a block needs a triangle mesh; \
-         export it with faces, not as points"
+        "the scan has no surface ({triangles} triangles with an area of zero, or with coordinates that are too large to \
+         compute with): a block needs a triangle mesh; export it with faces, not as points"
     )]
     NoArea {
         /// Triangles in the file.

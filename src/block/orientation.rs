@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
-use super::scan_sums::{BlockSums, SampledTriangle, ScanPart};
+use super::scan_sums::{SampledTriangle, ScanPart, ScanSums};
 use crate::domain::LengthUnit;
 use crate::domain::cancel::poll;
 use crate::mesh::TriangleStream;
@@ -59,7 +59,7 @@ impl Orientation {
         unit: Option<LengthUnit>,
     ) -> Result<(Self, ScanPart), BlockError> {
         let mut part = ScanPart::whole();
-        let mut sums = BlockSums::over(mesh, &part)?;
+        let mut sums = ScanSums::over(mesh, &part)?;
         let triangles = sums.triangles;
         let bulk = bulk_box(&sums.corners);
         if sums
@@ -69,14 +69,14 @@ impl Orientation {
             .any(|corner| !is_in_box(&bulk, corner))
         {
             part = ScanPart(Some(bulk));
-            sums = BlockSums::over(mesh, &part)?;
+            sums = ScanSums::over(mesh, &part)?;
         }
         let found = Self::of_sums(&sums, unit).ok_or(BlockError::NoArea { triangles })?;
         Ok((Self { triangles, ..found }, part))
     }
 
     /// Returns the frame, or `None` without any area that can be computed with.
-    fn of_sums(sums: &BlockSums, unit: Option<LengthUnit>) -> Option<Self> {
+    fn of_sums(sums: &ScanSums, unit: Option<LengthUnit>) -> Option<Self> {
         let (triangles, sample, origin) = (sums.triangles, &sums.sample, sums.origin?);
         let sums = &sums.area;
         let mean = sums.first / sums.area;

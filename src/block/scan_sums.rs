@@ -103,7 +103,7 @@ impl ScanPart {
 }
 
 /// What one pass over a part of a scan collects.
-pub(super) struct BlockSums {
+pub(super) struct ScanSums {
     pub(super) area: AreaSums,
     pub(super) triangles: u64,
     /// First corner of the first triangle. Positions relative to it keep their precision far from the origin.
@@ -113,7 +113,7 @@ pub(super) struct BlockSums {
     pub(super) corners: Vec<[f64; 3]>,
 }
 
-impl BlockSums {
+impl ScanSums {
     /// Passes over a part of a scan.
     pub(super) fn over(
         mesh: &mut dyn TriangleStream,
@@ -155,7 +155,8 @@ impl BlockSums {
         for triangle in sampled.filter(|triangle| part.has(triangle)) {
             let [a, b, c] = triangle.map(|corner| Vector3::from(corner) - origin);
             let normal = (b - a).cross(&(c - a));
-            self.sample.push([a, normal].map(|v| v.cast::<f32>()));
+            self.sample
+                .push([a, normal].map(nalgebra::Matrix::cast::<f32>));
         }
         let step = if is_small { 1 } else { CORNER_STEP };
         let sampled = triangles.iter().step_by(step);

@@ -30,6 +30,10 @@ const PAGE: usize = 500;
 
 /// Options of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a choice of its own, with a name"
+)]
 pub struct CheckOptions {
     /// Compare files by length instead of hash. Do not compare indexes with tables, nor the fingerprints and dirty
     /// marks of jobs with their results.

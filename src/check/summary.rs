@@ -83,6 +83,10 @@ pub struct Unreferenced {
 
 /// Repairs made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a choice of its own, with a name"
+)]
 pub struct Repaired {
     /// Number of pairs sent back to an earlier stage.
     pub requeued: u64,

@@ -24,6 +24,10 @@ use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a choice of its own, with a name"
+)]
 pub(super) struct CheckArgs {
     /// Queue missing or changed results again, recount, and remove unreferenced files; verdicts are never touched
     #[arg(long)]

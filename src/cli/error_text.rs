@@ -10,7 +10,7 @@ use crate::config::ConfigError;
 use crate::export::FolderError;
 use crate::platform;
 use crate::runner::RunError;
-use crate::store::{CATALOG_FILE, PlaceError, StorageError, StoreError, TargetLockError};
+use crate::store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 
 /// Returns the exit code of an error.
 pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
@@ -40,13 +40,9 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
     match cause.downcast_ref() {
         Some(RunError::InUse(_)) => return Some(ExitCode::InUse),
-        Some(
-            RunError::OtherSettings(_)
-            | RunError::OtherPlan(_)
-            | RunError::Place(
-                PlaceError::Taken { .. } | PlaceError::Unknown(_) | PlaceError::Unreadable(_),
-            ),
-        ) => return Some(ExitCode::Usage),
+        Some(RunError::OtherSettings(_) | RunError::OtherPlan(_) | RunError::Place(_)) => {
+            return Some(ExitCode::Usage);
+        }
         Some(RunError::NoSuchPair(_) | RunError::NoSuchBlock(_)) => {
             return Some(ExitCode::NothingSelected);
         }

@@ -248,7 +248,9 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
         context.info("no verdicts yet");
     } else {
         output::print(&log_text(&events, context.stdout))?;
-        output::print(&damaged_text(&damaged, context.stdout))?;
+        if !damaged.is_empty() {
+            output::print(&damaged_text(&damaged, context.stdout))?;
+        }
     }
     Ok(ExitCode::Done)
 }

@@ -173,7 +173,8 @@ pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> 
     let rows = lines.map(|(line, content)| {
         let mut parsed: VerdictLine = serde_json::from_slice(content)
             .map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
-        parsed.verdict.reviewer = parsed.verdict.reviewer.trim().to_owned();
+        let reviewer = parsed.verdict.reviewer.trim().to_owned();
+        parsed.verdict.reviewer = reviewer;
         if parsed.verdict.reviewer.is_empty() {
             return Err(RefusedLine::new(line, "reviewer is empty"));
         }

@@ -12,8 +12,9 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header}
 use axum::middleware::Next;
 use axum::response::{Html, IntoResponse as _, Response};
 
-use super::access_control::{AccessControl, SESSION_SCRIPT, START};
+use super::access_control::AccessControl;
 use super::page_frame::closed_page;
+use super::session::{SESSION_SCRIPT, START};
 
 /// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 const BODY_LIMIT: usize = 16 * 1024;

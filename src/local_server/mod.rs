@@ -9,6 +9,7 @@ mod address;
 mod connection;
 mod connections;
 mod guard;
+mod guarded_pages;
 mod host_check;
 mod page_frame;
 mod session;

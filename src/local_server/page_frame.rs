@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, html};
 
-use super::access_control::SESSION_SCRIPT;
+use super::session::SESSION_SCRIPT;
 
 /// Returns a whole document. `body` is the `body` element.
 pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Markup {

@@ -7,6 +7,11 @@ use rand::rngs::SysRng;
 
 use crate::domain::ContentHash;
 
+/// Path that accepts the one-time token.
+pub(super) const START: &str = "/start";
+/// Path of the script that opens the page of the browser's session. It is no secret.
+pub(super) const SESSION_SCRIPT: &str = "/session.js";
+
 /// Start of the paths of all sessions.
 const PATHS: &str = "/s/";
 

@@ -7,12 +7,12 @@ use super::history::ReviewerHistory;
 use super::item::{ItemView, ReviewItem};
 use super::options::QueueOptions;
 use super::order;
-use super::state::ServerState;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
-use crate::local_server::WorkFailed;
+use crate::local_server::{WorkFailed, WorkThread};
 use crate::report::consensus::{is_disputed, partition_verdicts};
 use crate::report::pair_artifacts::{PairArtifacts, group_identical};
+use crate::store::Project;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
@@ -31,8 +31,12 @@ impl ReviewQueue {
     ///
     /// # Errors
     /// Returns an error if the catalog cannot be read, or planting a fault panics.
-    pub(super) async fn read(state: &ServerState) -> Result<Self, QueueError> {
-        let (catalog, options) = (&state.catalog, &state.options.queue);
+    pub(super) async fn read(
+        catalog: &Catalog,
+        project: &Project,
+        work: &WorkThread,
+        options: &QueueOptions,
+    ) -> Result<Self, QueueError> {
         let key = catalog.review_key().await?;
         let random = SeededRandom::new(options.seed, &options.reviewer);
         let mut items = all_items(catalog, options).await?;
@@ -43,7 +47,7 @@ impl ReviewQueue {
         order::sort(&mut items, options.order, &random);
         if options.has_attention_checks() {
             let selected = check_items::select_for_faults(&items, &others, &options.rates, &random);
-            let faults = faults(state, selected, &random).await?;
+            let faults = faults(catalog, project, work, selected, &random).await?;
             items = check_items::interleave(items, faults, &options.rates, &random);
         }
         let item = |item: ReviewItem| Arc::new(item.with_id(&key, &options.reviewer));
@@ -156,17 +160,19 @@ fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
 
 /// Plants faults in the selected items. Skips pairs whose files cannot be read.
 async fn faults(
-    state: &ServerState,
+    catalog: &Catalog,
+    project: &Project,
+    work: &WorkThread,
     selected: Vec<&ReviewItem>,
     random: &SeededRandom,
 ) -> Result<Vec<ReviewItem>, QueueError> {
     let mut faults = Vec::with_capacity(selected.len());
     for item in selected {
-        let Some(detail) = state.catalog.pair(&item.pair).await? else {
+        let Some(detail) = catalog.pair(&item.pair).await? else {
             continue;
         };
-        let (project, item, random) = (state.project.clone(), item.clone(), random.clone());
-        let fault = state.work.call(move || {
+        let (project, item, random) = (project.clone(), item.clone(), random.clone());
+        let fault = work.call(move || {
             let depth = PairArtifacts::new(&project, &detail.results).depth().ok()?;
             Some(check_items::plant_fault(&item, &depth, &random))
         });

@@ -32,7 +32,8 @@ impl ServerState {
     /// # Errors
     /// Returns an error if the catalog cannot be read, or if a blocking task fails.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
-        let queue = ReviewQueue::read(self).await?;
+        let (catalog, project, work) = (&self.catalog, &self.project, &self.work);
+        let queue = ReviewQueue::read(catalog, project, work, &self.options.queue).await?;
         let mut served = self.lock_served();
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));

@@ -10,7 +10,7 @@ use tokio::task::JoinHandle;
 use super::compute_thread::{ComputedStage, task_result};
 use super::error::RunError;
 use super::events::RunEvent;
-use super::pair_failure::FailedPair;
+use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
 use crate::catalog::{CheckpointOutcome, Lease};
@@ -53,7 +53,7 @@ impl StoredStages {
         let end = match (self.lease, self.unwritten) {
             (CheckpointOutcome::LeaseLost, _) => Ok(PairEnd::LeaseLost),
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
-                let failed = FailedPair {
+                let failed = PairFailure {
                     name: self.pair,
                     attributes: stage.attributes,
                     stage: stage.stage,

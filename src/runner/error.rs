@@ -39,7 +39,7 @@ pub enum RunError {
     Storage(#[from] StorageError),
     /// The artifacts belong to another catalog.
     #[error(transparent)]
-    Place(#[from] PlaceError),
+    Place(Box<PlaceError>),
     /// An artifact could not be written.
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
@@ -51,6 +51,15 @@ fn list(changes: &[FieldChange]) -> String {
     match changes.as_slice() {
         [] => String::new(),
         changes => format!(" ({})", changes.join(", ")),
+    }
+}
+
+impl From<PlaceError> for RunError {
+    fn from(error: PlaceError) -> Self {
+        match error {
+            PlaceError::Failed(error) => Self::Artifact(error),
+            error => Self::Place(Box::new(error)),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::catalog::{FailureAction, InputVersions, Lease, StageFailure};
 use crate::domain::{Failure, PairName, Stage};
 
 /// A stage of a pair that failed.
-pub(super) struct FailedPair {
+pub(super) struct PairFailure {
     pub(super) name: PairName,
     /// The manifest attributes as JSON.
     pub(super) attributes: String,
@@ -21,7 +21,7 @@ pub(super) struct FailedPair {
     pub(super) ms: Option<u64>,
 }
 
-impl FailedPair {
+impl PairFailure {
     /// Stores the failure under the lease. Returns how the pair ended.
     ///
     /// # Errors

@@ -13,7 +13,7 @@ use super::folder_check::check_folders;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::pair_context::{FileInUse, PairContext};
-use super::pair_failure::FailedPair;
+use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, Lease, PairAttributes, PairWork};
@@ -136,7 +136,7 @@ async fn reading_after_stop(file: &FileInUse, stop: &Stop) {
         let (found, now) = (file.get(), clock.now());
         if found != path {
             (path, since) = (found, now);
-        } else if path.is_some() && now - since >= LONGEST_READ_AFTER_STOP {
+        } else if path.is_some() && now.saturating_sub(since) >= LONGEST_READ_AFTER_STOP {
             return;
         }
     }
@@ -211,7 +211,7 @@ async fn store_failure(
         Some(inputs) => inputs,
         None => pair.inputs_now(context).await,
     };
-    let failed = FailedPair {
+    let failed = PairFailure {
         name: pair.attributes.name,
         attributes: pair.attributes_json,
         stage,

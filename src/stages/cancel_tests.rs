@@ -1,5 +1,7 @@
 //! Tests that every stage ends soon after it is cancelled, and refuses scans that would take minutes to draw.
 
+use std::fmt::Write as _;
+
 use super::depth::depth;
 use super::fit::{FitError, fit};
 use super::testing::{SyntheticSheet, paper_settings, print, settings};
@@ -19,18 +21,15 @@ fn check<T: PartialEq + std::fmt::Debug>(name: &str, least_polls: u64, stage: im
     for eighths in EIGHTHS {
         let at = (polls * eighths / 8).max(1);
         let token = CancelToken::cancelled_at(at);
-        assert_eq!(
-            token.run(&stage),
-            Err(Cancelled),
-            "{name} at {at} of {polls}"
-        );
+        let ended = token.run(&stage);
+        assert!(ended == Err(Cancelled), "{name} at {at} of {polls}");
         assert_eq!(
             token.polls(),
             at,
             "{name} goes on after the poll that cancels it"
         );
     }
-    assert_eq!(stage(), result, "{name} after it was cancelled");
+    assert!(stage() == result, "{name} after it was cancelled");
     result
 }
 
@@ -44,8 +43,8 @@ fn check_all(settings: &Settings, least_polls: [u64; 4]) {
         let (scan, print) = (Scan::from(mesh.clone()), Print::from(image.clone()));
         pipeline::fit(&scan, Some(&print), None, settings).expect("a plane")
     });
-    let scan = Scan::from(mesh);
     let map = check("depth", of_depth, || {
+        let scan = Scan::from(mesh.clone());
         depth(&scan, &fitted, None, &settings.depth).expect("a map")
     });
     let normalized = check("normalize", of_normalize, || {
@@ -135,10 +134,10 @@ fn a_polygon_of_many_corners_is_refused_after_little_work() {
          element face 1\nproperty list uint uint vertex_indices\nend_header\n"
     );
     for [x, y, z] in circle(COUNT) {
-        ply.push_str(&format!("{x:.4} {y:.4} {z}\n"));
+        writeln!(ply, "{x:.4} {y:.4} {z}").expect("written");
     }
     ply.push_str(&COUNT.to_string());
-    (0..COUNT).for_each(|k| ply.push_str(&format!(" {k}")));
+    (0..COUNT).for_each(|k| write!(ply, " {k}").expect("written"));
     let mesh = read(ply.as_bytes(), "polygon.ply", &MeshLimits::SUGGESTED).expect("a mesh");
     assert_eq!(mesh.triangles.len(), COUNT as usize - 2);
     refused(mesh, &print(14.0, 2.0).0);

@@ -28,9 +28,8 @@ impl Project {
     pub fn check_artifacts_folder(&self) -> Result<(), ArtifactError> {
         let folder = self.artifacts_dir();
         let first = std::fs::read_dir(&folder).map(|mut entries| entries.next().transpose());
-        let error = match first.and_then(|first| first) {
-            Ok(_) => return Ok(()),
-            Err(error) => error,
+        let Err(error) = first.and_then(|first| first) else {
+            return Ok(());
         };
         match error.kind() {
             ErrorKind::NotFound if folder.symlink_metadata().is_ok() => {

@@ -121,7 +121,7 @@ mod tests {
     use super::{OwnerRecord, OwnerTraces, Standing};
     use crate::domain::CatalogIdentity;
 
-    /// Paths of catalogs, and those that use the folder.
+    /// Paths of all catalogs, and of the catalogs that use the folder.
     struct Known<'a>(&'a [&'a str], &'a [&'a str]);
 
     impl OwnerTraces for Known<'_> {

@@ -33,7 +33,7 @@ pub enum PlaceError {
         /// Whether one of both is a copy of the other.
         is_copy: bool,
     },
-    /// It holds results without the name of an owner, and none of those that this catalog names.
+    /// It holds results without the name of an owner, and none that this catalog names.
     #[error(
         "{place} holds results, but none of this catalog, and not the name of the catalog that they belong to (owner.json); nothing was changed there. Give this catalog a place of its own ({}), or, if no other catalog uses this place, run `check --take-over`",
         own_place(.0),
@@ -159,7 +159,7 @@ impl Project {
         Ok(message)
     }
 
-    /// Returns whether a place without an owner holds artifacts, but none of those that the catalog names.
+    /// Returns whether a place without an owner holds artifacts, but none that the catalog names.
     fn holds_others(
         &self,
         place: &Place<'_>,

@@ -101,13 +101,14 @@ fn finished(project: &Project, pair: usize) -> [usize; 4] {
 }
 
 /// Returns the path of a pair's artifact.
-fn artifact(project: &Project, pair: usize, stage: Stage, role: &str) -> PathBuf {
+pub(crate) fn artifact(project: &Project, pair: usize, stage: Stage, role: &str) -> PathBuf {
     let found = &pairs(project)[pair].results;
     let record = found.stage(stage).expect("a result");
     project.artifact_path(&record.files[role])
 }
 
-fn kinds(report: &Value) -> BTreeSet<String> {
+/// Returns the kinds of damage in a report.
+pub(crate) fn kinds(report: &Value) -> BTreeSet<String> {
     let damage = report["damage"].as_object().expect("an object");
     damage.keys().cloned().collect()
 }
@@ -401,107 +402,4 @@ fn missing_or_changed_inputs_are_notes_not_damage() {
         let line = line.unwrap_or_else(|| panic!("{what}: {}", told.out));
         assert!(line.contains(path.to_str().expect("UTF-8")), "{line}");
     }
-}
-
-/// A disk that is not mounted looks like an empty folder.
-#[test]
-fn a_repair_changes_no_result_while_most_files_are_missing_unless_that_is_accepted() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = done(dir.path());
-    let (artifacts, away) = (project.artifacts_dir(), dir.path().join("away"));
-    let before = at(&project, &["status", "--json"]).expect(0).out;
-    let unknown = artifacts.join("tmp/4711-0");
-    std::fs::rename(&artifacts, &away).expect("moved");
-    std::fs::create_dir_all(artifacts.join("tmp")).expect("a folder");
-    std::fs::write(&unknown, "half").expect("written");
-    for args in [&["check"][..], &["check", "--repair"]] {
-        let kept = at(&project, args).expect(12);
-        assert!(kept.out.contains("no result file is there"), "{}", kept.out);
-        assert!(kept.next()[0].ends_with("--repair --accept-missing"));
-        assert!(unknown.exists(), "nothing is removed either");
-    }
-    let kept = at(&project, &["check", "--repair", "--json"])
-        .expect(12)
-        .json();
-    assert_eq!(kept["repaired"]["withheld"], true);
-    assert_eq!(kept["repaired"]["requeued"], 0);
-    assert_eq!(at(&project, &["status", "--json"]).expect(0).out, before);
-    std::fs::remove_dir_all(&artifacts).expect("removed");
-    std::fs::rename(&away, &artifacts).expect("mounted");
-    at(&project, &["check", "--repair"]).expect(0);
-    std::fs::remove_dir_all(&artifacts).expect("removed");
-    at(&project, &["check", "--accept-missing"]).expect(2);
-    let repaired = at(&project, &["check", "--repair", "--accept-missing"]).expect(0);
-    assert!(
-        repaired.out.contains("2 pairs will run again"),
-        "{}",
-        repaired.out
-    );
-}
-
-#[cfg(unix)]
-#[test]
-fn artifacts_that_cannot_be_read_end_a_check_once_and_change_nothing() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = done(dir.path());
-    let before = at(&project, &["status", "--json"]).expect(0).out;
-    let (artifacts, away) = (project.artifacts_dir(), dir.path().join("away"));
-    std::fs::rename(&artifacts, &away).expect("moved");
-    let file = || std::fs::write(&artifacts, "no folder");
-    let link = || std::os::unix::fs::symlink(dir.path().join("unmounted"), &artifacts);
-    let cases: [(&dyn Fn() -> std::io::Result<()>, &str); 2] = [
-        (&file, "is a file, where this program keeps a folder"),
-        (&link, "a link to a folder that is not there"),
-    ];
-    for (block, reason) in cases {
-        block().expect("made");
-        for args in [
-            &["check"][..],
-            &["check", "--repair"],
-            &["check", "--repair", "--accept-missing"],
-            &["check", "--collect=1"],
-            &["export", "-o", "out"],
-        ] {
-            let refused = at(&project, args).expect(1);
-            assert_eq!(refused.err.matches(reason).count(), 1, "{}", refused.err);
-        }
-        std::fs::remove_file(&artifacts).expect("removed");
-    }
-    assert_eq!(at(&project, &["status", "--json"]).expect(0).out, before);
-    std::fs::rename(&away, &artifacts).expect("mounted");
-    at(&project, &["check"]).expect(0);
-}
-
-/// A folder that somebody made, a pipe, and a file where a folder belongs.
-#[cfg(unix)]
-#[test]
-fn what_is_in_the_place_of_an_artifact_is_named_and_concerns_its_pair_alone() {
-    use rustix::fs::{CWD, FileType, Mode, mknodat};
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = done(dir.path());
-    let before = exported(&project, "before");
-    let blocked = artifact(&project, 0, Stage::Depth, "depth.png");
-    std::fs::remove_file(&blocked).expect("removed");
-    let make_pipe = |path: &Path| mknodat(CWD, path, FileType::Fifo, Mode::RUSR, 0);
-    make_pipe(&blocked).expect("a pipe");
-    let found = at(&project, &["check", "--json"]).expect(12).json();
-    assert_eq!(kinds(&found), ["file_unreadable".to_owned()].into());
-    std::fs::remove_file(&blocked).expect("removed");
-    std::fs::create_dir_all(blocked.join("mine")).expect("a folder");
-    let text = format!("{} is a directory, where", blocked.display());
-    for args in [&["check"][..], &["check", "--repair"]] {
-        let found = at(&project, args).expect(12);
-        assert!(found.out.contains(&text), "{}", found.out);
-        assert!(found.next().is_empty(), "{}", found.err);
-    }
-    let ended = at(&project, &["run", "--rerun", "all"]).expect(3);
-    assert_eq!(ended.err.matches(&text).count(), 1, "{}", ended.err);
-    let status = at(&project, &["status", "--json"]).expect(0).json();
-    assert_eq!(status["jobs"]["done"], 1, "{status}");
-    assert_eq!(status["jobs"]["quarantined"], 1, "{status}");
-    std::fs::remove_dir_all(&blocked).expect("moved away");
-    at(&project, &["retry"]).expect(0);
-    at(&project, &["run"]).expect(0);
-    at(&project, &["check"]).expect(0);
-    assert!(exported(&project, "after") == before, "another export");
 }

@@ -13,6 +13,7 @@ mod block_view;
 mod blocks;
 mod browser;
 mod check;
+mod check_files;
 mod cli;
 #[cfg(unix)]
 mod copies;
@@ -69,6 +70,7 @@ mod memory;
 mod names;
 mod object_store;
 mod object_store_blocks;
+mod object_store_owner;
 mod odd;
 #[cfg(unix)]
 mod old_snapshots;

@@ -13,7 +13,7 @@ use mocban::check::{CheckOptions, check};
 use mocban::store::Project;
 
 use crate::cli::{Call, binary, call, empty, mocban};
-use crate::resume::{copy_folder, project};
+use crate::resume::project;
 use crate::s3_server::{Faults, Outage, S3Server, proxy, proxy_with_outage};
 use crate::uninterrupted::{assert_same_files, files};
 
@@ -25,14 +25,14 @@ const GOOD: Faults = Faults {
 };
 
 /// A project with local files that has been run, and one with the same pairs in an object store, not run yet.
-struct Remote {
+pub(crate) struct Remote {
     dir: tempfile::TempDir,
-    server: S3Server,
+    pub(crate) server: S3Server,
 }
 
 impl Remote {
     /// Returns `None` if no server is installed.
-    fn new() -> Option<Self> {
+    pub(crate) fn new() -> Option<Self> {
         let server = S3Server::start()?;
         let dir = empty();
         let local = project(dir.path(), "local", PAIRS);
@@ -62,27 +62,40 @@ impl Remote {
         Some(made)
     }
 
-    fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         self.dir.path()
     }
 
     /// Returns a command on the remote project through a port, with the cache of one machine.
-    fn command(&self, port: u16, cache: &str, args: &[&str]) -> Command {
+    pub(crate) fn command(&self, port: u16, cache: &str, args: &[&str]) -> Command {
+        let mut command = self.command_of("remote", port, cache);
+        command.args(args);
+        command
+    }
+
+    /// Like [`Self::command`], on another project and without arguments.
+    pub(crate) fn command_of(&self, project: &str, port: u16, cache: &str) -> Command {
         let mut command = binary();
         command.current_dir(self.path());
         command.env("XDG_CACHE_HOME", self.path().join(cache));
         S3Server::configure(&mut command, port);
-        command.args(["-C", "remote"]).args(args);
+        command.args(["-C", project]);
         command
     }
 
-    fn remote(&self, port: u16, args: &[&str]) -> Call {
+    pub(crate) fn remote(&self, port: u16, args: &[&str]) -> Call {
         call(&mut self.command(port, "cache", args))
+    }
+
+    /// Makes the project the owner of the store, so that the first request of a run that writes stores a result.
+    fn own_the_store(&self) {
+        let port = self.server.port();
+        self.remote(port, &["check", "--take-over"]).expect(0);
     }
 
     /// Checks that both projects have the same export, and that nothing is damaged.
     #[track_caller]
-    fn assert_same_results(&self) {
+    pub(crate) fn assert_same_results(&self) {
         for folder in ["of-local", "of-remote"] {
             let _ = std::fs::remove_dir_all(self.path().join(folder));
         }
@@ -200,6 +213,7 @@ fn a_store_that_is_away_is_waited_for_and_nobody_is_blamed() {
     let Some(remote) = Remote::new() else { return };
     let outage = Outage::default();
     let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    remote.own_the_store();
     outage.begin_at_put();
     let mut run = RunInOutage::start(&mut remote.command(port, "cache", &["run", "-j", "2"]));
     run.wait_for("a request to the object store has been running");
@@ -218,6 +232,7 @@ fn a_stop_request_ends_the_wait_for_a_store_that_is_away() {
     let Some(remote) = Remote::new() else { return };
     let outage = Outage::default();
     let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    remote.own_the_store();
     outage.begin_at_put();
     let mut run = RunInOutage::start(&mut remote.command(port, "cache", &["run", "-j", "2"]));
     run.wait_for("waiting for it to store results");
@@ -241,6 +256,7 @@ fn a_stop_request_does_not_wait_until_a_request_is_given_up() {
     let Some(remote) = Remote::new() else { return };
     let outage = Outage::default();
     let (port, _) = proxy_with_outage(remote.server.port(), GOOD, &outage);
+    remote.own_the_store();
     outage.begin_at_put();
     let mut command = remote.command(port, "cache", &["run", "-j", "2"]);
     let mut run = command.spawn().expect("the binary starts");
@@ -277,70 +293,6 @@ fn a_lost_pack_is_computed_again() {
     remote.remote(port, &["check", "--repair"]).expect(0);
     remote.remote(port, &["run"]).expect(0);
     remote.assert_same_results();
-}
-
-#[test]
-fn settings_of_the_store_that_are_wrong_are_explained() {
-    let Some(remote) = Remote::new() else { return };
-    let port = remote.server.port();
-    let refused = |command: &mut Command, code: i32, wanted: &str| {
-        let refused = call(command).expect(code);
-        assert!(refused.err.contains(wanted), "{}", refused.err);
-        assert!(
-            !refused.err.contains("secret-of-the-test"),
-            "{}",
-            refused.err
-        );
-        assert_eq!(refused.err.lines().count(), 1, "{}", refused.err);
-    };
-    let set = |setting: &str| remote.command(port, "cache", &["--set", setting, "run"]);
-    let missing = &mut set("storage.artifacts=s3://no-such-bucket/x");
-    refused(missing, 2, "s3://no-such-bucket/x: there is no such bucket");
-    refused(
-        &mut set("storage.artifacts=https://x"),
-        2,
-        "begins with s3://",
-    );
-    refused(
-        &mut set("storage.roots.scans=data"),
-        2,
-        "give an absolute path",
-    );
-    refused(
-        &mut set("storage.roots.Scans=/data"),
-        2,
-        "storage.roots.Scans: ",
-    );
-    let mut status = remote.command(port, "cache", &["status"]);
-    call(status.env_remove("AWS_ACCESS_KEY_ID")).expect(0);
-    let without_keys = &mut remote.command(port, "cache", &["run"]);
-    refused(
-        without_keys.env_remove("AWS_ACCESS_KEY_ID"),
-        2,
-        "no keys: set AWS_ACCESS_KEY_ID",
-    );
-    // A port that was just free, so nobody listens there.
-    let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).expect("a port");
-    let away = listener.local_addr().expect("an address").port();
-    drop(listener);
-    let away = &mut remote.command(away, "cache", &["run"]);
-    refused(away, 1, "the object store does not answer properly");
-    let list = "id,mesh,print\nnew,scans:meshes/none.obj,scans:prints/none.png\n";
-    std::fs::write(remote.path().join("more.csv"), list).expect("written");
-    let import = remote.remote(port, &["import", "more.csv"]).expect(2);
-    assert!(import.err.contains("2 files are missing"), "{}", import.err);
-    remote.remote(port, &["run"]).expect(0);
-    // Without the setting, nobody knows where the packs are.
-    std::fs::write(remote.path().join("remote/mocban.toml"), "").expect("written");
-    let without_store = ["--set", "storage.roots.scans=s3://mocban/scans"];
-    let export = ["export", "--to", "jsonl", "-o", "lost"];
-    let export = remote.remote(port, &[&without_store[..], &export].concat());
-    assert_ne!(export.code, 0);
-    assert!(
-        export.err.contains("set storage.artifacts"),
-        "{}",
-        export.err
-    );
 }
 
 #[test]
@@ -446,109 +398,4 @@ fn make_old(folder: &Path) {
         let changed = file.and_then(|file| file.set_modified(old));
         changed.expect("changed");
     }
-}
-
-/// A backup restored beside the original, and a copied folder, name the same bucket.
-#[test]
-fn a_bucket_belongs_to_one_catalog_until_another_takes_it_over() {
-    let Some(remote) = Remote::new() else { return };
-    let port = remote.server.port();
-    remote.remote(port, &["run"]).expect(0);
-    remote.remote(port, &["backup", "b.sqlite"]).expect(0);
-    mocban(remote.path(), &["restore", "b.sqlite", "again"]).expect(0);
-    let settings = |folder: &str| remote.path().join(folder).join("mocban.toml");
-    std::fs::copy(settings("remote"), settings("again")).expect("copied");
-    copy_folder(&remote.path().join("remote"), &remote.path().join("copy"));
-    let objects = remote.server.list("results");
-    let of = |folder: &str, args: &[&str]| {
-        let mut command = remote.command(port, "cache", &[]);
-        call(command.args(["-C", folder]).args(args))
-    };
-    for (folder, kind) in [
-        ("again", "of another catalog"),
-        ("copy", "the original or a copy"),
-    ] {
-        for args in [
-            &["check", "--repair"][..],
-            &["check", "--collect=1"],
-            &["run", "--rerun", "all"],
-            &["plan"],
-        ] {
-            let refused = of(folder, args).expect(2);
-            for wanted in [
-                "s3://mocban/results",
-                kind,
-                "remote/catalog.sqlite",
-                "--take-over",
-            ] {
-                assert!(refused.err.contains(wanted), "{wanted}: {}", refused.err);
-            }
-        }
-        assert!(of(folder, &["check"]).expect(0).err.contains("warning: "));
-    }
-    assert_eq!(remote.server.list("results"), objects);
-    // The project is moved, without a word, and another catalog takes the place over.
-    std::fs::rename(remote.path().join("remote"), remote.path().join("moved")).expect("moved");
-    let told = of("moved", &["check", "--repair"]).expect(0);
-    assert!(!told.err.contains("warning"), "{}", told.err);
-    let told = of("again", &["check", "--take-over"]).expect(0);
-    assert!(
-        told.err.contains("now belongs to this catalog"),
-        "{}",
-        told.err
-    );
-    of("again", &["check", "--repair"]).expect(0);
-    let refused = of("moved", &["run"]).expect(2);
-    assert!(
-        refused.err.contains("again/catalog.sqlite"),
-        "{}",
-        refused.err
-    );
-    of("again", &["run"]).expect(0);
-}
-
-/// Wrong settings look as if every result were gone.
-#[test]
-fn a_repair_with_a_store_that_cannot_be_read_changes_nothing() {
-    let Some(remote) = Remote::new() else { return };
-    let port = remote.server.port();
-    remote.remote(port, &["run"]).expect(0);
-    let before = remote.remote(port, &["status", "--json"]).expect(0).out;
-    let set = |setting: &str, args: &[&str]| {
-        let all = [&["--set", setting][..], args].concat();
-        call(&mut remote.command(port, "cache", &all))
-    };
-    for args in [
-        &["check"][..],
-        &["check", "--repair"],
-        &["check", "--repair", "--accept-missing"],
-    ] {
-        let refused = set("storage.artifacts=s3://no-such-bucket/x", args).expect(1);
-        let reason = "there is no such bucket";
-        assert_eq!(refused.err.matches(reason).count(), 1, "{}", refused.err);
-        assert!(refused.out.is_empty(), "{}", refused.out);
-    }
-    // Another folder has no results.
-    let kept = set(
-        "storage.artifacts=s3://mocban/other",
-        &["check", "--repair"],
-    )
-    .expect(12);
-    assert!(kept.out.contains("no result file is there"), "{}", kept.out);
-    let away = call(
-        remote
-            .command(1, "cache", &["check", "--repair"])
-            .env("MOCBAN_STORE_TIME_SCALE", "240"),
-    )
-    .expect(1);
-    assert!(
-        away.err.contains("does not answer properly"),
-        "{}",
-        away.err
-    );
-    assert_eq!(
-        remote.remote(port, &["status", "--json"]).expect(0).out,
-        before
-    );
-    remote.assert_same_results();
 }

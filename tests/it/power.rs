@@ -299,8 +299,11 @@ fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
         .read_dir()
         .expect("a folder")
     {
-        let name = folder.expect("an entry").file_name();
-        std::fs::create_dir_all(project.artifacts_dir().join(name)).expect("a folder");
+        let folder = folder.expect("an entry");
+        if folder.file_type().expect("a type").is_dir() {
+            let name = folder.file_name();
+            std::fs::create_dir_all(project.artifacts_dir().join(name)).expect("a folder");
+        }
     }
     let mut command = run(&project, &["-j", "1"]);
     let recorded = Recorded::of(project.dir(), &root.join("notes"), start, &mut command);

@@ -68,7 +68,6 @@ fn hostile_project(dir: &Path) {
         &call(run(&project, &["--color", "always"]).args(["--progress", "plain"])).expect(3),
     );
     let note = HOSTILE.replace('\n', " ");
-    let reviewer = format!("{PLAIN}\u{202e}\u{200b}");
     for color in ["never", "always"] {
         let set = [
             "verdict",
@@ -76,7 +75,7 @@ fn hostile_project(dir: &Path) {
             "upright-0001",
             "fail",
             "--reviewer",
-            &reviewer,
+            PLAIN,
             "--note",
             &note,
         ];

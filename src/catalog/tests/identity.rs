@@ -11,7 +11,8 @@ async fn a_catalog_keeps_its_identity_and_a_copy_has_one_of_its_own() {
     assert_eq!(identity.id.len(), 32);
     let again = world.place.open().await.expect("a catalog");
     assert_eq!(again.identity().await.expect("an identity"), identity);
-    let copy = Place::new().create().await.expect("a catalog");
+    let target = Place::new();
+    let copy = target.create().await.expect("a catalog");
     let copied = world.catalog.copy_to(&copy, |_, _| {}).await;
     copied.expect("copied");
     let other = copy.identity().await.expect("an identity");

@@ -66,6 +66,9 @@ async fn content(project: &Project, catalog: &Catalog) -> BTreeMap<String, Strin
     }
     for folder in std::fs::read_dir(project.artifacts_dir()).expect("a folder") {
         let folder = folder.expect("an entry").path();
+        if folder.ends_with("owner.json") {
+            continue;
+        }
         for file in std::fs::read_dir(&folder).expect("a folder") {
             let path = file.expect("an entry").path();
             let bytes = std::fs::read_to_string(&path).expect("text");

@@ -1,0 +1,52 @@
+//! The router of a server: its start address, and pages that only the session sees.
+
+use std::sync::Arc;
+
+use axum::extract::{RawQuery, State};
+use axum::http::{Method, StatusCode, header};
+use axum::response::{Html, IntoResponse as _, Response};
+use axum::routing::get;
+use axum::{Router, middleware};
+
+use super::access_control::AccessControl;
+use super::guard::guard;
+use super::page_frame::{closed_page, forward_page};
+use super::session::{SESSION_SCRIPT, START};
+
+impl AccessControl {
+    /// Returns the router of a server: the start address, and `pages` for requests of the session. The paths of `pages`
+    /// are those below the path of the session, so links between pages must be relative.
+    pub fn guarded(self: &Arc<Self>, pages: Router) -> Router {
+        let script = [(header::CONTENT_TYPE, "text/javascript; charset=utf-8")];
+        let text = include_str!("../../assets/local-server/session.js");
+        Router::new()
+            .route(START, get(start))
+            .with_state(Arc::clone(self))
+            .route(SESSION_SCRIPT, get(async move || (script, text)))
+            .fallback_service(pages)
+            .layer(middleware::from_fn_with_state(Arc::clone(self), guard))
+    }
+}
+
+/// Accepts the one-time token, sets the session cookie, and responds with a page that leads on to the session. A redirect
+/// would not work: a browser sends a `SameSite=Strict` cookie only if the navigation starts on this site.
+async fn start(
+    State(access): State<Arc<AccessControl>>,
+    method: Method,
+    RawQuery(query): RawQuery,
+) -> Response {
+    // Programs that preview links send HEAD, which must not use up the token.
+    if method != Method::GET {
+        return StatusCode::METHOD_NOT_ALLOWED.into_response();
+    }
+    let session = &access.session;
+    let token = query
+        .as_deref()
+        .and_then(|query| query.strip_prefix("token="));
+    if session.open(token.unwrap_or_default()) {
+        let cookie = [(header::SET_COOKIE, session.set_cookie())];
+        return (cookie, Html(forward_page(&session.path).into_string())).into_response();
+    }
+    // The script of this page leads a browser that has opened the session on to it.
+    (StatusCode::FORBIDDEN, Html(closed_page().into_string())).into_response()
+}
