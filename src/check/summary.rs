@@ -173,12 +173,13 @@ impl CheckSummary {
 
     /// Returns whether `check --repair` by this user could repair something.
     pub fn is_repairable(&self) -> bool {
+        let is_missing = |finding: &Finding| finding.what.ends_with(" is missing");
         self.rows_to_set_apart > 0
-            || (self.damage.keys()).any(|kind| {
-                !matches!(
-                    kind,
-                    Kind::Database | Kind::Reference | Kind::Row | Kind::FileUnreadable
-                )
+            || self.damage.iter().any(|(kind, found)| match kind {
+                Kind::Database | Kind::Reference | Kind::Row | Kind::FileUnreadable => false,
+                // A repair creates what is missing, and leaves what other programs added.
+                Kind::Schema => found.first.iter().any(is_missing),
+                _ => true,
             })
     }
 

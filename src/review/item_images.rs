@@ -87,11 +87,11 @@ impl ItemImages {
             view,
             canvas_from_print: inputs.canvas_from_print,
             scores: inputs.mask_overlap(print_from_depth),
-            print: print.into(),
-            print_mask: png_mask(&print_mask).into(),
-            relief: png_rgb8(&view.relief(&inputs.depth, print_from_depth)).into(),
-            depth_mask: png_mask(&view.mask(&inputs.strokes, print_from_depth)).into(),
-            stroke_map: stroke_map(&view, &inputs, &masks, item).into(),
+            print: exact(print),
+            print_mask: exact(png_mask(&print_mask)),
+            relief: exact(png_rgb8(&view.relief(&inputs.depth, print_from_depth))),
+            depth_mask: exact(png_mask(&view.mask(&inputs.strokes, print_from_depth))),
+            stroke_map: exact(stroke_map(&view, &inputs, &masks, item)),
         })
     }
 
@@ -103,6 +103,11 @@ impl ItemImages {
             + self.depth_mask.len()
             + self.stroke_map.len()
     }
+}
+
+/// Returns an image without spare capacity, because [`ItemImages::bytes`] counts only its length.
+fn exact(image: Vec<u8>) -> Bytes {
+    image.into_boxed_slice().into()
 }
 
 /// Draws where the mask and the ink of an item disagree. The map is computed again from the alignment that the item
@@ -170,12 +175,13 @@ impl ImageCache {
             ImageLayer::Relief => self.of(item).await?.relief.clone(),
             ImageLayer::DepthMask => self.of(item).await?.depth_mask.clone(),
             ImageLayer::StrokeMap => self.of(item).await?.stroke_map.clone(),
-            ImageLayer::DepthFrameRelief => self.alignment_inputs(item).await?.relief().into(),
+            ImageLayer::DepthFrameRelief => self.draw(item, AlignmentInputs::relief).await?,
             ImageLayer::DepthFrameMask => {
-                png_mask(&self.alignment_inputs(item).await?.strokes).into()
+                self.draw(item, |inputs| png_mask(&inputs.strokes)).await?
             }
             ImageLayer::CanvasMask => {
-                png_mask(&self.alignment_inputs(item).await?.canvas_mask).into()
+                self.draw(item, |inputs| png_mask(&inputs.canvas_mask))
+                    .await?
             }
         })
     }
@@ -202,16 +208,18 @@ impl ImageCache {
         images
     }
 
-    /// Reads the data for a manual alignment of an item.
+    /// Draws an image for the manual alignment of an item.
     ///
     /// # Errors
     /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
-    async fn alignment_inputs(
+    async fn draw(
         &self,
         item: &Arc<ReviewItem>,
-    ) -> Result<AlignmentInputs, ImageError> {
-        let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
-            AlignmentInputs::read(&PairArtifacts::new(project, pair), item)
+        draw: impl FnOnce(&AlignmentInputs) -> Vec<u8> + Send + 'static,
+    ) -> Result<Bytes, ImageError> {
+        let read = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
+            let inputs = AlignmentInputs::read(&PairArtifacts::new(project, pair), item)?;
+            Ok(draw(&inputs).into())
         };
         self.read(item, read).await
     }

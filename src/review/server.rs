@@ -71,9 +71,9 @@ pub async fn bind(
     let listener = listen(address, &name).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let work = Arc::new(WorkThread::default());
-    let images = (catalog.clone(), project.clone(), Arc::clone(&work));
+    let (read, files) = (catalog.clone(), project.clone());
     let state = ServerState {
-        images: ImageCache::new(images.0, images.1, options.limits, images.2),
+        images: ImageCache::new(read, files, options.limits, Arc::clone(&work)),
         work,
         access: Arc::new(AccessControl::new("review", address).map_err(ReviewError::Token)?),
         catalog,

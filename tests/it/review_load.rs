@@ -11,6 +11,7 @@ use crate::cli::{call, mocban};
 use crate::memory::enlarge;
 use crate::page::{NO_CHECKS, Page, answer, open_review};
 use crate::resume::{pairs, project, run};
+use crate::test_size::trials;
 
 /// Sets the maximum number of open files of a process.
 fn limit_files(pid: Pid, files: u64) {
@@ -149,4 +150,33 @@ fn memory_does_not_grow_with_the_number_of_items_shown() {
     });
     let peak = peak_mib(page.pid());
     assert!(peak < 160, "{peak} MiB");
+}
+
+/// Eight clients at once. Most requests are answered from memory; in each trial, each client also reads a scan, draws an
+/// image, and reads the queue, for which errors are planted in depth maps.
+#[test]
+fn memory_does_not_grow_with_the_number_of_requests() {
+    let (_dir, _project, page) = open_review(&[]);
+    let queue = page.queue();
+    let ids = queue.iter().map(|item| item["id"].as_str().expect("an id"));
+    let ids: Vec<&str> = ids.collect();
+    let (site, ids, trials) = (&*page, &*ids, trials(8));
+    std::thread::scope(|scope| {
+        for client in 0..8 {
+            scope.spawn(move || {
+                let get = |path: &str| assert_eq!(site.get(path).status, 200, "{path}");
+                for trial in 0..trials {
+                    let id = ids[(5 * client + trial) % ids.len()];
+                    get(&format!("/scan/{id}"));
+                    get(&format!("/image/{id}/depth-frame-relief"));
+                    get("/api/queue");
+                    for i in 0..40 {
+                        get(&format!("/image/{}/print", ids[i % ids.len()]));
+                    }
+                }
+            });
+        }
+    });
+    let peak = peak_mib(page.pid());
+    assert!(peak < 232, "{peak} MiB");
 }
