@@ -228,15 +228,15 @@ fn missing_files(summary: &CheckSummary) -> Option<String> {
     };
     let inputs = match summary.inputs_missing.count {
         0 => "",
-        _ => "once scans and prints are at their places, ",
+        _ => "put scans and prints at their places; then ",
     };
     let withheld = if summary.repaired.withheld {
-        "so nothing was queued again; "
+        ", so nothing was queued again"
     } else {
         ""
     };
     Some(format!(
-        "{which}, as after `restore`, or if a disk is not mounted, {withheld}if they are really gone, {inputs}\
+        "{which}, as after `restore`, or if a disk is not mounted{withheld}; if they are really gone, {inputs}\
          `check --repair --accept-missing` and `run` compute them again"
     ))
 }

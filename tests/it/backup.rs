@@ -24,7 +24,7 @@ pub(crate) fn files(dir: &Path) -> Vec<String> {
 #[test]
 fn backup_taken_during_a_run_restores_to_the_same_export() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let original = project(dir.path(), "original", "3");
+    let original = project(dir.path(), "original", "8");
     std::fs::write(original.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
     let blank = dir.path().join("blank");
     copy_folder(&original.dir().join("data"), &blank.join("data"));
@@ -54,7 +54,7 @@ fn backup_taken_during_a_run_restores_to_the_same_export() {
     assert!(std::fs::read(blank.settings_path()).expect("settings") == settings);
     let accept = ["check", "--repair", "--accept-missing", "--json"];
     let repaired = at(&blank, &accept).expect(0).json();
-    assert_eq!(repaired["pairs"], 3);
+    assert_eq!(repaired["pairs"], 8);
     assert!(
         repaired["damage"]["file_missing"]["found"].as_u64() >= Some(1),
         "{repaired}"
