@@ -39,10 +39,10 @@ impl StoredStages {
     ///
     /// # Errors
     /// Returns `self` if the lease is lost or ended with the pair's last stage, or if a stage was left unstored.
-    pub(super) fn into_lease(self) -> Result<Lease, Self> {
+    pub(super) fn into_lease(self) -> Result<Lease, Box<Self>> {
         match self.lease {
             CheckpointOutcome::Lease(lease) if self.unwritten.is_none() => Ok(lease),
-            lease => Err(Self { lease, ..self }),
+            lease => Err(Box::new(Self { lease, ..self })),
         }
     }
 

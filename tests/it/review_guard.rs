@@ -149,7 +149,7 @@ fn nothing_is_served_without_the_cookie_or_without_the_path_of_the_session() {
         let get = |path: &str, headers: &[_]| {
             send(target.page.address(), "GET", path, headers, b"").expect("a reply")
         };
-        let without_cookie = get(&target.path(page), &[host.clone()]);
+        let without_cookie = get(&target.path(page), std::slice::from_ref(&host));
         assert_eq!(without_cookie.status, 401, "{page}");
         for session in ["", "/s", "/s/", &guessed, &target.page.session[..40]] {
             let path = format!("{session}{page}");
