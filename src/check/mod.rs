@@ -5,6 +5,7 @@
 //! are set apart where they are.
 
 mod blocks;
+mod damaged_jobs;
 mod finding;
 mod pairs;
 mod summary;
@@ -20,9 +21,10 @@ use crate::catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use crate::domain::{BlockId, BlockStage, PairId, Stage, UnixMillis};
+use crate::domain::{BlockId, BlockStage, UnixMillis};
 use crate::runner::{RunError, claim_artifacts};
 use crate::store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
+use damaged_jobs::{DamagedJobs, repair_jobs};
 use pairs::PairCheck;
 
 /// Number of pairs in memory at a time.
@@ -206,7 +208,8 @@ async fn rows_and_files(
         }
     }
     back.blocks = check_blocks(project, catalog, options.quick, &mut named, summary).await?;
-    let is_withheld = options.repair && !repair_jobs(catalog, options, back, summary).await?;
+    let is_withheld =
+        options.repair && !repair_jobs(catalog, options.accept_missing, back, summary).await?;
     if options.repair {
         catalog.remove_stale_files();
     }
@@ -247,42 +250,6 @@ async fn damaged_rows(
         catalog.set_apart(apart, options.now).await?;
     }
     Ok(faulty)
-}
-
-/// The damaged pairs and blocks that a repair sends back, each with its first damaged stage. All are known before the
-/// first one is sent back, because their number decides whether a repair is plausible.
-#[derive(Debug, Default)]
-struct DamagedJobs {
-    pairs: Vec<(PairId, Stage)>,
-    blocks: Vec<(BlockId, BlockStage)>,
-}
-
-/// Sends damaged pairs and blocks back, so that the next run computes their results again. Returns `false`, and changes
-/// nothing, if most result files are missing and the caller does not accept that.
-async fn repair_jobs(
-    catalog: &Catalog,
-    options: CheckOptions,
-    back: DamagedJobs,
-    summary: &mut CheckSummary,
-) -> Result<bool, CheckError> {
-    let DamagedJobs { pairs, blocks } = back;
-    if pairs.is_empty() && blocks.is_empty() {
-        return Ok(true);
-    }
-    if summary.lacks_most_files() && !options.accept_missing {
-        summary.repaired.withheld = true;
-        return Ok(false);
-    }
-    summary.repaired.requeued += pairs.len() as u64;
-    summary.repaired.requeued_blocks += blocks.len() as u64;
-    for page in pairs.chunks(PAGE) {
-        catalog.restore(page.to_vec()).await?;
-    }
-    if !blocks.is_empty() {
-        catalog.reset_blocks(blocks).await?;
-    }
-    summary.mark_repairable();
-    Ok(true)
 }
 
 /// Checks all blocks, and adds their artifacts to `named`. Returns the damaged blocks, each with its first damaged
