@@ -15,8 +15,8 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 use axum::{Router, middleware};
 
-/// The names under which a server without a session is asked for: IP addresses, `localhost`, and those of the user. A
-/// server that other computers can reach is also asked for by the name of its computer, and by names without a dot.
+/// The host names that a server without a session accepts: IP addresses, `localhost`, and names that the user gives. A
+/// server that other computers can reach also accepts the name of its computer, and names without a dot.
 #[derive(Debug)]
 pub struct ServedNames {
     /// In lower case.

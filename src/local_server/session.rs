@@ -17,8 +17,8 @@ const PATHS: &str = "/s/";
 
 /// Secrets of one start of the server.
 ///
-/// A request needs both the cookie and the path. Browsers share cookies among all ports of a host, but they tell the
-/// path of a page to no other server. The path also is in the history of the browser, which has no cookies.
+/// A request needs both the cookie and the path. Browsers send a cookie to all ports of a host, but send the
+/// path of a page to no other server. The history of the browser has the path, but not the cookie.
 #[derive(Debug)]
 pub(super) struct Session {
     /// The one-time token of the start address.

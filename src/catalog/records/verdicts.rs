@@ -362,7 +362,7 @@ pub(crate) async fn log(
         .await
 }
 
-/// Returns the query of [`LOG`]: of an action or a pair, with rows after a number and at most so many.
+/// Returns the query of [`LOG`]: of an action or a pair, for a limited number of rows after a row.
 fn select_log(
     (act, pair): (Option<i64>, Option<&PairName>),
     (after, limit): (Option<i64>, Option<i64>),
