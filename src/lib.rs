@@ -189,7 +189,7 @@
 //! iterate over its `ALL` or `PAPER`, or take a metric as an argument:
 //!
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
-//! - `src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
+//! - `crates/core/src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/report/comparison.rs`: which metrics are compared with each other
 //! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
@@ -211,7 +211,7 @@
 //! ## The 3D view
 //!
 //! `src/export/scan_view/scan_data.rs` encodes a scan in the frame of its print with textures, which `view_inputs.rs` beside
-//! it reads; `src/mesh/clustering.rs` simplifies large scans. `assets/scan-viewer/scan-viewer.js` shows the data in three
+//! it reads; `crates/core/src/mesh/clustering.rs` simplifies large scans. `assets/scan-viewer/scan-viewer.js` shows the data in three
 //! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
@@ -268,23 +268,19 @@ pub mod cli;
 pub mod config;
 pub mod demo;
 pub mod documentation;
-pub mod domain;
 pub mod export;
 mod failpoint;
 pub mod labels;
 pub mod local_server;
 pub mod manifest;
-pub mod mesh;
-pub mod page_vec;
 mod platform;
 #[cfg(test)]
 #[path = "../tests/support/postgres_server.rs"]
 mod postgres_server;
-pub mod raster;
 pub mod report;
 pub mod review;
 pub mod runner;
-mod simd;
 pub mod stages;
 pub mod store;
 pub mod view;
+pub use mocban_core::{domain, mesh, page_vec, raster, simd};

@@ -11,7 +11,7 @@ use super::relief::Relief;
 use super::stored_heights::StoredHeights;
 use super::window_images::ShrunkRelief;
 use super::windows::{WindowSizes, match_windows};
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Rotations of the page against the outline of the face that are searched, apart from quarter turns: up to this angle,
 /// degrees.
@@ -280,7 +280,7 @@ mod tests {
     use super::super::test_world::{SIDES_MM, TestWorld};
     use super::{CarvedFace, PageAlignment, align};
     use crate::block::{BlockError, PageInk};
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     fn aligned(world: &TestWorld, page: &PageInk) -> Result<PageAlignment, BlockError> {
         let face: CarvedFace = world.face();

@@ -4,7 +4,7 @@ use super::align::CarvedFace;
 use super::characters::PlacedCharacter;
 use super::page_map::PageMap;
 use super::relief::surface_height;
-use crate::domain::{Affine2, PrintFromMesh};
+use mocban_core::domain::{Affine2, PrintFromMesh};
 
 /// Step of the rounded pixels, as a part of the longer edge of the character's box.
 const ROUNDED_PART: f64 = 0.002;
@@ -107,7 +107,7 @@ mod tests {
     use super::super::test_world::{SIDES_MM, TestWorld};
     use super::CharacterMap;
     use crate::block::{CharacterBox, PageMap, Support, place_characters};
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     #[test]
     fn mesh_points_near_the_character_get_the_page_pixels_of_the_map() {

@@ -11,7 +11,7 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::window_images::{ShrunkRelief, WarpedInk, Window};
 use super::windows::{WindowMatch, match_window};
-use crate::domain::cancel::ThreadToken;
+use mocban_core::domain::cancel::ThreadToken;
 
 /// Margin around a character's box whose relief and ink are compared, mm.
 const MARGIN_MM: f64 = 0.8;

@@ -8,10 +8,10 @@ use rustfft::num_complex::Complex32;
 use super::page_ink::PageInk;
 use super::square_fft::{SIZE, SquareFft, quarter_turned};
 use super::window_images::ShrunkRelief;
-use crate::domain::Affine2;
-use crate::domain::cancel::{ThreadToken, poll};
-use crate::raster::Grid;
-use crate::raster::blur::gaussian_blur;
+use mocban_core::domain::Affine2;
+use mocban_core::domain::cancel::{ThreadToken, poll};
+use mocban_core::raster::Grid;
+use mocban_core::raster::blur::gaussian_blur;
 
 /// Blurs whose difference keeps characters and their parts, mm.
 const FINE_BLUR_MM: f64 = 0.9;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::align::{CarvedFace, PageAlignment, refine, shrunk_face};
 use super::page_ink::PageInk;
-use crate::domain::{Affine2, ControlPoint, ControlPoints};
+use mocban_core::domain::{Affine2, ControlPoint, ControlPoints};
 
 /// Largest distance of a control point from the similarity of all, mm. Paper shrinks unevenly by about 2 %, which is
 /// 3 mm on a long block; clicks are accurate to 1 mm.
@@ -167,7 +167,7 @@ mod tests {
     use super::super::test_world::TestWorld;
     use super::{ControlPointError, align_at};
     use crate::block::CarvedFace;
-    use crate::domain::{Affine2, ControlPoint};
+    use mocban_core::domain::{Affine2, ControlPoint};
 
     /// Points of the face in mm, far from each other.
     const PLACES: [[f64; 2]; 4] = [[15.0, 12.0], [135.0, 20.0], [120.0, 85.0], [20.0, 90.0]];

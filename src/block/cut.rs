@@ -8,8 +8,8 @@ use super::align::CarvedFace;
 use super::bounds::bounds;
 use super::characters::PlacedCharacter;
 use super::relief::surface_height;
-use crate::domain::cancel::{ThreadToken, poll, polled};
-use crate::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
+use mocban_core::domain::cancel::{ThreadToken, poll, polled};
+use mocban_core::mesh::{Mesh, MeshReadError, Triangle, TriangleStream, Vertices};
 
 /// Margin around a character's box, mm: ground for the plane and the threshold, but few strokes of neighbours.
 pub const CUT_MARGIN_MM: f64 = 0.8;
@@ -300,7 +300,7 @@ mod tests {
     use super::super::test_world::TestWorld;
     use super::{CELL_MM, CUT_MARGIN_MM, CutPlan, cell_size, cut_meshes};
     use crate::block::{CharacterBox, PlacedCharacter};
-    use crate::mesh::Mesh;
+    use mocban_core::mesh::Mesh;
 
     fn character(face_box: [f64; 4]) -> PlacedCharacter {
         PlacedCharacter {

@@ -1,6 +1,6 @@
 //! Why a block cannot be processed.
 
-use crate::mesh::MeshReadError;
+use mocban_core::mesh::MeshReadError;
 
 /// Why a block cannot be processed.
 #[derive(Debug, thiserror::Error)]

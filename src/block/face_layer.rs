@@ -3,9 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
-use crate::domain::cancel::poll;
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Grid, Mask};
+use mocban_core::domain::cancel::poll;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Pixels of the height map per side of a cell of the mask: 0.6 mm.
 pub(super) const FACE_CELL: usize = 4;
@@ -177,7 +177,7 @@ mod tests {
     use super::super::test_world::frame;
     use super::{FACE_CELL, face_angle, find_face};
     use crate::block::HeightMap;
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     /// A face of 600 x 400 pixels, rotated by an angle, in 1,000 x 800 pixels.
     fn map(angle: f64, other: impl Fn(f64, f64) -> f32) -> HeightMap {

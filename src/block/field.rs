@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::windows::WindowMatch;
-use crate::domain::cancel::ThreadToken;
+use mocban_core::domain::cancel::ThreadToken;
 
 /// Windows below this correlation are left out.
 pub(super) const MIN_NCC: f64 = 0.35;

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::error::BlockError;
 use super::orientation::Orientation;
 use super::scan_sums::ScanPart;
-use crate::domain::cancel::{ThreadToken, poll};
-use crate::mesh::{Triangle, TriangleStream};
-use crate::raster::Grid;
+use mocban_core::domain::cancel::{ThreadToken, poll};
+use mocban_core::mesh::{Triangle, TriangleStream};
+use mocban_core::raster::Grid;
 
 /// Spacing of height maps, mm. Strokes are about 1 mm wide; scans have points every 0.1 to 0.3 mm.
 pub const HEIGHT_STEP_MM: f64 = 0.15;
@@ -278,7 +278,7 @@ mod tests {
     use super::super::test_world::frame;
     use super::{HEIGHT_STEP_MM, HeightMap, MAX_MAP_PIXELS, NO_HEIGHT, draw_height_maps};
     use crate::block::{BlockError, Orientation, ScanPart};
-    use crate::mesh::{Mesh, Triangle};
+    use mocban_core::mesh::{Mesh, Triangle};
 
     /// Triangles of any size and direction within 24 x 16 x 6 mm.
     fn triangles(seed: u64) -> Vec<Triangle> {

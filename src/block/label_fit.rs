@@ -101,7 +101,7 @@ fn share_on_ink(
 mod tests {
     use super::{LabelFit, check_label_fit};
     use crate::block::{CharacterBox, PageInk};
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     const WIDTH: f64 = 700.0;
     const HEIGHT: f64 = 500.0;

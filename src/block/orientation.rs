@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::error::BlockError;
 use super::scan_sums::{SampledTriangle, ScanPart, ScanSums};
-use crate::domain::LengthUnit;
-use crate::domain::cancel::poll;
-use crate::mesh::TriangleStream;
-use crate::mesh::robust_bounds::{bulk_box, is_in_box};
+use mocban_core::domain::LengthUnit;
+use mocban_core::domain::cancel::poll;
+use mocban_core::mesh::TriangleStream;
+use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
 
 /// Typical long side of a block, mm. The unit is the one that brings the long side nearest to it.
 const TYPICAL_LONG_SIDE_MM: f64 = 320.0;
@@ -216,8 +216,8 @@ mod tests {
 
     use super::{Orientation, ScanPart};
     use crate::block::BlockError;
-    use crate::domain::LengthUnit;
-    use crate::mesh::{Mesh, Vertices};
+    use mocban_core::domain::LengthUnit;
+    use mocban_core::mesh::{Mesh, Vertices};
 
     /// A plate of 320 x 200 x 20 mm in any pose, in a unit of `mm` millimetres.
     fn plate(mm: f64) -> (Mesh, Rotation3<f64>) {

@@ -6,7 +6,7 @@ use super::agreement::{Agreement, Support};
 use super::characters::PlacedCharacter;
 use super::page_map::StoredPageMap;
 use super::stored_heights::HeightHeader;
-use crate::domain::{BlockSide, LengthUnit};
+use mocban_core::domain::{BlockSide, LengthUnit};
 
 /// What `face` returns.
 #[derive(Debug, Clone, Serialize, Deserialize)]

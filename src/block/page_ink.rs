@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::error::BlockError;
-use crate::domain::cancel::ThreadToken;
-use crate::raster::blur::gaussian_blur;
-use crate::raster::otsu;
-use crate::raster::{Grid, PrintImage};
+use mocban_core::domain::cancel::ThreadToken;
+use mocban_core::raster::blur::gaussian_blur;
+use mocban_core::raster::otsu;
+use mocban_core::raster::{Grid, PrintImage};
 
 /// Cells along the longer side of the page, in which the brightness of the sheet is estimated: about 1 mm each.
 const CELLS: usize = 400;
@@ -298,7 +298,7 @@ fn halved(ink: &Grid<u8>) -> Grid<u8> {
 mod tests {
     use super::PageInk;
     use crate::block::BlockError;
-    use crate::raster::{Grid, PrintImage};
+    use mocban_core::raster::{Grid, PrintImage};
 
     /// Strokes every 20 pixels on a sheet that is darker at the right, on a scanner's bed of 60 pixels.
     fn page(ink: u16, bed: u16) -> PrintImage {

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::Affine2;
-use crate::raster::Grid;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::Grid;
 
 /// Spacing of the nodes, mm. Paper shrinks and warps smoothly over several centimetres.
 const NODE_STEP_MM: f64 = 5.0;
@@ -248,7 +248,7 @@ pub(super) fn points_of_row(
 #[cfg(test)]
 mod tests {
     use super::{PageMap, StoredPageMap};
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     const LOW: [f64; 2] = [-20.0, 5.0];
     const HIGH: [f64; 2] = [95.0, 71.0];

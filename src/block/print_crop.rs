@@ -1,7 +1,7 @@
 //! Cuts the print of a character out of its page.
 
-use crate::domain::Affine2;
-use crate::raster::{Grid, PrintImage};
+use mocban_core::domain::Affine2;
+use mocban_core::raster::{Grid, PrintImage};
 
 /// The print of one character, cut out of its page.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ pub fn cut_print(
 #[cfg(test)]
 mod tests {
     use super::cut_print;
-    use crate::raster::{Grid, PrintImage};
+    use mocban_core::raster::{Grid, PrintImage};
 
     #[test]
     fn prints_are_turned_upright_and_keep_their_place() {

@@ -7,8 +7,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::face_layer::{FACE_CELL, cells_of_face, face_angle};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
-use crate::domain::cancel::poll;
-use crate::raster::{Grid, Mask};
+use mocban_core::domain::cancel::poll;
+use mocban_core::raster::{Grid, Mask};
 
 /// Side of the cells whose tops are fitted, in pixels of the height map: 4.05 mm. Each contains tops where there is text.
 const CELL: usize = 27;

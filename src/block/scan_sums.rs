@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::domain::cancel::ThreadToken;
-use crate::mesh::robust_bounds::{Bounds, is_in_box};
-use crate::mesh::{MeshReadError, Triangle, TriangleStream};
+use mocban_core::domain::cancel::ThreadToken;
+use mocban_core::mesh::robust_bounds::{Bounds, is_in_box};
+use mocban_core::mesh::{MeshReadError, Triangle, TriangleStream};
 
 /// Triangles that one task sums. Sums are added in a fixed order, so they do not depend on the number of threads.
 const TASK: usize = 4096;

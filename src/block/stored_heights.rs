@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::face_layer::{FACE_CELL, find_face};
 use super::height_map::{HEIGHT_STEP_MM, HeightMap, NO_HEIGHT};
 use super::orientation::Orientation;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Step of stored heights, mm.
 const STORED_STEP_MM: f32 = 0.0005;

@@ -10,8 +10,8 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::stored_heights::{HeightHeader, StoredHeights};
 use super::window_images::ShrunkRelief;
-use crate::domain::Affine2;
-use crate::raster::Grid;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::Grid;
 
 /// Sides of the face, mm.
 pub(super) const SIDES_MM: [f64; 2] = [150.0, 100.0];

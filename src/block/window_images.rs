@@ -7,9 +7,9 @@ use super::height_map::{HEIGHT_STEP_MM, HeightMap};
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::relief::Relief;
-use crate::domain::Affine2;
-use crate::domain::cancel::ThreadToken;
-use crate::raster::Grid;
+use mocban_core::domain::Affine2;
+use mocban_core::domain::cancel::ThreadToken;
+use mocban_core::raster::Grid;
 
 /// Shifts that are correlated together, one per lane.
 pub(super) const LANES: usize = 8;

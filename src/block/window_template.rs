@@ -1,7 +1,7 @@
 //! Normalized cross-correlation of one window of the relief with the ink at many shifts.
 
 use super::window_images::{LANES, ShrunkRelief, WarpedInk, Window};
-use crate::simd::dispatch;
+use mocban_core::simd::dispatch;
 
 /// Windows need this share of their pixels on the face and on the page.
 const MIN_SHARE: f32 = 0.35;

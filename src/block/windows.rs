@@ -6,7 +6,7 @@ use super::page_ink::PageInk;
 use super::page_map::PageMap;
 use super::window_images::{ShrunkRelief, WarpedInk, Window};
 use super::window_template::WindowTemplate;
-use crate::domain::cancel::ThreadToken;
+use mocban_core::domain::cancel::ThreadToken;
 
 /// Sizes of one round of windows.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,7 @@ use crate::catalog::{
     Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, Lease, Result,
     StageCheckpoint,
 };
-use crate::domain::{PairName, UnixMillis};
+use mocban_core::domain::{PairName, UnixMillis};
 
 impl Catalog {
     /// Imports rows in one transaction.

@@ -4,9 +4,9 @@
 use super::finding::{Finding, Kind};
 use super::pairs::kind_of;
 use crate::catalog::AuditedBlock;
-use crate::domain::{BlockId, BlockStage};
 use crate::runner::result_hash;
 use crate::store::{ArtifactError, Project};
+use mocban_core::domain::{BlockId, BlockStage};
 
 /// Result of the check of one block.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use super::summary::CheckSummary;
 use crate::catalog::{Catalog, CatalogError};
-use crate::domain::{BlockId, BlockStage, PairId, Stage};
+use mocban_core::domain::{BlockId, BlockStage, PairId, Stage};
 
 /// Number of pairs that are sent back in one transaction.
 const PAGE: usize = 500;

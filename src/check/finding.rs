@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::catalog::{ChecksummedTable, CounterDrift, FaultyFingerprint, FaultyRow};
-use crate::domain::{PairId, PairName, Stage};
+use mocban_core::domain::{PairId, PairName, Stage};
 
 /// What the user can do about a damaged pair.
 const IMPORT: &str = "import its list again, or restore a backup";

@@ -21,10 +21,10 @@ use crate::catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use crate::domain::{BlockId, BlockStage, UnixMillis};
 use crate::runner::{RunError, claim_artifacts};
 use crate::store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use damaged_jobs::{DamagedJobs, repair_jobs};
+use mocban_core::domain::{BlockId, BlockStage, UnixMillis};
 use pairs::PairCheck;
 
 /// Number of pairs in memory at a time.

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use super::finding::{Finding, Kind};
 use crate::catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
-use crate::domain::{
+use crate::runner::{metric_results, result_hash};
+use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
+use mocban_core::domain::{
     ArtifactRef, ArtifactSet, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
     ThresholdMetric,
 };
-use crate::runner::{metric_results, result_hash};
-use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 
 /// Largest relative difference between a number and its copy in a column.
 const ROUNDING: f64 = 1e-12;
@@ -279,8 +279,10 @@ mod tests {
 
     use super::{Kind, result_hash, state};
     use crate::catalog::{AuditedPair, AuditedResult, KnownInputs, MetricResult};
-    use crate::domain::test_values::metric_outcome;
-    use crate::domain::{ArtifactSet, ContentHash, JobStatus, PairId, Stage, ThresholdMetric};
+    use mocban_core::domain::test_values::metric_outcome;
+    use mocban_core::domain::{
+        ArtifactSet, ContentHash, JobStatus, PairId, Stage, ThresholdMetric,
+    };
 
     fn pair(status: JobStatus, cursor: i64) -> AuditedPair {
         let outcome = r#"{"ink":0,"metrics":[]}"#.to_owned();

@@ -11,10 +11,10 @@ use super::files::{self, input_file_limits};
 use super::select;
 use super::table::count;
 use crate::catalog::Catalog;
-use crate::domain::ThresholdMetric;
 use crate::export::block_view::{BlockView, BlockViewError};
-use crate::raster::png_rgb8;
 use crate::store::Project;
+use mocban_core::domain::ThresholdMetric;
+use mocban_core::raster::png_rgb8;
 
 /// What to draw of a block, and where to.
 #[derive(Debug)]

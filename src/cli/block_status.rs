@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use crate::catalog::{BlockState, Catalog};
-use crate::domain::{JobStatus, one_line};
+use mocban_core::domain::{JobStatus, one_line};
 
 /// Number of failed blocks that are named, unless all are requested.
 const NAME_LIMIT: usize = 5;
@@ -137,7 +137,7 @@ mod tests {
     use super::BlockStatus;
     use crate::catalog::{BlockAttributes, BlockState, StoredBlockFailure};
     use crate::cli::screen::Palette;
-    use crate::domain::{BlockStage, Failure, FailureClass, JobStatus};
+    use mocban_core::domain::{BlockStage, Failure, FailureClass, JobStatus};
 
     fn state(name: &str, status: JobStatus) -> BlockState {
         let failure = StoredBlockFailure {

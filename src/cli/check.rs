@@ -18,9 +18,9 @@ use crate::catalog::{Catalog, CatalogError};
 use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
-use crate::domain::one_line;
 use crate::runner::{self, RunError};
 use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
+use mocban_core::domain::one_line;
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]

@@ -12,9 +12,9 @@ use super::error_text::ErrorPlace;
 use super::exit::{ExitCode, Refusal};
 use super::table::{columns, count};
 use crate::catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
-use crate::domain::is_address;
 use crate::runner;
 use crate::store::{Project, SETTINGS_FILE};
+use mocban_core::domain::is_address;
 
 /// Arguments of `copy`.
 #[derive(Debug, Args)]

@@ -14,8 +14,8 @@ use super::import_blocks::BlockArgs;
 use super::table::count;
 use crate::catalog::{Catalog, ImportChunk, StoredCharacter};
 use crate::demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
-use crate::domain::{Affine2, BlockName, PairName};
 use crate::runner::{Stop, StopLevel};
+use mocban_core::domain::{Affine2, BlockName, PairName};
 
 /// Id of the block.
 const NAME: &str = "block";

@@ -12,11 +12,11 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::files::input_file_limits;
 use super::table::count;
-use crate::domain::ThresholdMetric;
 use crate::export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
+use mocban_core::domain::ThresholdMetric;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::block_status::BlockStatus;
 use super::table::columns;
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
-use crate::domain::FailureClass;
+use mocban_core::domain::FailureClass;
 
 /// Maximum number of failed pairs that are read, unless all are requested.
 const READ_LIMIT: usize = 200;
@@ -106,7 +106,7 @@ impl Failures {
 mod tests {
     use super::Failures;
     use crate::catalog::{FailedPair, StoredFailure};
-    use crate::domain::{Failure, FailureClass, JobStatus, Stage};
+    use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage};
 
     fn failed(name: &str, class: FailureClass) -> FailedPair {
         FailedPair {

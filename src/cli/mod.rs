@@ -74,7 +74,7 @@ use context::Context;
 pub use exit::ExitCode;
 use screen::Screen;
 
-use crate::domain::is_hidden;
+use mocban_core::domain::is_hidden;
 
 /// Parses the command line, executes the command and returns the exit code. Prints each error once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {

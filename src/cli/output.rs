@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use super::screen::terminal_text;
-use crate::domain::visible_json;
+use mocban_core::domain::visible_json;
 
 /// Writes a result to stdout and ends it with a line feed. Escapes hidden characters, as `terminal_text` does.
 pub(super) fn print(text: &str) -> std::io::Result<()> {

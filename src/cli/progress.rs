@@ -11,8 +11,8 @@ use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use super::time_text::duration;
-use crate::domain::one_line;
 use crate::runner::{RunEvent, StopLevel};
+use mocban_core::domain::one_line;
 
 /// Shows one run.
 #[derive(Debug)]
@@ -215,7 +215,7 @@ fn stopping_line(level: StopLevel, reason: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Palette, RunEvent, StopLevel, event_line, json};
-    use crate::domain::{Failure, FailureClass, PairName, Stage};
+    use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
 
     #[test]
     fn lines_of_events() {

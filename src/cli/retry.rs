@@ -8,8 +8,8 @@ use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::pairs_and_blocks;
 use crate::catalog::{BlockRetry, Catalog, RetrySelection};
-use crate::domain::FailureClass;
 use crate::runner::NamedWork;
+use mocban_core::domain::FailureClass;
 
 /// Arguments of `retry`.
 #[derive(Debug, Args)]

@@ -14,12 +14,12 @@ use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
 use crate::catalog::{SetApart, StatusCounts};
-use crate::domain::{ReviewOrder, ThresholdMetric};
-use crate::page_vec;
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
 use crate::runner::{Stop, StopLevel};
+use mocban_core::domain::{ReviewOrder, ThresholdMetric};
+use mocban_core::page_vec;
 
 /// Arguments of `review`.
 #[derive(Debug, Args)]
@@ -263,8 +263,8 @@ fn language_of_system() -> Option<Language> {
 mod tests {
     use super::{QueueCounts, order, percent, progress, review_command};
     use crate::config::{Sources, load};
-    use crate::domain::ReviewOrder;
     use crate::review::key_map;
+    use mocban_core::domain::ReviewOrder;
 
     #[test]
     fn default_settings_give_every_action_its_own_key() {

@@ -14,9 +14,9 @@ use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
 use super::{missing_results, select, signals};
 use crate::catalog::{Catalog, RerunPolicy};
 use crate::config::Config;
-use crate::domain::Stage;
 use crate::runner::{self, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use crate::store::Project;
+use mocban_core::domain::Stage;
 
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]

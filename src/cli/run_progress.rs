@@ -1,7 +1,7 @@
 //! Counts a run's progress from its events.
 
-use crate::domain::Stage;
 use crate::runner::RunEvent;
+use mocban_core::domain::Stage;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -127,8 +127,8 @@ impl RunProgress {
 #[cfg(test)]
 mod tests {
     use super::RunProgress;
-    use crate::domain::{Failure, FailureClass, PairName, Stage};
     use crate::runner::RunEvent;
+    use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
 
     fn pair() -> PairName {
         "0001".parse().expect("valid id")

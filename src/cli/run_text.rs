@@ -6,8 +6,8 @@ use super::review::review_step;
 use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
 use crate::catalog::{BlockPlanEntry, Plan};
-use crate::domain::JobStatus;
 use crate::runner::{BlockSummary, RunSummary};
+use mocban_core::domain::JobStatus;
 
 /// Prints how a run ended and which pairs failed.
 pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {
@@ -140,7 +140,7 @@ pub(super) fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
 mod tests {
     use super::{Plan, plan_text};
     use crate::catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
-    use crate::domain::Stage;
+    use mocban_core::domain::Stage;
 
     #[test]
     fn plan_names_the_setting_that_changed() {

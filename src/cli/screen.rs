@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 use clap::ColorChoice;
 use indicatif::{MultiProgress, ProgressBar};
 
-use crate::domain::{one_line, visible, visible_json};
+use mocban_core::domain::{one_line, visible, visible_json};
 
 /// Beginning of the program's own terminal codes. It contains a random number.
 static OWN_CODE: LazyLock<String> =

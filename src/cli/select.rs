@@ -3,8 +3,8 @@
 use super::exit::Refusal;
 use crate::catalog::Catalog;
 use crate::config::nearest;
-use crate::domain::{BlockName, PairName};
 use crate::runner::NamedWork;
+use mocban_core::domain::{BlockName, PairName};
 
 /// Largest number of similar ids in a message.
 const MAX_SIMILAR: usize = 3;

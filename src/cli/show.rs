@@ -16,10 +16,12 @@ use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::local;
 use super::verdict;
 use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
-use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric};
 use crate::report::ManualCorrection;
 use crate::runner::{self, NamedWork};
 use crate::store::Project;
+use mocban_core::domain::{
+    DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
+};
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]

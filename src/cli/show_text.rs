@@ -6,12 +6,12 @@ use super::screen::{Palette, Tone};
 use super::table::columns;
 use super::time_text::{duration, local};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
-use crate::domain::{
+use crate::report::ManualCorrection;
+use crate::store::Project;
+use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,
 };
-use crate::report::ManualCorrection;
-use crate::store::Project;
 
 /// One pair, its project and the colours.
 pub(super) struct PairPage<'a> {
@@ -338,7 +338,7 @@ fn adjustment_text(adjustment: &Adjustment, iou: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Adjustment, ManualCorrection, adjustment_text};
-    use crate::domain::ThresholdMetric;
+    use mocban_core::domain::ThresholdMetric;
 
     #[test]
     fn adjustment_is_one_line() {

@@ -16,9 +16,9 @@ use super::screen::{Palette, Tone, clear_code};
 use super::status_hosts;
 use super::table::{columns, count};
 use crate::catalog::{Catalog, StageCounts, StatusCounts};
-use crate::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use crate::runner;
 use crate::store::Project;
+use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]

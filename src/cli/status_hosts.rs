@@ -9,7 +9,7 @@ use super::table::{columns, count};
 use super::time_text::rough_duration;
 use super::worker_totals::{WorkerTotals, is_present};
 use crate::catalog::{Catalog, WorkerRecord, WorkerState};
-use crate::domain::UnixMillis;
+use mocban_core::domain::UnixMillis;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
 const SHOWN_MS: i64 = 24 * 3_600_000;
@@ -140,7 +140,7 @@ mod tests {
     use super::WorkerTable;
     use crate::catalog::WorkerRecord;
     use crate::cli::screen::Palette;
-    use crate::domain::{ComputeTimes, Stage, WaitReason, WorkerId, WorkerMetrics};
+    use mocban_core::domain::{ComputeTimes, Stage, WaitReason, WorkerId, WorkerMetrics};
 
     const NOW: i64 = 1_800_000_000_000;
 

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
 
-use crate::domain::UnixMillis;
+use mocban_core::domain::UnixMillis;
 
 /// Formats a time in the time zone of the computer, with its offset from UTC: `2026-11-21 11:10:03 +07:00`.
 pub(super) fn local(at: UnixMillis) -> String {

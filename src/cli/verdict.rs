@@ -18,7 +18,7 @@ use crate::catalog::{
     Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
     check_reviewer,
 };
-use crate::domain::{Reason, ThresholdMetric, Verdict, one_line};
+use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]

@@ -9,8 +9,8 @@ use super::files::RefusedLine;
 use super::time_text::parse_utc;
 use crate::catalog::{NewVerdict, ReviewContext};
 use crate::config::hint;
-use crate::domain::{ContentHash, PairName, UnixMillis};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
+use mocban_core::domain::{ContentHash, PairName, UnixMillis};
 
 const COLUMNS: [&str; 7] = [
     "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
@@ -197,7 +197,7 @@ fn json_error(error: &serde_json::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::{check_values, parse_csv, parse_jsonl, refuse_unknown};
-    use crate::domain::{Reason, ThresholdMetric, Verdict};
+    use mocban_core::domain::{Reason, ThresholdMetric, Verdict};
 
     fn error(text: &str) -> String {
         parse_csv(text.as_bytes()).expect_err("refused").to_string()

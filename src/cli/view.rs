@@ -14,13 +14,13 @@ use super::output;
 use super::select;
 use super::signals;
 use crate::catalog::Catalog;
-use crate::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
-use crate::page_vec;
 use crate::runner::{Stop, StopLevel};
 use crate::store::Project;
 use crate::view::{self, ViewServer};
+use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
+use mocban_core::page_vec;
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]

@@ -10,8 +10,8 @@ use super::run::{self, RunArgs};
 use super::signals;
 use super::table::pairs_and_blocks;
 use crate::catalog::RerunPolicy;
-use crate::domain::Stage;
 use crate::runner::{self, RunPart, Stop};
+use mocban_core::domain::Stage;
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]

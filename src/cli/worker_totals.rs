@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value, json};
 
 use crate::catalog::{WorkerRecord, WorkerState};
-use crate::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMetrics};
+use mocban_core::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMetrics};
 
 /// Sums over one or more workers.
 #[derive(Debug, Default)]

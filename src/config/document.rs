@@ -8,9 +8,9 @@ use toml::Value;
 use super::error::ConfigError;
 use super::sources::Preset;
 use super::tree::{Setting, Tree};
-use crate::mesh;
-use crate::raster;
 use crate::stages::Settings;
+use mocban_core::mesh;
+use mocban_core::raster;
 
 /// Every setting as a typed value. [`Tree`] has already refused unknown sections and keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Longest quotation in a message, in characters.
 const MAX_QUOTE: usize = 160;

@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::tree::flatten;
-use crate::domain::is_address;
+use mocban_core::domain::is_address;
 
 /// Settings of the section `storage` that name a place.
 const PLACES: [&str; 3] = ["catalog", "artifacts", "cache"];

@@ -4,7 +4,7 @@ use toml::Value;
 
 use super::error::ConfigError;
 use super::tree::Setting;
-use crate::domain::has_password;
+use mocban_core::domain::has_password;
 
 /// Settings that are addresses, and those below them.
 const ADDRESSES: [&str; 3] = ["storage.catalog", "storage.artifacts", "storage.roots"];

@@ -7,9 +7,9 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, hint, quote};
 use super::tree::Tree;
-use crate::domain::enum_names;
 use crate::platform::is_pipe;
 use crate::store::read_file_or_pipe;
+use mocban_core::domain::enum_names;
 
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -8,7 +8,7 @@ use super::kind::Crop;
 use super::noise::Noise;
 use super::polygon::BoundsMm;
 use super::scalar_field::{SampleFrame, ScalarField};
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Margin of the sample frame around the character's strokes, mm.
 const MARGIN_MM: f64 = 2.2;

@@ -9,7 +9,7 @@ use super::mesh_of_points::MeshOfPoints;
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
 use super::scalar_field::ScalarField;
-use crate::mesh::Mesh;
+use mocban_core::mesh::Mesh;
 
 /// Height of an ordinary scan with walls and base, mm.
 const THIN_MM: f64 = 1.9;

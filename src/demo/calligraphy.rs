@@ -20,8 +20,8 @@ use super::rendered_print::PrintFrame;
 use super::scalar_field::bilinear;
 use super::scene::{Scene, pair_id, pair_rng};
 use super::tier::{REAL_PAIRS, Tier};
-use crate::domain::Affine2;
-use crate::raster::Mask;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::Mask;
 
 /// Maps pixels of the clean mask to pixels of the photograph.
 const CROP_FROM_CLEAN: Affine2 = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);

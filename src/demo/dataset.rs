@@ -10,7 +10,7 @@ use super::generator::PairGenerator;
 use super::pair::DemoPair;
 use super::scene::pair_id;
 use super::tier::Tier;
-use crate::raster::png_grey8;
+use mocban_core::raster::png_grey8;
 
 /// Increased whenever the same options produce different bytes.
 const REVISION: u32 = 2;

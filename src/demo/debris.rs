@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::noise::normal;
 use super::polygon::Polygon;
-use crate::mesh::Mesh;
+use mocban_core::mesh::Mesh;
 
 /// Moves random vertices by 0.3 to 4 mm along the viewing direction, and by less across it.
 pub(super) fn add_far_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {

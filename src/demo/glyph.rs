@@ -3,8 +3,8 @@
 use ab_glyph::{Font, FontRef, GlyphId, OutlinedGlyph, PxScale, point};
 
 use super::scalar_field::SampleFrame;
-use crate::raster::Grid;
-use crate::raster::fonts::MINCHO;
+use mocban_core::raster::Grid;
+use mocban_core::raster::fonts::MINCHO;
 
 /// Minimum ratio of height to width of usable characters. Errors are measured as shares of the character's height, so
 /// flat characters, such as a single horizontal bar, are left out.
@@ -129,7 +129,7 @@ fn draw(outline: &OutlinedGlyph, coverage: &mut Grid<f32>) {
 mod tests {
     use super::Glyphs;
     use crate::demo::scalar_field::SampleFrame;
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     #[test]
     fn font_has_nom_characters_outside_the_basic_multilingual_plane() {

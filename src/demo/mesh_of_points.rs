@@ -1,6 +1,6 @@
 //! A mesh that grows from a list of points and contains only the points in use.
 
-use crate::mesh::Mesh;
+use mocban_core::mesh::Mesh;
 
 /// A mesh whose vertices are taken from a list of points. A point becomes a vertex when the first triangle uses it.
 pub(super) struct MeshOfPoints<'a> {

@@ -20,10 +20,10 @@ use super::scene::{Scene, pair_rng};
 use super::solvable::{is_legible, is_solvable};
 use super::tier::Tier;
 use super::truth_line::TruthLine;
-use crate::domain::LengthUnit;
-use crate::mesh::Mesh;
-use crate::mesh::write::MeshFormat;
-use crate::raster::Grid;
+use mocban_core::domain::LengthUnit;
+use mocban_core::mesh::Mesh;
+use mocban_core::mesh::write::MeshFormat;
+use mocban_core::raster::Grid;
 
 /// A pair in memory.
 pub struct DemoPair {
@@ -200,7 +200,7 @@ mod tests {
     use crate::demo::PairGenerator;
     use crate::demo::tier::Tier;
     use crate::demo::truth_line::{IGNORED, STROKE_TOP};
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     fn pair(tier: Tier, index: u64) -> DemoPair {
         PairGenerator::new(tier, 11)

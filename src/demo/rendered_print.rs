@@ -12,8 +12,8 @@ use super::polygon::Polygon;
 use super::print_sheet::PrintSheet;
 use super::scalar_field::ScalarField;
 use super::scene::Scene;
-use crate::domain::Affine2;
-use crate::raster::Grid;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::Grid;
 
 /// Size of a print image and the true map between its pixels and mm.
 #[derive(Debug, Clone, Copy)]

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::raster::{Grid, Mask};
+use mocban_core::raster::{Grid, Mask};
 
 /// A square grid of samples centred on the character. Its coordinates in mm are u (right on the print) and v (down).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -223,7 +223,7 @@ fn lower_envelope(heights: &[f32], out: &mut [f32], centres: &mut [usize], ends:
 #[cfg(test)]
 mod tests {
     use super::{SampleFrame, ScalarField, distance_squared};
-    use crate::raster::{Grid, Mask};
+    use mocban_core::raster::{Grid, Mask};
 
     #[test]
     fn distances_equal_a_brute_force_search() {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::noise::normal;
 use super::tier::Tier;
-use crate::domain::{Affine2, LengthUnit, PrintFromMesh};
+use mocban_core::domain::{Affine2, LengthUnit, PrintFromMesh};
 
 /// A rigid motion and a length unit.
 #[derive(Debug, Clone)]
@@ -177,7 +177,7 @@ mod tests {
 
     use super::ScanPose;
     use crate::demo::tier::Tier;
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     #[test]
     fn print_from_mesh_inverts_the_pose() {

@@ -10,7 +10,7 @@ use super::mesh_of_points::MeshOfPoints;
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
 use super::scalar_field::ScalarField;
-use crate::mesh::Mesh;
+use mocban_core::mesh::Mesh;
 
 /// Size of smooth scan errors, mm.
 const RIPPLE_MM: f64 = 0.5;
@@ -243,7 +243,7 @@ mod tests {
     use crate::demo::conditions::Conditions;
     use crate::demo::polygon::{BoundsMm, Polygon};
     use crate::demo::scalar_field::{SampleFrame, ScalarField};
-    use crate::mesh::Mesh;
+    use mocban_core::mesh::Mesh;
 
     fn bump(style: &ScanStyle) -> Mesh {
         let mut rng = ChaCha8Rng::seed_from_u64(5);

@@ -11,7 +11,7 @@ use super::damage::Damage;
 use super::glyph::Glyphs;
 use super::scalar_field::ScalarField;
 use super::tier::Tier;
-use crate::domain::ContentHash;
+use mocban_core::domain::ContentHash;
 
 /// What is carved and printed.
 pub(super) struct Scene {

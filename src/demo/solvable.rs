@@ -5,7 +5,7 @@ use super::carved_block::CarvedBlock;
 use super::rendered_print::{PrintFrame, RenderedPrint};
 use super::scene::Scene;
 use super::truth_line::{IGNORED, STROKE_TOP};
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Smallest intersection over union of the strokes and the print under its best global threshold.
 const MIN_PRINT_IOU: f64 = 0.6;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::kind::{self, DemoKind};
-use crate::domain::enum_names;
+use mocban_core::domain::enum_names;
 
 /// Number of pairs of the `real` tier.
 pub(super) const REAL_PAIRS: u64 = 20;

@@ -8,8 +8,8 @@ use super::rendered_print::PrintFrame;
 use super::scalar_field::ScalarField;
 use super::scan_pose::{ScanPose, TopsPlane};
 use super::scene::Scene;
-use crate::domain::PrintFromMesh;
-use crate::raster::Grid;
+use mocban_core::domain::PrintFromMesh;
+use mocban_core::raster::Grid;
 
 /// Mask value of a stroke top.
 pub(super) const STROKE_TOP: u8 = 255;

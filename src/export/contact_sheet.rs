@@ -7,13 +7,13 @@ use super::pictures::{
 };
 use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, PairResults, SetApart};
-use crate::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
-use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
 use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::{Consensus, evaluate_pairs};
 use crate::store::Project;
+use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
+use mocban_core::raster::ImageLimits;
 
 /// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;
@@ -281,11 +281,11 @@ fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
 #[cfg(test)]
 mod tests {
     use super::{ContactSheetOptions, ContactSheetOrder, frame, is_shown, rank, state};
-    use crate::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use crate::export::pictures::FrameKind;
-    use crate::raster::ImageLimits;
     use crate::report::Consensus;
     use crate::report::test_fixtures;
+    use mocban_core::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
+    use mocban_core::raster::ImageLimits;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
         ContactSheetOptions {

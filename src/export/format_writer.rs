@@ -10,7 +10,7 @@ use super::export_folder::FolderError;
 use super::options::ExportOptions;
 use super::pair_pictures::{PairPictures, PictureError};
 use super::record::PairRecord;
-use crate::domain::{PairName, ThresholdMetric};
+use mocban_core::domain::{PairName, ThresholdMetric};
 
 /// What all formats know about an export.
 #[derive(Debug, Clone)]

@@ -5,8 +5,6 @@ use rayon::prelude::*;
 use super::contact_sheet::DrawError;
 use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
-use crate::domain::{ContentHash, SeededRandom, ThresholdMetric};
-use crate::raster::{ImageLimits, jpeg_rgb8};
 use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
 use crate::report::ground_truth::TruthErrors;
 use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
@@ -14,6 +12,8 @@ use crate::report::number_format::format_number;
 use crate::report::pair_artifacts::group_identical;
 use crate::report::{Consensus, TruthEvaluation};
 use crate::store::Project;
+use mocban_core::domain::{ContentHash, SeededRandom, ThresholdMetric};
+use mocban_core::raster::{ImageLimits, jpeg_rgb8};
 
 /// Longest side of an image, pixels.
 const SIDE: usize = 280;
@@ -243,8 +243,8 @@ fn file_name(stored: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{GallerySelection, MAX_PER_REASON, SAMPLE_SIZE};
-    use crate::domain::Verdict::{Fail, Pass};
     use crate::report::{TruthEvaluation, test_fixtures};
+    use mocban_core::domain::Verdict::{Fail, Pass};
 
     fn selection(seed: u64, pairs: usize) -> GallerySelection {
         let mut selection = GallerySelection::new(seed);

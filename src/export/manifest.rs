@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::format::ExportFormat;
 use super::options::ExportOptions;
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 /// Name of the manifest.
 pub(super) const MANIFEST: &str = "export.json";

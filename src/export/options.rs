@@ -7,8 +7,8 @@ use super::format::ExportFormat;
 use super::pair_pictures::InputFileLimits;
 use super::split::SplitSettings;
 use crate::catalog::MetricRecord;
-use crate::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
 use crate::report::Consensus;
+use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
 
 /// Default size of shards in MiB.
 const SHARD_MIB: u64 = 256;

@@ -8,12 +8,14 @@ use super::pictures::{PrintView, Rgb, eight_bits};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{MetricRecord, PairResults};
-use crate::domain::artifact_role::DEPTH;
-use crate::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
-use crate::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
-use crate::raster::{DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::{InputError, Project, open_input};
+use mocban_core::domain::artifact_role::DEPTH;
+use mocban_core::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
+use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
+use mocban_core::raster::{
+    DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb,
+};
 
 /// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.
 #[derive(Debug, thiserror::Error)]

@@ -11,9 +11,9 @@ use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{CutOrigin, MetricRecord, PairResults};
-use crate::domain::{Affine2, Failure, FailureClass};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::store::Project;
+use mocban_core::domain::{Affine2, Failure, FailureClass};
 
 /// One format of an export.
 pub(super) struct FormatOutput {

@@ -6,11 +6,11 @@ use serde_json::{Map, Value};
 
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
-use crate::domain::{
+use crate::report::Consensus;
+use mocban_core::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
-use crate::report::Consensus;
 
 /// State of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]

@@ -8,8 +8,8 @@ use super::pair_pictures::{PairPictures, PictureError};
 use super::record::{MetricFields, PairFields, PairRecord};
 use super::record_fields::{RecordField, schema_of};
 use crate::catalog::MetricRecord;
-use crate::domain::{PairName, ThresholdMetric};
-use crate::raster::{png_grey16, png_mask, png_rgb8};
+use mocban_core::domain::{PairName, ThresholdMetric};
+use mocban_core::raster::{png_grey16, png_mask, png_rgb8};
 
 /// The fields of a sample.
 #[derive(Debug, Serialize, JsonSchema)]

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::record::SplitName;
 use crate::catalog::PairAttributes;
-use crate::domain::{ContentHash, enum_names};
+use mocban_core::domain::{ContentHash, enum_names};
 
 /// What keeps pairs together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

@@ -1,7 +1,7 @@
 //! Errors of the reader of labels.
 
 use super::message::{boxes, for_count, list, quoted};
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Maximum number of characters of a reason, which may quote the file.
 const MAX_REASON: usize = 300;

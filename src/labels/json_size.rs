@@ -6,7 +6,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::error::LabelsProblem;
 use super::page_fit::MAX_BOXES;
-use crate::domain::cancel::PollCounter;
+use mocban_core::domain::cancel::PollCounter;
 
 /// Most memory that the values of a file may take, in bytes.
 const MAX_BYTES: usize = 384 << 20;

@@ -1,6 +1,6 @@
 //! Parts of sentences about labels.
 
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Maximum number of characters of a text from a file that a message shows.
 const MAX_SHOWN: usize = 60;

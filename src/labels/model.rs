@@ -1,6 +1,6 @@
 //! Boxes of a page, and the page they belong to.
 
-use crate::domain::enum_names;
+use mocban_core::domain::enum_names;
 
 /// Format of a file with labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

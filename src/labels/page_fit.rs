@@ -7,7 +7,7 @@ use super::message::{boxes, for_count, list, quoted};
 use super::model::{LabelBox, PageFile, bounds};
 use super::page_choice::is_same_file;
 use super::region::{Corners, LabelRegion, PageRegions};
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 /// Maximum number of boxes of a page.
 pub const MAX_BOXES: usize = 100_000;

@@ -9,7 +9,7 @@ use super::message::{list, quoted};
 use super::model::{LabelFormat, Labels, PageFile};
 use super::page_fit::fit_to_page;
 use super::region::{PageRegions, shown};
-use crate::domain::{FileKind, UniqueKeys, sanitize};
+use mocban_core::domain::{FileKind, UniqueKeys, sanitize};
 
 /// Largest file that is read, in bytes.
 pub const MAX_BYTES: usize = 64 << 20;

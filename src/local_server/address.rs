@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
 
-use crate::domain::ContentHash;
+use mocban_core::domain::ContentHash;
 
 /// First port and number of ports of the dynamic range (RFC 6335).
 const DYNAMIC_PORTS: [u16; 2] = [49_152, 16_384];

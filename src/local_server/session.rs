@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rand::TryRng as _;
 use rand::rngs::SysRng;
 
-use crate::domain::ContentHash;
+use mocban_core::domain::ContentHash;
 
 /// Path that accepts the one-time token.
 pub(super) const START: &str = "/start";

@@ -6,7 +6,7 @@ use std::thread;
 
 use tokio::sync::oneshot;
 
-use crate::domain::cancel::{CancelGuard, CancelToken};
+use mocban_core::domain::cancel::{CancelGuard, CancelToken};
 
 /// Runs long work on one thread, one call after another.
 ///
@@ -72,7 +72,7 @@ mod tests {
     use std::sync::mpsc;
 
     use super::{WorkFailed, WorkThread};
-    use crate::domain::cancel::polled;
+    use mocban_core::domain::cancel::polled;
 
     /// Sends a message when it is dropped.
     struct Ended(mpsc::Sender<()>);

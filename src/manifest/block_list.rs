@@ -7,7 +7,7 @@ use super::column_names::{missing_column, similar_column};
 use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
 use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
-use crate::domain::{BlockName, BlockSide, LengthUnit};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 
 /// The columns of a list of blocks. The first three are required.
 const COLUMNS: [&str; 6] = ["block", "mesh", "page", "labels", "unit", "side"];
@@ -210,7 +210,7 @@ fn row(
 #[cfg(test)]
 mod tests {
     use super::{is_block_list, parse_blocks};
-    use crate::domain::{BlockSide, LengthUnit};
+    use mocban_core::domain::{BlockSide, LengthUnit};
 
     fn refusal(text: &str) -> String {
         parse_blocks(text.as_bytes()).expect_err(text).to_string()

@@ -175,7 +175,7 @@ impl CsvHeader {
 #[cfg(test)]
 mod tests {
     use super::{ManifestError, ManifestRow};
-    use crate::domain::LengthUnit;
+    use mocban_core::domain::LengthUnit;
 
     fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
         super::parse_csv(text.as_bytes())

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::error::{ManifestError, at_line};
 use super::folders::{is_named_like_input, is_named_like_mesh, is_named_like_print};
 use super::row::{ManifestRow, REQUIRED, RowIds};
-use crate::domain::{PairName, PairNameError};
+use mocban_core::domain::{PairName, PairNameError};
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]

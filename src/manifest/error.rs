@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Longest text of a problem, in characters.
 const MAX_CHARS: usize = 300;

@@ -8,7 +8,7 @@ use unicode_normalization::UnicodeNormalization as _;
 
 use super::error::{ManifestError, at_file, of_list};
 use super::row::ManifestRow;
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
 const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];

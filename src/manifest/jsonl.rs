@@ -10,7 +10,7 @@ use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, of_list};
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
-use crate::domain::{KEY_TWICE, UniqueKeys};
+use mocban_core::domain::{KEY_TWICE, UniqueKeys};
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` counts as no value. Blank lines are ignored.
 ///

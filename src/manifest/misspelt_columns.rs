@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use super::column_names::similar_column;
 use super::row::{ManifestRow, OPTIONAL};
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Maximum number of different names of columns that are compared. JSON Lines may have other names in each row.
 const MAX_NAMES: usize = 1000;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
-use crate::domain::{ContentHash, LengthUnit, PairName};
+use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
 /// One pair of a list. Paths are stored as written; a relative path is relative to the list.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,7 +25,7 @@ use super::truth_evaluation::{TruthEvaluation, TruthProblems};
 use super::truth_summary::TruthSummary;
 use super::warnings::warnings;
 use crate::catalog::{MetricRecord, PairResults, SetApart};
-use crate::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
+use mocban_core::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
 
 /// The sums from which a report is made.
 #[derive(Debug, Clone, Default)]
@@ -279,8 +279,8 @@ impl MetricSums {
 #[cfg(test)]
 mod tests {
     use super::ReportAccumulator;
-    use crate::domain::{FailureClass, ThresholdMetric, Verdict};
     use crate::report::{TruthEvaluation, test_fixtures};
+    use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
 
     #[test]
     fn means_are_over_finished_pairs_only() {

@@ -5,7 +5,7 @@ use super::model::{MetricRow, Report};
 use super::number_format::{NumberStyle, counted};
 use super::number_format::{format_count, format_interval, format_rate, format_share, joined};
 use super::stats::Rate;
-use crate::domain::{ThresholdMetric, sanitize};
+use mocban_core::domain::{ThresholdMetric, sanitize};
 
 /// Returns the sentence on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
 pub(super) fn accuracy(report: &Report) -> String {

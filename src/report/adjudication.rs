@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::consensus::{Consensus, partition_verdicts};
 use super::stats::{IntervalMethod, Rate};
 use crate::catalog::MetricRecord;
-use crate::domain::Verdict;
+use mocban_core::domain::Verdict;
 
 /// Acc of a metric under three rules for disagreement. Each rule decides which results pass, fail or are left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -60,9 +60,9 @@ impl AdjudicationRules {
 #[cfg(test)]
 mod tests {
     use super::AdjudicationRules;
-    use crate::domain::Verdict::{self, Fail, Pass, Unsure};
-    use crate::domain::{ReviewOrder, ThresholdMetric};
     use crate::report::test_fixtures;
+    use mocban_core::domain::Verdict::{self, Fail, Pass, Unsure};
+    use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 
     fn of(results: &[(&[Verdict], Option<Verdict>)]) -> AdjudicationRules {
         let mut rules = AdjudicationRules::default();

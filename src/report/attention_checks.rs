@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
-use crate::domain::Verdict;
+use mocban_core::domain::Verdict;
 
 /// Planted faults that reviewers failed, as a share of those they judged. An unsure verdict is not a detection.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

@@ -9,7 +9,7 @@ use super::ground_truth::TruthErrors;
 use super::stats::ratio;
 use super::truth_evaluation::TruthEvaluation;
 use crate::catalog::{BlockDetail, Catalog, CatalogError, PairResults};
-use crate::domain::{BlockCharacterState, BlockName, BlockStage, ThresholdMetric, TrueBox};
+use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, ThresholdMetric, TrueBox};
 
 /// A result is tight if it is right and its mean landmark error is at most this percentage of the character's height.
 const TIGHT_TRE_PCT: f64 = 1.5;

@@ -1,6 +1,6 @@
 //! Found boxes compared with true ones.
 
-use crate::domain::{TrueBox, box_iou};
+use mocban_core::domain::{TrueBox, box_iou};
 
 /// Counts of found and true boxes at one threshold of the intersection over union.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -48,7 +48,7 @@ impl BoxMatches {
 #[cfg(test)]
 mod tests {
     use super::BoxMatches;
-    use crate::domain::{TrueBox, box_iou};
+    use mocban_core::domain::{TrueBox, box_iou};
 
     fn square(left: f64, is_partial: bool) -> TrueBox {
         TrueBox {

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::number_format::format_count;
 use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
-use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
-use crate::domain::enum_names;
+use mocban_core::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
+use mocban_core::domain::enum_names;
 
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: u64 = 100_000;
@@ -183,7 +183,7 @@ pub(super) fn about(pairs: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Basis, Comparison, ComparisonSums, about, two_digits};
-    use crate::domain::ThresholdMetric;
+    use mocban_core::domain::ThresholdMetric;
 
     /// Compares over `(times, [nl_ssim, density, ensemble])`.
     fn compare(outcomes: &[(usize, [Option<bool>; 3])]) -> Vec<Comparison> {

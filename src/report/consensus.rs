@@ -1,7 +1,7 @@
 //! The joint verdict of all reviewers on one result.
 
 use crate::catalog::{MetricRecord, ReviewerVerdict};
-use crate::domain::{ReviewOrder, Verdict};
+use mocban_core::domain::{ReviewOrder, Verdict};
 
 /// The joint verdict of all reviewers on a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,8 +80,8 @@ pub(crate) fn is_disputed(verdicts: &[&ReviewerVerdict]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::Consensus;
-    use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::test_fixtures;
+    use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
 
     fn consensus(verdicts: &[Verdict], older: u64) -> Consensus {
         let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::consensus::Consensus;
 use crate::catalog::{MetricRecord, ReviewerVerdict};
-use crate::domain::{Reason, Verdict};
+use mocban_core::domain::{Reason, Verdict};
 
 /// The number of failed results for which a reason was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -49,10 +49,10 @@ impl FailReasonSums {
 #[cfg(test)]
 mod tests {
     use super::{FailReasonCount, FailReasonSums};
-    use crate::domain::Reason::{Angle, Mirrored};
-    use crate::domain::Verdict::{Fail, Pass};
-    use crate::domain::{Reason, ThresholdMetric};
     use crate::report::test_fixtures;
+    use mocban_core::domain::Reason::{Angle, Mirrored};
+    use mocban_core::domain::Verdict::{Fail, Pass};
+    use mocban_core::domain::{Reason, ThresholdMetric};
 
     #[test]
     fn a_failed_result_counts_once_for_each_reason_and_a_passed_one_not_at_all() {

@@ -1,7 +1,7 @@
 //! The images of the HTML report and the texts next to them, as plain data. `export` draws the images.
 
 use crate::catalog::VerdictEvent;
-use crate::domain::{PairName, ThresholdMetric, Verdict};
+use mocban_core::domain::{PairName, ThresholdMetric, Verdict};
 
 /// All images of a report.
 #[derive(Debug, Clone, Default, PartialEq)]

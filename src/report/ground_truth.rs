@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
+use mocban_core::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 
 /// A result passes only if its angle error is at most this number of degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
@@ -204,7 +204,7 @@ fn rotation_deg(map: &Affine2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{TruthError, TruthErrors, TruthRecord};
-    use crate::domain::{Affine2, PrintFromMesh, Rigid3};
+    use mocban_core::domain::{Affine2, PrintFromMesh, Rigid3};
 
     /// A tilted plane seen mirrored, ten pixels a unit.
     fn rotated_map(angle_rad: f64, shift: [f64; 2]) -> (PrintFromMesh, Rigid3) {

@@ -7,7 +7,7 @@ use super::comparison::{Basis, Comparison, TOO_FEW_TO_ESTIMATE, about};
 use super::model::{MetricRow, Report};
 use super::number_format::{format_count, format_p, joined};
 use super::stats::SIGNIFICANCE_LEVEL;
-use crate::domain::{MetricOutcome, ThresholdMetric};
+use mocban_core::domain::{MetricOutcome, ThresholdMetric};
 
 /// Returns the sentences, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
@@ -195,13 +195,13 @@ fn without_basis(report: &Report) -> String {
 mod tests {
     use super::headline;
     use crate::catalog::PairResults;
-    use crate::domain::ThresholdMetric::{Density, Ensemble};
-    use crate::domain::Verdict::{Fail, Pass};
-    use crate::domain::{FailureClass, ThresholdMetric, Verdict};
     use crate::report::{
         AttentionCheckRates, IntervalMethod, Rate, Report, ReportAccumulator, TruthEvaluation,
         test_fixtures,
     };
+    use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
+    use mocban_core::domain::Verdict::{Fail, Pass};
+    use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
 
     /// Returns a report on `n` pairs whose verdicts `verdict` chooses, by pair and metric.
     fn judged(n: u32, verdict: impl Fn(u32, ThresholdMetric) -> Verdict) -> Report {

@@ -8,8 +8,8 @@ use super::ground_truth::MAX_ANGLE_DEG;
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use super::stats::{Rate, median, quantile};
 use crate::catalog::{PairResults, StoredAlignment};
-use crate::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
 use crate::store::Project;
+use mocban_core::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
 
 /// One metric's errors against manual alignments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -172,7 +172,7 @@ impl ManualAlignmentErrors {
 #[cfg(test)]
 mod tests {
     use super::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     /// Returns the map that places a relief of 101 x 51 px with its centre at (200, 100) + `shift`.
     fn placed(scale: f64, angle_deg: f64, shift: [f64; 2]) -> Affine2 {

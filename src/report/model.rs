@@ -18,7 +18,7 @@ use super::stats::IntervalMethod;
 use super::thresholds::ThresholdDistribution;
 use super::truth_summary::TruthSummary;
 use crate::catalog::SetApart;
-use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
+use mocban_core::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.
 pub const SCHEMA: u32 = 1;

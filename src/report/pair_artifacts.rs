@@ -3,13 +3,13 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{MetricRecord, PairResults, StageRecord};
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
-use crate::domain::{
+use crate::store::{self, Project};
+use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
+use mocban_core::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
     RegisterOutcome, Stage,
 };
-use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
-use crate::store::{self, Project};
+use mocban_core::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 
 /// Value of ink or strokes in a stored mask.
 const INK: u8 = 255;

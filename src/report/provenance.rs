@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::catalog::PairResults;
-use crate::domain::{ContentHash, Stage, UnixMillis};
+use mocban_core::domain::{ContentHash, Stage, UnixMillis};
 
 /// The origin of the numbers. Equal inputs, settings, results and verdicts give an equal value, except `last_result`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -163,8 +163,8 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::ProvenanceSums;
-    use crate::domain::{Stage, Verdict};
     use crate::report::test_fixtures::{done, stage};
+    use mocban_core::domain::{Stage, Verdict};
 
     #[test]
     fn settings_that_differ_are_named_with_both_values() {
@@ -207,7 +207,7 @@ mod tests {
             let mut pair = done(name, 0.8, &[]);
             let mut record = stage(Stage::Register, 1);
             if is_other {
-                record.mesh_hash = crate::domain::ContentHash::of(b"other");
+                record.mesh_hash = mocban_core::domain::ContentHash::of(b"other");
             }
             pair.stages = vec![record];
             sums.add(&pair);

@@ -50,9 +50,9 @@ pub fn missing(report: &Report) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::{below, missing};
-    use crate::domain::{FailureClass, Verdict};
     use crate::report::test_fixtures;
     use crate::report::{Report, ReportAccumulator, TruthEvaluation};
+    use mocban_core::domain::{FailureClass, Verdict};
 
     fn report(verdicts: &[Option<Verdict>]) -> Report {
         let mut tally = ReportAccumulator::default();

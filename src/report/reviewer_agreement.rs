@@ -12,7 +12,7 @@ use super::stats::{AgreementTable, Rate};
 use crate::catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults, SetApart,
 };
-use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
+use mocban_core::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
@@ -256,10 +256,10 @@ fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Ver
 mod tests {
     use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
     use crate::catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
-    use crate::domain::{
+    use crate::report::test_fixtures;
+    use mocban_core::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
     };
-    use crate::report::test_fixtures;
 
     fn answer(pair: &str, check: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
         AttentionCheckAnswer {

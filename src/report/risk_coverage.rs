@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::comparison::Basis;
 use super::stats::Rate;
-use crate::domain::ThresholdMetric;
+use mocban_core::domain::ThresholdMetric;
 
 /// Coverages of a curve, in percent of the results. At each coverage, the most confident results are kept.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
@@ -92,9 +92,9 @@ fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
 #[cfg(test)]
 mod tests {
     use super::{COVERAGE_PERCENT, RiskCoverageCurve};
-    use crate::domain::ThresholdMetric;
     use crate::report::comparison::Basis;
     use crate::report::stats::wilson_95;
+    use mocban_core::domain::ThresholdMetric;
 
     /// The curve of density over results in the order given.
     fn curve(judged: &[(f64, bool)]) -> RiskCoverageCurve {

@@ -10,7 +10,7 @@ use super::stats::{
     BOOTSTRAP_SEED, ClusterSample, MIN_UNITS, ResampledMeans, ResamplingUnit, resample_count,
 };
 use crate::catalog::PairResults;
-use crate::domain::ThresholdMetric;
+use mocban_core::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
@@ -210,9 +210,9 @@ fn comparisons(resampled: &mut ResampledMeans, by: ResamplingUnit) -> Vec<ScoreC
 mod tests {
     use super::{BootstrapResults, ScoreSample};
     use crate::catalog::PairResults;
-    use crate::domain::ThresholdMetric;
     use crate::report::stats::{MIN_UNITS, ResamplingUnit};
     use crate::report::test_fixtures;
+    use mocban_core::domain::ThresholdMetric;
 
     /// Resamples pairs on which the ensemble has a higher IoU than all other metrics. Every seventh pair fails.
     fn resampled(pairs: u32, has_blocks: bool) -> BootstrapResults {

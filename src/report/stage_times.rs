@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::stats::{median, quantile};
-use crate::domain::Stage;
+use mocban_core::domain::Stage;
 
 /// Computing times of one stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -36,7 +36,7 @@ impl StageTimes {
 #[cfg(test)]
 mod tests {
     use super::StageTimes;
-    use crate::domain::Stage;
+    use mocban_core::domain::Stage;
 
     #[test]
     fn a_stage_has_its_median_its_tail_and_its_sum() {

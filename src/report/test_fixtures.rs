@@ -15,8 +15,8 @@ use super::truth_evaluation::TruthEvaluation;
 use crate::catalog::{
     MetricRecord, PairAttributes, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
-use crate::domain::test_values::metric_outcome;
-use crate::domain::{
+use mocban_core::domain::test_values::metric_outcome;
+use mocban_core::domain::{
     BlockName, ContentHash, Failure, FailureClass, JobStatus, PairName, Reason, Stage,
     ThresholdMetric, TrueBox, Verdict,
 };

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::stats::{median, quantile};
-use crate::domain::ThresholdMetric;
+use mocban_core::domain::ThresholdMetric;
 
 /// Equal bins of a distribution.
 pub const BINS: usize = 40;
@@ -54,7 +54,7 @@ pub(super) fn relative_height(level: u16) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{ThresholdDistribution, relative_height};
-    use crate::domain::ThresholdMetric;
+    use mocban_core::domain::ThresholdMetric;
 
     #[test]
     fn levels_span_the_heights_of_a_map() {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::ground_truth::{TruthError, TruthErrors, TruthRecord};
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError, group_identical};
 use crate::catalog::PairResults;
-use crate::domain::{MetricOutcome, ThresholdMetric};
-use crate::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
 use crate::store::{Project, read_input};
+use mocban_core::domain::{MetricOutcome, ThresholdMetric};
+use mocban_core::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
 
 /// Value of pixels in a tops mask that are a true stroke top.
 const TOP: u8 = 255;
@@ -186,8 +186,8 @@ fn check_size(tops: &Grid<u8>, wanted: [usize; 2]) -> Result<(), TruthError> {
 #[cfg(test)]
 mod tests {
     use super::mask_iou;
-    use crate::raster::{Grid, Mask};
     use crate::report::ground_truth::TruthError;
+    use mocban_core::raster::{Grid, Mask};
 
     #[test]
     fn ignored_pixels_count_for_neither_mask() {

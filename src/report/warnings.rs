@@ -7,7 +7,7 @@ use super::number_format::{counted, format_count, format_number};
 use super::score_bootstrap::BootstrapSkipped;
 use super::stats::{MAX_UNITS, MIN_UNITS};
 use super::truth_evaluation::TruthProblems;
-use crate::domain::sanitize;
+use mocban_core::domain::sanitize;
 
 /// Tolerance for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
@@ -140,11 +140,11 @@ fn unusable_truth(truth: &TruthProblems) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{bootstrap_skipped, impossible_dice, missing_pairs, qualified_results};
-    use crate::domain::ThresholdMetric;
     use crate::report::model::PairProgress;
     use crate::report::score_bootstrap::BootstrapSkipped;
     use crate::report::stats::ResamplingUnit;
     use crate::report::test_fixtures;
+    use mocban_core::domain::ThresholdMetric;
 
     #[test]
     fn the_reason_for_no_bootstrap_is_given() {

@@ -7,8 +7,8 @@ use super::item::ReviewItem;
 use super::item_images::{IMAGE_SIDE, ItemImages};
 use crate::catalog::ManualAlignment;
 use crate::catalog::check_event;
-use crate::domain::Affine2;
 use crate::report::ManualCorrection;
+use mocban_core::domain::Affine2;
 
 /// Accepted scale of the relief relative to the image.
 const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;

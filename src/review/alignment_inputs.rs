@@ -2,10 +2,10 @@
 
 use super::image_error::ImageError;
 use super::item::ReviewItem;
-use crate::domain::{Affine2, ContentHash, PrintFromMesh, Stage};
 use crate::export::pictures::shaded;
-use crate::raster::{DepthMap, Mask, MaskOverlap, png_rgb8, warp_mask};
 use crate::report::pair_artifacts::PairArtifacts;
+use mocban_core::domain::{Affine2, ContentHash, PrintFromMesh, Stage};
+use mocban_core::raster::{DepthMap, Mask, MaskOverlap, png_rgb8, warp_mask};
 
 /// The depth map of an item, and the canvas on which its scores are computed.
 #[derive(Debug)]

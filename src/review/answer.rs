@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::item::ReviewItem;
 use super::state::ServerState;
 use crate::catalog::{InvalidVerdict, NOTE_CHARS, NewVerdict, ReviewContext};
-use crate::domain::{Reason, Verdict};
+use mocban_core::domain::{Reason, Verdict};
 
 /// An answer as the page sends it.
 #[derive(Debug, Deserialize)]

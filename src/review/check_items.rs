@@ -1,8 +1,8 @@
 //! Attention checks: planted faults and duplicates, shown among the results to measure how reliable a reviewer is.
 
 use super::item::{ItemView, ReviewItem};
-use crate::domain::{AttentionCheck, SeededRandom};
-use crate::raster::{DepthMap, Mask};
+use mocban_core::domain::{AttentionCheck, SeededRandom};
+use mocban_core::raster::{DepthMap, Mask};
 
 /// How many attention checks are added to a queue.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,10 +160,10 @@ pub(super) fn interleave(
 #[cfg(test)]
 mod tests {
     use super::{CheckRates, interleave, plant_fault, select_for_faults};
-    use crate::domain::{AttentionCheck, SeededRandom};
-    use crate::raster::{DepthMap, Grid};
     use crate::review::item::ReviewItem;
     use crate::review::item::test_fixtures::item;
+    use mocban_core::domain::{AttentionCheck, SeededRandom};
+    use mocban_core::raster::{DepthMap, Grid};
 
     const RATES: CheckRates = CheckRates {
         faults: 0.1,

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::item_images::ImageLayer;
-use crate::domain::{Reason, Verdict};
+use mocban_core::domain::{Reason, Verdict};
 
 /// Prefix of the ids of examples in image addresses. Ids of items are hexadecimal.
 const ID_PREFIX: &str = "example-";
@@ -102,10 +102,10 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::{EXAMPLES, layer};
-    use crate::domain::{Reason, Verdict};
-    use crate::raster::{ImageLimits, decode, decode_mask};
     use crate::review::Language;
     use crate::review::item_images::ImageLayer;
+    use mocban_core::domain::{Reason, Verdict};
+    use mocban_core::raster::{ImageLimits, decode, decode_mask};
 
     #[test]
     fn every_reason_has_an_example() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::item::ReviewItem;
 use super::options::QueueOptions;
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
-use crate::domain::ContentHash;
+use mocban_core::domain::ContentHash;
 
 /// The latest answers and manual alignments of a reviewer.
 #[derive(Debug, Default)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use crate::domain::enum_names;
+use mocban_core::domain::enum_names;
 
 /// The text of each message by language. The script replaces placeholders such as `{n}` by values.
 static MESSAGES: LazyLock<BTreeMap<&str, BTreeMap<&str, &str>>> = LazyLock::new(|| {

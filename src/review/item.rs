@@ -1,7 +1,7 @@
 //! An item of the queue: an image that a reviewer judges, and related data that stay on the server.
 
 use crate::catalog::Shown;
-use crate::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
+use mocban_core::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
 
 /// What the images of an item are rendered from.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +106,7 @@ impl ReviewItem {
 #[cfg(test)]
 pub(super) mod test_fixtures {
     use super::{ItemView, ReviewItem};
-    use crate::domain::{Affine2, ContentHash, PairName, ThresholdMetric};
+    use mocban_core::domain::{Affine2, ContentHash, PairName, ThresholdMetric};
 
     /// Returns a good result of one metric; items differ by their number.
     pub(crate) fn item(number: u16) -> ReviewItem {
@@ -133,7 +133,7 @@ pub(super) mod test_fixtures {
 #[cfg(test)]
 mod tests {
     use super::test_fixtures::item;
-    use crate::domain::{AttentionCheck, ContentHash};
+    use mocban_core::domain::{AttentionCheck, ContentHash};
 
     #[test]
     fn a_rotated_relief_keeps_its_centre() {

@@ -14,16 +14,16 @@ use super::cache_slots::CacheSlots;
 use super::image_error::ImageError;
 use super::item::ReviewItem;
 use crate::catalog::{Catalog, PairResults};
-use crate::domain::{Affine2, Stage};
 use crate::export::pictures::PrintView;
 use crate::export::scan_view::ScanView;
 use crate::export::{InputFileLimits, SourcePrint};
 use crate::local_server::WorkThread;
-use crate::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::stages::normalize::PrintMasks;
 use crate::stages::register::StrokeMap;
 use crate::store::Project;
+use mocban_core::domain::{Affine2, Stage};
+use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
 
 /// Longer side of an image in pixels.
 pub(super) const IMAGE_SIDE: usize = 640;

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 
 use super::item::ReviewItem;
-use crate::domain::{ReviewOrder, SeededRandom};
+use mocban_core::domain::{ReviewOrder, SeededRandom};
 
 /// Sorts items into the order in which they are shown.
 pub(super) fn sort(items: &mut [ReviewItem], order: ReviewOrder, random: &SeededRandom) {
@@ -33,8 +33,8 @@ pub(super) fn sample(
 #[cfg(test)]
 mod tests {
     use super::{sample, sort};
-    use crate::domain::{ReviewOrder, SeededRandom};
     use crate::review::item::test_fixtures::item;
+    use mocban_core::domain::{ReviewOrder, SeededRandom};
 
     fn order(order: ReviewOrder, seed: u64, reviewer: &str) -> Vec<String> {
         let mut items: Vec<_> = (0..50).map(item).collect();

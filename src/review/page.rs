@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use super::i18n::Language;
 use super::options::QueueOptions;
 use super::page_dialogs::{confirm, guide, help, jump};
-use crate::domain::{Reason, ReviewOrder, one_line};
 use crate::local_server::document;
+use mocban_core::domain::{Reason, ReviewOrder, one_line};
 
 /// Display modes with a button, in the order of their keys.
 const MODES: &str = "two_up overlay edges onion checker difference reveal";
@@ -185,8 +185,8 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::review;
-    use crate::domain::ReviewOrder;
     use crate::review::{CheckRates, Language, QueueOptions};
+    use mocban_core::domain::ReviewOrder;
 
     fn options(order: ReviewOrder, faults: f64) -> QueueOptions {
         QueueOptions {

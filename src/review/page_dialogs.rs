@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::examples::{EXAMPLES, Example};
 use super::i18n::Language;
 use super::keys::ACTIONS;
-use crate::domain::Reason;
+use mocban_core::domain::Reason;
 
 /// Returns the guide: when to pass, an example for each reason to fail, and the colours. It opens on a reviewer's first
 /// start.

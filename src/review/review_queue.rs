@@ -8,11 +8,11 @@ use super::item::{ItemView, ReviewItem};
 use super::options::QueueOptions;
 use super::order;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
-use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
 use crate::local_server::{WorkFailed, WorkThread};
 use crate::report::consensus::{is_disputed, partition_verdicts};
 use crate::report::pair_artifacts::{PairArtifacts, group_identical};
 use crate::store::Project;
+use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
@@ -185,9 +185,9 @@ async fn faults(
 mod tests {
     use super::{is_open_conflict, is_reliable, items_of_pair};
     use crate::catalog::ReviewerVerdict;
-    use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::test_fixtures;
     use crate::review::{CheckRates, QueueOptions};
+    use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
 
     fn options(order: ReviewOrder, faults: f64, duplicates: f64) -> QueueOptions {
         QueueOptions {

@@ -24,8 +24,8 @@ use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
 use crate::catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
-use crate::domain::{PairName, ReviewOrder, one_line};
 use crate::report::pair_artifacts::PairArtifactsError;
+use mocban_core::domain::{PairName, ReviewOrder, one_line};
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {

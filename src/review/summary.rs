@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::review_queue::ReviewQueue;
 use super::state::ServerState;
 use crate::catalog::CatalogError;
-use crate::domain::Verdict;
 use crate::report::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
+use mocban_core::domain::Verdict;
 
 /// The summary of a review.
 #[derive(Debug, Serialize)]
@@ -83,7 +83,7 @@ impl ReviewSummary {
 #[cfg(test)]
 mod tests {
     use super::VerdictCounts;
-    use crate::domain::Verdict;
+    use mocban_core::domain::Verdict;
 
     #[test]
     fn verdicts_are_counted() {

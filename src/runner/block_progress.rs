@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::block_inputs::BlockSources;
 use super::block_stages::BlockStageOutput;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
-use crate::domain::{ArtifactSet, BlockStage};
+use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
 
-use crate::domain::LengthUnit;
-use crate::domain::cancel::polled;
-use crate::mesh::Vertices;
-use crate::mesh::robust_bounds::{bulk_box, is_in_box};
-use crate::raster::DepthMap;
+use mocban_core::domain::LengthUnit;
+use mocban_core::domain::cancel::polled;
+use mocban_core::mesh::Vertices;
+use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
+use mocban_core::raster::DepthMap;
 
 /// Lengths of whole blocks, mm. Characters have 6 to 30 mm.
 const BLOCK_MM: std::ops::RangeInclusive<f64> = 120.0..=1_000.0;
@@ -75,8 +75,8 @@ pub(super) fn length_of_map(depth: &DepthMap) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{advice, length_of, wrong_unit};
-    use crate::domain::LengthUnit;
-    use crate::mesh::Vertices;
+    use mocban_core::domain::LengthUnit;
+    use mocban_core::mesh::Vertices;
 
     #[test]
     fn only_scans_as_long_as_a_block_get_the_advice() {

@@ -16,8 +16,8 @@ use super::prefetch::Prefetch;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
-use crate::domain::WorkerId;
-use crate::raster;
+use mocban_core::domain::WorkerId;
+use mocban_core::raster;
 
 /// What a run has counted about blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::stop::StopLevel;
 use crate::catalog::StatusCounts;
-use crate::domain::{BlockName, BlockStage, Failure, PairName, Stage};
+use mocban_core::domain::{BlockName, BlockStage, Failure, PairName, Stage};
 
 /// Something that happened in a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::catalog::LeaseHolder;
-use crate::domain::{UnixMillis, WorkerId};
+use mocban_core::domain::{UnixMillis, WorkerId};
 
 /// Time without a connection and without a new heartbeat after which a worker is dead, as a share of the lease: 7 of 50
 /// seconds. A living worker notices a broken connection within one recovery interval (2.5 s), and then
@@ -112,7 +112,7 @@ impl Liveness {
 mod tests {
     use super::Liveness;
     use crate::catalog::LeaseHolder;
-    use crate::domain::WorkerId;
+    use mocban_core::domain::WorkerId;
 
     const ME: WorkerId = WorkerId(1);
     const OTHER: WorkerId = WorkerId(2);

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use super::run_metrics::RunMetrics;
 use crate::catalog::RerunPolicy;
-use crate::domain::{BlockName, PairName, Stage};
 use crate::{mesh, raster};
+use mocban_core::domain::{BlockName, PairName, Stage};
 
 /// Options of a run.
 #[derive(Debug, Clone)]

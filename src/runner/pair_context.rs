@@ -8,10 +8,10 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::catalog::{InputVersions, PairAttributes, PairWork};
-use crate::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
-use crate::raster::DepthMap;
 use crate::stages::normalize::Normalized;
 use crate::stages::{Print, Scan};
+use mocban_core::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
+use mocban_core::raster::DepthMap;
 
 /// The stored result of an earlier stage.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use super::events::RunEvent;
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, RunContext};
 use crate::catalog::{FailureAction, InputVersions, Lease, StageFailure};
-use crate::domain::{Failure, PairName, Stage};
+use mocban_core::domain::{Failure, PairName, Stage};
 
 /// A stage of a pair that failed.
 pub(super) struct PairFailure {

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::catalog::{BlockFailureAction, FailureAction};
-use crate::domain::{BlockId, FailureClass, PairId, UnixMillis};
 use crate::failpoint;
+use mocban_core::domain::{BlockId, FailureClass, PairId, UnixMillis};
 
 /// Attempts of a stage that fails to read or write.
 const IO_ATTEMPTS: u32 = 3;
@@ -163,8 +163,8 @@ mod tests {
 
     use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Timing, backoff_ms, failure_action};
     use crate::catalog::FailureAction;
-    use crate::domain::{FailureClass, PairId};
     use crate::runner::input_reads::{MAX_HANGING, THREADS};
+    use mocban_core::domain::{FailureClass, PairId};
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
         FailedAttempt {

@@ -16,8 +16,8 @@ use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
-use crate::domain::{BlockName, PairName, WaitReason, WorkerId};
-use crate::raster;
+use mocban_core::domain::{BlockName, PairName, WaitReason, WorkerId};
+use mocban_core::raster;
 
 /// Identifies a task that occupies a slot. A pair may occupy two slots: after its lease was lost, the process may lease
 /// the pair again while the earlier task still computes.

@@ -29,10 +29,10 @@ use super::worker_session::this_process;
 use crate::catalog::{
     Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
 };
-use crate::domain::WorkerId;
-use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::Project;
+use mocban_core::domain::WorkerId;
+use mocban_core::page_vec;
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {

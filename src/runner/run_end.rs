@@ -14,7 +14,7 @@ use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
-use crate::domain::Stage;
+use mocban_core::domain::Stage;
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.
 pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {

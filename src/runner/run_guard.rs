@@ -3,8 +3,8 @@
 use super::error::RunError;
 use super::options::{RunOptions, RunPart};
 use crate::catalog::{Catalog, Fingerprints, SharedSettings, WorkerSettings};
-use crate::domain::UnixMillis;
 use crate::store::{Project, RunLock};
+use mocban_core::domain::UnixMillis;
 
 /// The right to run a project.
 #[derive(Debug)]

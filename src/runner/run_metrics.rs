@@ -13,8 +13,8 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::{Registry, Unit};
 
-use crate::domain::{ComputeTimes, Stage, WaitReason, WorkerMetrics};
 use crate::platform;
+use mocban_core::domain::{ComputeTimes, Stage, WaitReason, WorkerMetrics};
 
 /// Version of this program.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -242,7 +242,7 @@ mod tests {
     use std::time::Duration;
 
     use super::{RunMetrics, TimedRead};
-    use crate::domain::{ComputeTimes, Stage, WaitReason};
+    use mocban_core::domain::{ComputeTimes, Stage, WaitReason};
 
     /// Returns metrics of a run with known counts and times.
     fn known() -> RunMetrics {

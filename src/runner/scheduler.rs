@@ -21,7 +21,7 @@ use super::run_selection::RunSelection;
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
 use crate::catalog::{Outstanding, Waiting};
-use crate::domain::{WaitReason, WorkerId};
+use mocban_core::domain::{WaitReason, WorkerId};
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);

@@ -9,15 +9,15 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
-use crate::domain::artifact_role::{
-    CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
-};
-use crate::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
-use crate::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::{NormalizeError, Normalized, PrintMasks};
 use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
 use crate::store::Project;
+use mocban_core::domain::artifact_role::{
+    CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
+};
+use mocban_core::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
+use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 
 /// Runs stages on a pair's thread. In tests, a fake executor has stages that fail or hang.
 pub(super) trait StageExecutor: Send + Sync + 'static {
@@ -207,7 +207,7 @@ fn round_trip<T: Serialize + DeserializeOwned + PartialEq>(
 #[cfg(test)]
 mod tests {
     use super::round_trip;
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     #[test]
     fn every_finite_number_comes_back_bit_for_bit() {

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::catalog::MetricResult;
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
-use crate::domain::{
+use crate::store::{ArtifactError, NewArtifact};
+use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
+use mocban_core::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
-use crate::raster::DepthMap;
-use crate::store::{ArtifactError, NewArtifact};
+use mocban_core::raster::DepthMap;
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,8 +130,8 @@ fn without_confidence(outcome: &MetricOutcome) -> Value {
 #[cfg(test)]
 mod tests {
     use super::{metric_results, result_hash};
-    use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::runner::tests::values;
+    use mocban_core::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
 
     #[test]
     fn a_verdict_outlives_another_confidence_but_not_another_alignment() {

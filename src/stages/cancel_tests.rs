@@ -6,8 +6,8 @@ use super::depth::depth;
 use super::fit::{FitError, fit};
 use super::testing::{SyntheticSheet, paper_settings, print, settings};
 use super::{Print, Scan, Settings, pipeline};
-use crate::domain::cancel::{CancelToken, Cancelled};
-use crate::mesh::{Mesh, MeshLimits, read};
+use mocban_core::domain::cancel::{CancelToken, Cancelled};
+use mocban_core::mesh::{Mesh, MeshLimits, read};
 
 /// Moments at which each stage is cancelled, as shares of its polls in eighths.
 const EIGHTHS: [u64; 4] = [0, 2, 5, 8];

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Scan;
 use super::zbuffer::{IndexedSurface, LARGEST_OVERLAP, NO_HIT, Viewport};
-use crate::domain::cancel::poll;
-use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
-use crate::raster::{DepthMap, Grid};
-use crate::simd::{max_f32, min_f32};
+use mocban_core::domain::cancel::poll;
+use mocban_core::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
+use mocban_core::raster::{DepthMap, Grid};
+use mocban_core::simd::{max_f32, min_f32};
 
 /// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 5;
@@ -191,10 +191,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantize};
-    use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence};
-    use crate::mesh::Mesh;
-    use crate::raster::Grid;
     use crate::stages::Scan;
+    use mocban_core::domain::{Bow, FitOutcome, LengthUnit, Rigid3, ScanRegion, SideEvidence};
+    use mocban_core::mesh::Mesh;
+    use mocban_core::raster::Grid;
 
     fn params() -> DepthParams {
         DepthParams {

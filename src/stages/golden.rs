@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use super::AlignedPair;
 use super::testing::{SyntheticSheet, print, settings, some_turn};
-use crate::raster::{Grid, decode_grey8, png_grey8};
+use mocban_core::raster::{Grid, decode_grey8, png_grey8};
 
 /// Largest difference between matching pixels, on a scale of 0 to 255.
 const TOLERANCE: u8 = 12;

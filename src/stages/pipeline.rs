@@ -17,10 +17,10 @@ use super::print::Print;
 use super::register::{self, RegisterError, Registered};
 use super::scan::Scan;
 use super::settings::{AlignmentMethod, Settings};
-use crate::domain::{
+use mocban_core::domain::{
     Affine2, FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric,
 };
-use crate::raster::DepthMap;
+use mocban_core::raster::DepthMap;
 
 /// Why a stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

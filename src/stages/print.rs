@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use super::binarize::{BinarizeError, InkMask, hypotheses, hypotheses_within};
-use crate::domain::PrintOutline;
-use crate::raster::PrintImage;
+use mocban_core::domain::PrintOutline;
+use mocban_core::raster::PrintImage;
 
 /// A decoded image of a print, and its binarizations, which are computed on first use.
 #[derive(Debug, Clone)]

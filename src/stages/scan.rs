@@ -3,9 +3,9 @@
 use std::sync::OnceLock;
 
 use super::zbuffer::IndexedSurface;
-use crate::domain::ScanRegion;
-use crate::domain::cancel::polled;
-use crate::mesh::Mesh;
+use mocban_core::domain::ScanRegion;
+use mocban_core::domain::cancel::polled;
+use mocban_core::mesh::Mesh;
 
 /// A mesh as read, and its surface, which is indexed on first use.
 #[derive(Debug)]

@@ -4,8 +4,8 @@ mod ssim;
 
 pub use ssim::{SsimReference, SsimScores, SsimWindow};
 
-use crate::domain::Scores;
-use crate::raster::{Mask, PixelBox};
+use mocban_core::domain::Scores;
+use mocban_core::raster::{Mask, PixelBox};
 
 /// Computes all scores of a depth mask against a print mask of the same size. SSIM and its structure part are in
 /// -1..=1, and the other scores are in 0..=1.
@@ -57,7 +57,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{SsimReference, SsimWindow, box_iou, score_masks};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     fn masks() -> impl Strategy<Value = (Mask, Mask)> {
         let side = 24_usize;

@@ -7,7 +7,7 @@ use super::depth::{self, DepthParams};
 use super::fit::{self, FitParams};
 use super::normalize::{self, NormalizeParams};
 use super::register::{self, RegisterParams};
-use crate::domain::{Stage, ThresholdMetric};
+use mocban_core::domain::{Stage, ThresholdMetric};
 
 /// Which of the two pipelines runs; see `stages::pipeline`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -12,9 +12,9 @@ use super::normalize::NormalizeParams;
 use super::register::RegisterParams;
 use super::score::SsimWindow;
 use super::{AlignedPair, AlignmentMethod, PipelineParams, Print, Settings, StageError};
-use crate::domain::{Affine2, MetricOutcome, PrintFromMesh};
-use crate::mesh::Mesh;
-use crate::raster::{Grid, PrintImage};
+use mocban_core::domain::{Affine2, MetricOutcome, PrintFromMesh};
+use mocban_core::mesh::Mesh;
+use mocban_core::raster::{Grid, PrintImage};
 
 /// Vertices along a side of the carved sheet.
 const SIDE: usize = 110;

@@ -11,7 +11,7 @@ use super::artifact_error::ArtifactError;
 use super::artifacts::NewArtifact;
 use super::packed::of_bucket;
 use super::remote::{Bucket, ProjectStorage};
-use crate::domain::{ArtifactRef, ContentHash};
+use mocban_core::domain::{ArtifactRef, ContentHash};
 
 impl Project {
     /// Stores artifacts durably as objects of their own. Replaces objects that exist, so that they do not look old to

@@ -16,7 +16,7 @@ use super::Project;
 use super::artifact_error::ArtifactError;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 use super::remote::{Bucket, PACKS, pack_key, pack_number};
-use crate::domain::{ARTIFACTS, ArtifactRef};
+use mocban_core::domain::{ARTIFACTS, ArtifactRef};
 
 /// Key of an object whose time of change is the present time of the store.
 const MARKER: &str = "collect-marker";

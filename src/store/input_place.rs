@@ -7,7 +7,7 @@ use super::Project;
 use super::input_error::InputError;
 use super::open_file::regular_metadata;
 use super::remote::{Bucket, BucketError, CachedObject, ProjectStorage, Root};
-use crate::domain::{ArtifactRef, ContentHash};
+use mocban_core::domain::{ArtifactRef, ContentHash};
 
 /// An input file of a project.
 #[derive(Debug, Clone)]
@@ -177,9 +177,9 @@ impl Project {
 
 #[cfg(test)]
 mod tests {
-    use crate::domain::ContentHash;
     use crate::store::remote::ProjectStorage;
     use crate::store::{InputError, Project, hash_input, read_input, stat_input};
+    use mocban_core::domain::ContentHash;
 
     #[test]
     fn an_object_is_an_input_and_its_changes_are_noticed() {

@@ -7,9 +7,9 @@ use super::input_error::InputError;
 use super::input_place::{Input, InputLocation};
 use super::open_file::{open_regular, regular_metadata};
 use super::remote::BucketError;
-use crate::domain::ContentHash;
-use crate::page_vec::PageVec;
 use crate::platform::generation;
+use mocban_core::domain::ContentHash;
+use mocban_core::page_vec::PageVec;
 
 /// Returns size, modification time and inode of a file as text. If all three are unchanged, the content is assumed to
 /// be unchanged.
@@ -255,8 +255,8 @@ mod tests {
     use std::io::{Read, Write as _};
 
     use super::{hash_input, open_input, read_input, stat_input};
-    use crate::domain::{ContentHash, FailureClass};
     use crate::store::{Input, InputError};
+    use mocban_core::domain::{ContentHash, FailureClass};
 
     #[test]
     fn a_file_over_the_limit_is_bad_input_and_names_the_setting() {

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::CatalogIdentity;
+use mocban_core::domain::CatalogIdentity;
 
 /// Name of the note: a file in a folder, an object in a store.
 pub(super) const OWNER: &str = "owner.json";
@@ -119,7 +119,7 @@ impl OwnerRecord {
 #[cfg(test)]
 mod tests {
     use super::{OwnerRecord, OwnerTraces, Standing};
-    use crate::domain::CatalogIdentity;
+    use mocban_core::domain::CatalogIdentity;
 
     /// Paths of all catalogs, and of the catalogs that use the folder.
     struct Known<'a>(&'a [&'a str], &'a [&'a str]);

@@ -6,7 +6,7 @@ use super::Project;
 use super::artifact_error::ArtifactError;
 use super::artifacts::NewArtifact;
 use super::remote::{Bucket, BucketError, Pack, ProjectStorage, pack_key, read_from_pack};
-use crate::domain::{ArtifactRef, PackLocation};
+use mocban_core::domain::{ArtifactRef, PackLocation};
 
 impl Project {
     /// Returns whether new artifacts are stored in an object store, in packs.

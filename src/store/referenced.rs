@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::Project;
 use super::owner_record::is_owner_record;
 use super::remote::pack_number;
-use crate::domain::{ArtifactRef, ContentHash};
+use mocban_core::domain::{ArtifactRef, ContentHash};
 
 /// The artifacts that rows of the catalog name. Only the first 64 bits of each hash are stored. An unreferenced file is
 /// not reported if a referenced file has the same 64 bits. A referenced file is never reported.

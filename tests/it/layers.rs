@@ -1,29 +1,23 @@
-//! Checks that top-level modules import only what the table in `src/lib.rs` allows, and that no imports form cycles.
+//! Checks the dependencies of the crates, and that neither files nor folders import each other in cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::source_text::{SourceFile, identifier, package_dir, paths_after, source_files};
+use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
-/// Crates that only these modules may name.
+/// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
-    ("sqlx", &["catalog"]),
-    ("clap", &["cli"]),
-    ("clap_complete", &["cli"]),
-    ("clap_mangen", &["cli"]),
-    ("pulldown_cmark", &["documentation"]),
-    ("indicatif", &["cli"]),
-    ("anyhow", &["cli"]),
-    ("toml", &["cli", "config"]),
-    ("pulp", &["simd"]),
-    ("quick_xml", &["labels"]),
-    (
-        "nalgebra",
-        &["block", "stages", "demo", "mesh", "raster", "report"],
-    ),
+    ("anyhow", &["mocban"]),
+    ("clap", &["mocban"]),
+    ("indicatif", &["mocban"]),
+    ("pulldown-cmark", &["mocban"]),
+    ("toml", &["mocban"]),
+    ("tracing-subscriber", &["mocban"]),
+    ("pulp", &["core"]),
+    ("tiff", &["core"]),
 ];
 
-/// Modules without files, processes, clocks and async code.
-const PURE_MODULES: &[&str] = &["domain", "raster", "mesh", "stages"];
+/// Crates without files, processes, clocks and async code.
+const PURE_CRATES: &[&str] = &["core"];
 const IMPURE: &[&str] = &[
     "tokio::",
     "std::fs",
@@ -33,78 +27,35 @@ const IMPURE: &[&str] = &[
     "Instant::now",
 ];
 
-/// Imports that only the unit tests of a module may use, beyond the table.
-const TEST_IMPORTS: &[(&str, &[&str])] = &[];
-
-/// Files that may take part in import cycles. Remove a file when its cycle is broken; add none.
-const CYCLIC_FILES: &[&str] = &[];
-
-/// Returns the files that belong to modules.
-fn module_files() -> Vec<SourceFile> {
-    let mut files = source_files();
-    files.retain(|file| file.module != "main" && file.module != "lib");
-    files
-}
-
-/// Returns the table of top-level modules in `src/lib.rs`: each module with the modules that it may import.
-fn table() -> BTreeMap<String, BTreeSet<String>> {
-    let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
-    let modules: Vec<(String, String)> = lib
-        .lines()
-        .filter_map(|line| line.strip_prefix("//! | `"))
-        .map(|line| {
-            let cells: Vec<&str> = line.split('|').collect();
-            (identifier(line), cells[2].trim().to_owned())
-        })
-        .collect();
-    let all: BTreeSet<String> = modules.iter().map(|(module, _)| module.clone()).collect();
-    modules
-        .into_iter()
-        .map(|(module, cell)| {
-            let named = cell.split(',').map(|name| name.trim().replace('`', ""));
-            let allowed = match cell.as_str() {
-                "all" => all.clone(),
-                _ => named.filter(|name| !name.is_empty()).collect(),
-            };
-            (module, allowed)
-        })
-        .collect()
-}
-
-/// Returns the first names of the paths after a prefix.
-fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
-    let paths = paths_after(code, prefix).into_iter();
-    paths.filter_map(|path| path.into_iter().next()).collect()
-}
-
-/// Returns the modules that a part of the code of a file names.
-fn imported_modules(file: &SourceFile, code: &str) -> BTreeSet<String> {
-    let mut used = names_after(code, "crate::");
-    if file.module().len() == 1 {
-        used.extend(names_after(code, "super::"));
+/// Returns the dependencies of a crate outside tests, from its `Cargo.toml`.
+fn dependencies(crate_name: &str) -> BTreeSet<String> {
+    let dir = match crate_name {
+        "mocban" => package_dir(),
+        _ => package_dir().join("crates").join(crate_name),
+    };
+    let manifest = std::fs::read_to_string(dir.join("Cargo.toml")).expect("a manifest");
+    let manifest: toml::Table = manifest.parse().expect("a manifest in TOML");
+    let names = |table: &toml::Table| {
+        let section = table.get("dependencies").and_then(toml::Value::as_table);
+        section.map(|section| section.keys().cloned().collect::<Vec<_>>())
+    };
+    let mut found: BTreeSet<String> = names(&manifest).unwrap_or_default().into_iter().collect();
+    if let Some(targets) = manifest.get("target").and_then(toml::Value::as_table) {
+        let tables = targets.values().filter_map(toml::Value::as_table);
+        found.extend(tables.filter_map(names).flatten());
     }
-    used
+    found
 }
 
 #[test]
-fn every_module_is_in_the_code_map() {
-    let modules: BTreeSet<String> = module_files().into_iter().map(|file| file.module).collect();
-    let mapped: BTreeSet<String> = table().into_keys().collect();
-    assert_eq!(modules, mapped);
-}
-
-#[test]
-fn modules_import_only_what_the_table_allows() {
-    let table = table();
+fn dependencies_stay_in_their_crates() {
+    let crates: BTreeSet<String> = source_files().into_iter().map(|f| f.crate_name).collect();
     let mut wrong = Vec::new();
-    for file in module_files() {
-        for name in imported_modules(&file, &file.production_code()) {
-            let is_foreign = table.contains_key(&name) && name != file.module;
-            if is_foreign && !table[&file.module].contains(&name) {
-                wrong.push(format!(
-                    "{}: {} may not import {name}",
-                    file.name, file.module
-                ));
+    for name in &crates {
+        let has = dependencies(name);
+        for (dependency, allowed) in ONLY_IN {
+            if has.contains(*dependency) && !allowed.contains(&name.as_str()) {
+                wrong.push(format!("{name} may not depend on {dependency}"));
             }
         }
     }
@@ -112,55 +63,13 @@ fn modules_import_only_what_the_table_allows() {
 }
 
 #[test]
-fn unit_tests_import_only_what_the_table_and_its_exceptions_allow() {
-    let table = table();
-    let exceptions: BTreeMap<&str, &[&str]> = TEST_IMPORTS.iter().copied().collect();
-    let mut wrong = BTreeSet::new();
-    let mut unused: BTreeSet<(String, String)> = TEST_IMPORTS
-        .iter()
-        .flat_map(|(module, names)| {
-            names
-                .iter()
-                .map(|name| ((*module).to_owned(), (*name).to_owned()))
-        })
-        .collect();
-    for file in module_files() {
-        let extra = exceptions
-            .get(file.module.as_str())
-            .copied()
-            .unwrap_or_default();
-        for name in imported_modules(&file, &file.test_code()) {
-            let is_foreign = table.contains_key(&name) && name != file.module;
-            if !is_foreign || table[&file.module].contains(&name) {
-                continue;
-            }
-            unused.remove(&(file.module.clone(), name.clone()));
-            if !extra.contains(&name.as_str()) {
-                wrong.insert(format!(
-                    "{}: tests of {} may not import {name}",
-                    file.name, file.module
-                ));
-            }
-        }
-    }
-    assert!(wrong.is_empty(), "{wrong:#?}");
-    assert!(unused.is_empty(), "no longer needed: {unused:?}");
-}
-
-#[test]
-fn crates_stay_in_their_modules() {
+fn pure_crates_use_neither_files_nor_clocks() {
     let mut wrong = Vec::new();
-    for file in module_files() {
+    for file in source_files() {
         let code = file.production_code();
-        for (name, modules) in ONLY_IN {
-            let is_named = !names_after(&code, &format!("{name}::")).is_empty();
-            if is_named && !modules.contains(&file.module.as_str()) {
-                wrong.push(format!("{}: {} may not use {name}", file.name, file.module));
-            }
-        }
         for name in IMPURE {
-            if PURE_MODULES.contains(&file.module.as_str()) && code.contains(name) {
-                wrong.push(format!("{}: {} may not use {name}", file.name, file.module));
+            if PURE_CRATES.contains(&file.crate_name.as_str()) && code.contains(name) {
+                wrong.push(format!("{} may not use {name}", file.name));
             }
         }
     }
@@ -169,19 +78,23 @@ fn crates_stay_in_their_modules() {
 
 #[test]
 fn only_progress_and_screen_draw() {
-    for file in module_files() {
-        let draws = !names_after(&file.production_code(), "indicatif::").is_empty();
+    for file in source_files() {
+        let draws = !paths_after(&file.production_code(), "indicatif::").is_empty();
         assert!(
             !draws
-                || ["cli/busy.rs", "cli/progress.rs", "cli/screen.rs"]
-                    .contains(&file.name.as_str()),
+                || [
+                    "src/cli/busy.rs",
+                    "src/cli/progress.rs",
+                    "src/cli/screen.rs"
+                ]
+                .contains(&file.name.as_str()),
             "{}",
             file.name
         );
     }
 }
 
-/// The import graph of the crate's files.
+/// The import graph of the files of a crate.
 struct ImportGraph {
     files: Vec<SourceFile>,
     by_module: BTreeMap<Vec<String>, usize>,
@@ -190,9 +103,21 @@ struct ImportGraph {
 }
 
 impl ImportGraph {
-    fn new() -> Self {
-        let mut files = source_files();
-        files.retain(|file| !file.is_test && file.name != "main.rs");
+    /// Returns the graph of each crate.
+    fn of_all_crates() -> Vec<Self> {
+        let mut crates: BTreeMap<String, Vec<SourceFile>> = BTreeMap::new();
+        for file in source_files() {
+            if !file.is_test && file.name != "src/main.rs" {
+                crates
+                    .entry(file.crate_name.clone())
+                    .or_default()
+                    .push(file);
+            }
+        }
+        crates.into_values().map(Self::new).collect()
+    }
+
+    fn new(files: Vec<SourceFile>) -> Self {
         let by_module = files
             .iter()
             .enumerate()
@@ -314,24 +239,54 @@ impl ImportGraph {
         let imports: Vec<BTreeSet<usize>> = (0..self.files.len())
             .map(|index| self.imports(index))
             .collect();
-        let reached: Vec<BTreeSet<usize>> = (0..imports.len())
-            .map(|start| reachable(&imports, start))
-            .collect();
-        let mut groups = BTreeSet::new();
-        for (index, from_here) in reached.iter().enumerate() {
-            if from_here.contains(&index) {
-                let group = from_here
-                    .iter()
-                    .filter(|other| reached[**other].contains(&index));
-                groups.insert(
-                    group
-                        .map(|other| self.files[*other].name.clone())
-                        .collect::<BTreeSet<_>>(),
-                );
-            }
-        }
-        groups.into_iter().collect()
+        let name = |index: usize| self.files[index].name.clone();
+        cycles(&imports, name)
     }
+
+    /// Returns the groups of folders that import each other, a folder with its own folders as one. A file beside the
+    /// folders counts as one, except `mod.rs` and `lib.rs`, which may import from all of them.
+    fn folder_cycles(&self, parent: &[String]) -> Vec<BTreeSet<String>> {
+        let child_of = |index: usize| {
+            let module = self.files[index].module();
+            (module.len() > parent.len() && module.starts_with(parent))
+                .then(|| module[parent.len()].clone())
+        };
+        let children: Vec<String> = (0..self.files.len())
+            .filter_map(child_of)
+            .collect::<BTreeSet<_>>()
+            .into_iter()
+            .collect();
+        let position = |child: &String| children.binary_search(child).expect("a child");
+        let mut imports = vec![BTreeSet::new(); children.len()];
+        for index in 0..self.files.len() {
+            let Some(from) = child_of(index).as_ref().map(position) else {
+                continue;
+            };
+            let targets = self.imports(index).into_iter().filter_map(child_of);
+            let others = targets
+                .map(|child| position(&child))
+                .filter(|to| *to != from);
+            imports[from].extend(others);
+        }
+        let name = |index: usize| [parent, &[children[index].clone()]].concat().join("/");
+        cycles(&imports, name)
+    }
+}
+
+/// Returns the groups of nodes that reach each other.
+fn cycles(imports: &[BTreeSet<usize>], name: impl Fn(usize) -> String) -> Vec<BTreeSet<String>> {
+    let starts = 0..imports.len();
+    let reached: Vec<BTreeSet<usize>> = starts.map(|start| reachable(imports, start)).collect();
+    let mut groups = BTreeSet::new();
+    for (index, from_here) in reached.iter().enumerate() {
+        if from_here.contains(&index) {
+            let group = from_here
+                .iter()
+                .filter(|other| reached[**other].contains(&index));
+            groups.insert(group.map(|other| name(*other)).collect::<BTreeSet<_>>());
+        }
+    }
+    groups.into_iter().collect()
 }
 
 /// Replaces `pub(in path)` by `pub(crate)`, because the path of a visibility is not an import.
@@ -359,17 +314,38 @@ fn reachable(edges: &[BTreeSet<usize>], start: usize) -> BTreeSet<usize> {
 
 #[test]
 fn files_do_not_import_each_other_in_cycles() {
-    let is_known = |name: &String| CYCLIC_FILES.iter().any(|known| name.starts_with(known));
-    let mut cycles = ImportGraph::new().cycles();
-    cycles.retain(|cycle| !cycle.iter().all(is_known));
+    let graphs = ImportGraph::of_all_crates();
+    let cycles: Vec<_> = graphs.iter().flat_map(ImportGraph::cycles).collect();
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
+}
+
+/// Folders whose children may import each other in cycles. Remove a folder when its cycle is broken; add none.
+const CYCLIC_FOLDERS: &[&str] = &[];
+
+#[test]
+fn folders_do_not_import_each_other_in_cycles() {
+    let mut found = Vec::new();
+    for graph in ImportGraph::of_all_crates() {
+        let parents: BTreeSet<Vec<String>> = (graph.files.iter())
+            .map(SourceFile::module)
+            .flat_map(|module| (0..module.len()).map(move |length| module[..length].to_vec()))
+            .collect();
+        for parent in parents {
+            let name = format!("{}:{}", graph.files[0].crate_name, parent.join("/"));
+            if !CYCLIC_FOLDERS.contains(&name.as_str()) {
+                let cycles = graph.folder_cycles(&parent);
+                found.extend(cycles.into_iter().map(|cycle| (name.clone(), cycle)));
+            }
+        }
+    }
+    assert!(found.is_empty(), "import cycles: {found:#?}");
 }
 
 /// Largest number of files in the walkthrough of one pair in `src/lib.rs`, and of their lines without unit tests.
 const MAX_WALK_FILES: usize = 18;
 const MAX_WALK_LINES: usize = 4500;
 
-/// Returns the files at the start of list items below a heading in `src/lib.rs`. Paths are relative to `src`.
+/// Returns the files at the start of list items below a heading in `src/lib.rs`. Paths are relative to the folder of the repository.
 fn listed_files(heading: &str) -> Vec<String> {
     let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
     let heading = format!("//! ## {heading}");
@@ -377,7 +353,7 @@ fn listed_files(heading: &str) -> Vec<String> {
     section
         .take_while(|line| !line.starts_with("//! ## "))
         .filter_map(|line| {
-            let (mark, file) = line.strip_prefix("//! ")?.split_once("`src/")?;
+            let (mark, file) = line.strip_prefix("//! ")?.split_once('`')?;
             let number = mark
                 .strip_suffix(". ")
                 .and_then(|number| number.parse::<u8>().ok());
@@ -395,7 +371,7 @@ fn the_way_of_one_pair_is_listed_and_short() {
         .iter()
         .map(|name| {
             let file = files.iter().find(|file| file.name == *name);
-            file.unwrap_or_else(|| panic!("src/{name} does not exist"))
+            file.unwrap_or_else(|| panic!("{name} does not exist"))
                 .production_lines()
         })
         .sum();

@@ -1,14 +1,16 @@
-//! Reads the source files of the crate for the tests that check its structure.
+//! Reads the source files of all crates for the tests that check their structure.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A source file below `src`.
+/// A source file below `src` or `crates/*/src`.
 pub(crate) struct SourceFile {
-    /// Path relative to `src`, with forward slashes.
+    /// Path relative to the folder of the repository, with forward slashes.
     pub(crate) name: String,
-    /// The top-level module.
-    pub(crate) module: String,
+    /// Folder of the crate below `crates`; `mocban` for the root.
+    pub(crate) crate_name: String,
+    /// Path relative to the `src` of the crate, with forward slashes.
+    path: String,
     /// The whole text.
     pub(crate) text: String,
     /// Whether the file is compiled for tests only.
@@ -24,14 +26,6 @@ impl SourceFile {
         without_comments(&self.text[..test_module_start(&self.text)])
     }
 
-    /// Returns the code of the unit tests without comments.
-    pub(crate) fn test_code(&self) -> String {
-        if self.is_test {
-            return without_comments(&self.text);
-        }
-        without_comments(&self.text[test_module_start(&self.text)..])
-    }
-
     /// Returns the number of lines without unit tests.
     pub(crate) fn production_lines(&self) -> usize {
         if self.is_test {
@@ -42,7 +36,7 @@ impl SourceFile {
 
     /// Returns the module's path from the crate root. The path of `lib.rs` and `main.rs` is empty.
     pub(crate) fn module(&self) -> Vec<String> {
-        let name = self.name.trim_end_matches(".rs");
+        let name = self.path.trim_end_matches(".rs");
         let mut parts: Vec<String> = name.split('/').map(str::to_owned).collect();
         if matches!(
             parts.last().map(String::as_str),
@@ -77,52 +71,72 @@ pub(crate) fn rust_files(dir: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Reads all files below `src`.
+/// Returns the names of all crates, each with its `src`.
+fn crates() -> Vec<(String, PathBuf)> {
+    let mut found = vec![("mocban".to_owned(), package_dir().join("src"))];
+    for entry in std::fs::read_dir(package_dir().join("crates")).expect("a readable directory") {
+        let dir = entry.expect("a readable entry").path();
+        let name = dir.file_name().expect("a name").to_string_lossy();
+        found.push((name.into_owned(), dir.join("src")));
+    }
+    found.sort();
+    found
+}
+
+/// Reads the source files of all crates.
 pub(crate) fn source_files() -> Vec<SourceFile> {
-    let src = package_dir().join("src");
-    let texts: Vec<(String, String)> = rust_files(&src)
+    let read = |(name, src): &(String, PathBuf)| crate_files(name, src);
+    crates().iter().flat_map(read).collect()
+}
+
+/// Reads the source files of a crate.
+fn crate_files(crate_name: &str, src: &Path) -> Vec<SourceFile> {
+    let texts: Vec<(String, String)> = rust_files(src)
         .into_iter()
         .map(|path| {
-            let name = path.strip_prefix(&src).expect("a path below src");
-            let name = name.to_string_lossy().replace('\\', "/");
             let text = std::fs::read_to_string(&path).expect("readable source");
-            (name, text)
+            (slashed(&path, src), text)
         })
         .collect();
     let test_modules: BTreeSet<String> = texts
         .iter()
-        .flat_map(|(name, text)| test_modules(name, text))
+        .flat_map(|(path, text)| test_modules(path, text))
         .collect();
     texts
         .into_iter()
-        .map(|(name, text)| {
-            let stem = name.trim_end_matches(".rs").to_owned();
-            let is_test = test_modules.iter().any(|module| {
-                stem == *module
-                    || stem
-                        .strip_prefix(module.as_str())
-                        .is_some_and(|rest| rest.starts_with('/'))
-            });
-            let module = stem.split('/').next().unwrap_or_default().to_owned();
+        .map(|(path, text)| {
+            let stem = path.trim_end_matches(".rs");
+            let is_below = |module: &String| {
+                let rest = stem.strip_prefix(module.as_str());
+                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+            };
             SourceFile {
-                name,
-                module,
+                name: slashed(&src.join(&path), &package_dir()),
+                crate_name: crate_name.to_owned(),
+                is_test: test_modules.iter().any(is_below),
+                path,
                 text,
-                is_test,
             }
         })
         .collect()
 }
 
-/// Returns the modules declared as `#[cfg(test)] mod NAME;`, as file paths below `src` without an extension.
+/// Returns a path relative to a folder, with forward slashes.
+fn slashed(path: &Path, folder: &Path) -> String {
+    let path = path.strip_prefix(folder).expect("a path below the folder");
+    path.to_string_lossy().replace('\\', "/")
+}
+
+/// Returns the modules declared as `mod NAME;` for tests only, as file paths below `src` without an extension.
 fn test_modules(name: &str, text: &str) -> Vec<String> {
     let stem = name.trim_end_matches(".rs");
     let dir = ["/mod", "lib", "main"]
         .iter()
         .find_map(|suffix| stem.strip_suffix(suffix))
         .unwrap_or(stem);
-    text.split("#[cfg(test)]\n")
-        .skip(1)
+    let marks = ["#[cfg(test)]\n", FOR_TESTS];
+    let after_marks = marks.iter().flat_map(|mark| text.split(mark).skip(1));
+    after_marks
         .filter_map(|after| {
             let module = after
                 .lines()
@@ -134,6 +148,9 @@ fn test_modules(name: &str, text: &str) -> Vec<String> {
         })
         .collect()
 }
+
+/// The mark of modules that tests of other crates use.
+const FOR_TESTS: &str = "#[cfg(any(test, feature = \"test-helpers\"))]\n";
 
 /// Returns the offset of the inline test module. Returns the length of the text if there is none.
 fn test_module_start(text: &str) -> usize {

@@ -16,7 +16,7 @@ use crate::block::align::CarvedFace;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::PageMap;
-use crate::raster::Mask;
+use mocban_core::raster::Mask;
 
 /// Total length of inner rules that decides alone, mm.
 const SURE_RULES_MM: f64 = 150.0;

@@ -2,7 +2,7 @@
 
 use super::rules::{Rule, find_solid, take_rules};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
-use crate::raster::{Grid, Mask};
+use mocban_core::raster::{Grid, Mask};
 
 /// Pixels per side of a cell.
 pub(super) const CELL: usize = 2;

@@ -20,7 +20,7 @@ use self::rows::{RowPitches, find_rows};
 use super::align::CarvedFace;
 use super::page_ink::PageInk;
 use super::page_map::PageMap;
-use crate::domain::{BoxName, NotePart};
+use mocban_core::domain::{BoxName, NotePart};
 
 /// Least area of a character, mm^2, and least length of its longer side, in pitches.
 const MIN_AREA_MM2: f64 = 0.8;

@@ -5,8 +5,8 @@ use super::layout::{CELL, Layout};
 use super::rows::{FoundRow, RowKind};
 use super::text_image::{PIXEL_MM, TextImage, Trust};
 use crate::block::page_map::PageMap;
-use crate::raster::Grid;
-use crate::raster::components::ConnectedComponents;
+use mocban_core::raster::Grid;
+use mocban_core::raster::components::ConnectedComponents;
 
 /// Parts of which at least this share lies in a second place are divided between the places.
 const SHARED: f64 = 0.2;

@@ -1,8 +1,8 @@
 //! Frame and rules between columns, and other marks that are no text.
 
 use super::text_image::PIXEL_MM;
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Grid, Mask};
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Length over which a rule is straight and nearly without gaps, mm, and the share of it that is covered.
 const RULE_MM: f64 = 25.0;

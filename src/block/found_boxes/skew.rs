@@ -2,7 +2,7 @@
 
 use crate::block::align::CarvedFace;
 use crate::block::window_images::ShrunkRelief;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Angles on both sides of that of the page that are searched, degrees.
 const REACH_DEG: f64 = 9.0;

@@ -8,8 +8,8 @@ use crate::block::orientation::Orientation;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::PageMap;
 use crate::block::relief::Relief;
-use crate::domain::Affine2;
-use crate::raster::{Grid, Mask};
+use mocban_core::domain::Affine2;
+use mocban_core::raster::{Grid, Mask};
 
 /// Size of the face, mm. The frame is 3 mm inside.
 const SIZE_MM: [f64; 2] = [82.0, 74.0];

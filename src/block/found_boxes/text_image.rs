@@ -7,8 +7,8 @@ use crate::block::face_layer::FACE_CELL;
 use crate::block::height_map::HEIGHT_STEP_MM;
 use crate::block::page_ink::PageInk;
 use crate::block::page_map::{PageMap, points_of_row};
-use crate::domain::cancel::ThreadToken;
-use crate::raster::Grid;
+use mocban_core::domain::cancel::ThreadToken;
+use mocban_core::raster::Grid;
 
 /// Size of a pixel, mm: that of height maps.
 pub(super) const PIXEL_MM: f64 = HEIGHT_STEP_MM;

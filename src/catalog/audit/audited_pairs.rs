@@ -9,7 +9,7 @@ use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::lease::MetricResult;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{
+use mocban_core::domain::{
     ContentHash, Disagreement, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage,
     ThresholdMetric,
 };

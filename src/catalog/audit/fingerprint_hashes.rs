@@ -7,7 +7,7 @@ use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::queue::fingerprint::hash_of;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{ContentHash, Stage};
+use mocban_core::domain::{ContentHash, Stage};
 
 /// A fingerprint whose hash does not follow from its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]

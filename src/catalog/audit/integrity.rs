@@ -13,7 +13,7 @@ use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::JobStatus;
+use mocban_core::domain::JobStatus;
 
 /// Largest number of broken references that a check lists.
 const LINES: usize = 50;

@@ -14,7 +14,7 @@ use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::queue::requeue::CLEAR_FAILURES;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{PairId, Stage};
+use mocban_core::domain::{PairId, Stage};
 
 const POSITIONS: &str = "
 SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::catalog::records::model::PairResults;
 use crate::catalog::{Catalog, Result};
-use crate::domain::BlockName;
+use mocban_core::domain::BlockName;
 
 /// Pairs that are read at a time.
 const PAGE: usize = 256;

@@ -10,7 +10,7 @@ use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{BlockCharacterState, BlockId, BlockName, PairId, PairName};
+use mocban_core::domain::{BlockCharacterState, BlockId, BlockName, PairId, PairName};
 
 const UPSERT: &str = "
 INSERT INTO block_character (block, label, place, character, box, confidence, state, reason, maps, pair)

@@ -3,7 +3,7 @@
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockName, ContentHash, ControlPoints};
+use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 
 const STORED: &str = "SELECT control_points FROM block WHERE name = ?1";
 

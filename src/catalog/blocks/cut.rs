@@ -14,7 +14,7 @@ use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::lease::InputVersions;
 use crate::catalog::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockName, PairId, PairName};
+use mocban_core::domain::{BlockName, PairId, PairName};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use crate::catalog::db::row::FromRow as _;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
 /// Counts of an import of blocks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

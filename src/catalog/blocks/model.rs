@@ -9,7 +9,7 @@ use crate::catalog::db::row::from_row;
 use crate::catalog::queue::fingerprint::differences;
 use crate::catalog::queue::lease::InputVersion;
 use crate::catalog::queue::plan::FieldChange;
-use crate::domain::{
+use mocban_core::domain::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
     ControlPoints, Failure, LengthUnit, PrintFromMesh, UnixMillis, WorkerId,
 };

@@ -13,7 +13,7 @@ use crate::catalog::queue::lease::InputVersion;
 use crate::catalog::records::checksums::ChecksummedTable;
 use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{
+use mocban_core::domain::{
     BlockId, BlockName, BlockStage, BlockStageRecord, ContentHash, ControlPoints, Failure,
     JobStatus, UnixMillis,
 };

@@ -9,7 +9,7 @@ use crate::catalog::blocks::records::{BLOCK, control_points, input_versions};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::row::{FromRow as _, from_row};
-use crate::domain::{
+use mocban_core::domain::{
     BlockId, BlockStage, CRASH_LIMIT, FailureClass, UnixMillis, WorkerId, is_poisoned,
 };
 

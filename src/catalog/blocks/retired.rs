@@ -10,7 +10,7 @@ use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{JobStatus, PairId, PairName, UnixMillis};
+use mocban_core::domain::{JobStatus, PairId, PairName, UnixMillis};
 
 /// Removes jobs. Their leases end, because no fenced statement finds them any more.
 const REMOVE: &str = "

@@ -6,7 +6,7 @@ use crate::catalog::db::query::query_scalar;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockId, BlockName, PairId};
+use mocban_core::domain::{BlockId, BlockName, PairId};
 
 const SELECT: &str =
     "SELECT id FROM block WHERE name IN (SELECT atom FROM json_each(?1)) ORDER BY id";

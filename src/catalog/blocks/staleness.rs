@@ -15,7 +15,7 @@ use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::queue::staleness::RerunPolicy;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
+use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 
 const JOBS: &str = "
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.mesh_hash, b.mesh_stat, b.page_hash,

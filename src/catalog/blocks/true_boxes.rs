@@ -5,7 +5,7 @@ use crate::catalog::db::value::Json;
 use crate::catalog::records::checksums::ChecksummedTable;
 use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{BlockName, TrueBox};
+use mocban_core::domain::{BlockName, TrueBox};
 
 const SET: &str = "UPDATE block SET true_boxes = ?2 WHERE name = ?1 RETURNING id";
 

@@ -87,7 +87,7 @@ mod tests {
     use crate::catalog::db::request::Message;
     use crate::catalog::db::request::Request;
     use crate::catalog::queue::claim::Heartbeat;
-    use crate::domain::WorkerId;
+    use mocban_core::domain::WorkerId;
 
     fn request() -> Request {
         let heartbeat = Heartbeat {

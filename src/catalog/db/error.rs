@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use sqlx::postgres::PgDatabaseError;
 
-use crate::domain::{PairName, ThresholdMetric, UnixMillis};
+use mocban_core::domain::{PairName, ThresholdMetric, UnixMillis};
 
 /// An error of the catalog.
 #[derive(Debug, thiserror::Error)]

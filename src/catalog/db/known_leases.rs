@@ -11,7 +11,7 @@ use crate::catalog::db::row::from_row;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::catalog::queue::lease::{FencedRow, Lease};
-use crate::domain::{JobStatus, PairId, WorkerId};
+use mocban_core::domain::{JobStatus, PairId, WorkerId};
 
 /// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit
 /// of the broken connection until it notices that the connection is broken.

@@ -15,7 +15,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::sidecar;
 use crate::catalog::db::network_fs;
 use crate::catalog::db::schema::{self, MIGRATOR};
-use crate::domain::FileKind;
+use mocban_core::domain::FileKind;
 
 /// SQLite's busy timeout of a connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);

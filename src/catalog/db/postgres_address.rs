@@ -3,7 +3,7 @@
 use sqlx::postgres::{PgConnectOptions, PgSslMode};
 
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::domain::without_password;
+use mocban_core::domain::without_password;
 
 /// Schema of the tables, unless the URL sets another `search_path`.
 pub(crate) const SCHEMA: &str = "mocban";

@@ -5,7 +5,7 @@ use sqlx::error::BoxDynError;
 
 use crate::catalog::db::value::{Argument, FromValue, Value as ColumnValue, read_blob, read_text};
 use crate::catalog::queue::lease::FingerprintId;
-use crate::domain::{
+use mocban_core::domain::{
     Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
     ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName, PrintFromMesh, Reason,
     ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,

@@ -20,7 +20,7 @@ use crate::catalog::db::query::query;
 use crate::catalog::db::retry_wait::RetryWait;
 use crate::catalog::queue::claim_start::ClaimStart;
 use crate::catalog::queue::worker_lock::WorkerLock;
-use crate::domain::WorkerId;
+use mocban_core::domain::WorkerId;
 
 /// Time after a connection was given up in which no other is tried.
 const PAUSE_AFTER_GIVING_UP: Duration = Duration::from_secs(10);

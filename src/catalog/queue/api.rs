@@ -7,7 +7,7 @@ use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{UnixMillis, WorkerId, WorkerMetrics};
+use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics};
 
 impl Catalog {
     /// Leases up to `slots` ready pairs, or none if the worker has ended or its heartbeat is before `alive_since`. May also

@@ -11,7 +11,7 @@ use crate::catalog::queue::claim::ClaimRequest;
 use crate::catalog::queue::counters::cursor;
 use crate::catalog::queue::lease::Lease;
 use crate::catalog::queue::server_claim::Behind;
-use crate::domain::{Stage, WorkerId};
+use mocban_core::domain::{Stage, WorkerId};
 
 /// Time between searches from the beginning, which find earlier pairs that other processes made ready.
 const SEARCH_ALL_EVERY: Duration = Duration::from_secs(5);
@@ -111,7 +111,7 @@ mod tests {
     use crate::catalog::queue::claim::ClaimRequest;
     use crate::catalog::queue::lease::Lease;
     use crate::catalog::queue::server_claim::Behind;
-    use crate::domain::{PairId, Stage, WorkerId};
+    use mocban_core::domain::{PairId, Stage, WorkerId};
     use std::time::Instant;
 
     fn request(slots: usize) -> ClaimRequest {

@@ -10,7 +10,7 @@ use crate::catalog::db::error::Result;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::row::from_row;
 use crate::catalog::db::script::Script;
-use crate::domain::{JobStatus, Stage};
+use mocban_core::domain::{JobStatus, Stage};
 
 const CHANGE: Sql = Sql::pair(
     "

@@ -9,7 +9,7 @@ use crate::catalog::queue::checkpoint::add_inputs;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::fragments::fingerprint_before;
 use crate::catalog::queue::lease::{FailureAction, Lease, StageFailure};
-use crate::domain::JobStatus;
+use mocban_core::domain::JobStatus;
 
 /// Number of attempts kept per pair. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;

@@ -12,7 +12,7 @@ use crate::catalog::db::value::Json;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{ContentHash, Stage};
+use mocban_core::domain::{ContentHash, Stage};
 
 /// The fingerprint of one stage's settings.
 #[derive(Debug, Clone, PartialEq)]
@@ -256,7 +256,7 @@ mod tests {
     use serde_json::json;
 
     use super::{Fingerprints, differences};
-    use crate::domain::Stage;
+    use mocban_core::domain::Stage;
 
     #[test]
     fn a_changed_setting_changes_its_stage_and_those_after_it() {

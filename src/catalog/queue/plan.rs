@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::catalog::queue::lease::FingerprintId;
-use crate::domain::{JobStatus, Stage};
+use mocban_core::domain::{JobStatus, Stage};
 
 /// Why a pair has work to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

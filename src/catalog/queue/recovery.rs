@@ -16,7 +16,7 @@ use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::queue::lease::InputVersions;
 use crate::catalog::queue::worker_lock;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
+use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -17,7 +17,7 @@ use crate::catalog::queue::staleness::{
     PAGE, RerunPolicy, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
 };
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{FailureClass, JobStatus, PairName, Stage};
+use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};
 
 /// Which failed pairs to requeue.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use crate::catalog::queue::staleness::{
     RerunPolicy, StaleJob, count_stale, decide, inspect, inspect_all,
 };
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{PairName, Stage};
+use mocban_core::domain::{PairName, Stage};
 
 impl Catalog {
     /// Plans a run with these settings for the selected pairs, or for all.

@@ -4,7 +4,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::query::query_scalar;
 use crate::catalog::db::rows::{json_array, names_json};
-use crate::domain::{PairId, PairName};
+use mocban_core::domain::{PairId, PairName};
 
 /// Some pairs of the catalog.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::catalog::queue::workers::WorkerSettings;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{Stage, UnixMillis};
+use mocban_core::domain::{Stage, UnixMillis};
 
 /// Time without a heartbeat after which `status` no longer counts a worker, in milliseconds. Only for display, because
 /// the clocks of two machines may differ.

@@ -17,7 +17,7 @@ use crate::catalog::queue::fingerprint::FingerprintChains;
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::plan::StaleReason;
 use crate::catalog::queue::selection::PairSelection;
-use crate::domain::{JobStatus, PairId, Stage};
+use mocban_core::domain::{JobStatus, PairId, Stage};
 
 /// Jobs inspected in one statement.
 pub(crate) const PAGE: usize = 10_000;
@@ -244,7 +244,7 @@ pub(crate) async fn clear_dirty(conn: &mut Conn, after: i64, last: i64) -> Resul
 #[cfg(test)]
 mod tests {
     use super::{CounterKey, RerunPolicy, StaleJob, StaleReason, decide};
-    use crate::domain::{JobStatus, Stage};
+    use mocban_core::domain::{JobStatus, Stage};
 
     fn job(cursor: i64, status: JobStatus) -> StaleJob {
         StaleJob {

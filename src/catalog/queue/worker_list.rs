@@ -5,7 +5,7 @@ use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::Json;
 use crate::catalog::queue::shared_runs::SHOWN_ACTIVE_MS;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{UnixMillis, WorkerId, WorkerMetrics, enum_names};
+use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics, enum_names};
 
 /// Selects the workers whose last heartbeat is later than `?1`. Leaves out workers that ended without metrics.
 pub(crate) const LIST: &str = "

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use crate::catalog::Result;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::query_scalar;
-use crate::domain::WorkerId;
+use mocban_core::domain::WorkerId;
 
 /// Takes the lock of a worker until the end of the session. Returns `false` if another session holds it, such as a broken
 /// connection of the same worker.

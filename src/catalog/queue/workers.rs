@@ -8,7 +8,7 @@ use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
 
 /// The process a worker runs in.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -15,7 +15,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::rows::json_array;
-use crate::domain::{ContentHash, enum_names};
+use mocban_core::domain::{ContentHash, enum_names};
 
 /// A table whose rows have checksums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -10,7 +10,7 @@ use crate::catalog::db::row::Row;
 use crate::catalog::db::value::Value;
 use crate::catalog::records::checksums::{COVERED, ChecksummedTable, checksum};
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{Affine2, AttentionCheck, PrintFromMesh, enum_names};
+use mocban_core::domain::{Affine2, AttentionCheck, PrintFromMesh, enum_names};
 
 /// Number of rows that are read at a time.
 const PAGE: i64 = 2000;

@@ -7,7 +7,7 @@ use crate::catalog::db::query::query_scalar;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 const SET: &str = "
 INSERT INTO truth (pair, body)

@@ -17,7 +17,7 @@ use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{PairName, UnixMillis};
+use mocban_core::domain::{PairName, UnixMillis};
 
 /// A row to import.
 pub type ImportRow = PairAttributes;

@@ -7,7 +7,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as};
 use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::{Catalog, Result};
-use crate::domain::ArtifactRef;
+use mocban_core::domain::ArtifactRef;
 
 /// Number of pairs that are read at a time.
 const PAGE: i64 = 2_000;

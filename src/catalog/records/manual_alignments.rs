@@ -10,7 +10,7 @@ use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::left_out::is_counted;
 use crate::catalog::records::review_answers::pair_id;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
+use mocban_core::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// A manual alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::catalog::db::row::from_row;
 use crate::catalog::records::verdicts::{ReviewerVerdict, VerdictEvent};
-use crate::domain::{
+use mocban_core::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
     ThresholdMetric, UnixMillis, Verdict,
 };

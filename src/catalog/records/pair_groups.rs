@@ -7,7 +7,7 @@ use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::records::checksums::ChecksummedTable;
 use crate::catalog::records::left_out::is_counted;
 use crate::catalog::{Catalog, Result};
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 const META_COLUMNS: Sql = Sql::pair(
     concat!(

@@ -15,7 +15,7 @@ use crate::catalog::records::model::{
 };
 use crate::catalog::records::{stage_results, verdicts};
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{
+use mocban_core::domain::{
     ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
     UnixMillis,
 };

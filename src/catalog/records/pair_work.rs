@@ -12,7 +12,7 @@ use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{PairId, Stage};
+use mocban_core::domain::{PairId, Stage};
 
 /// A leased pair with its attributes and results.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use crate::catalog::records::left_out::is_counted;
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{
+use mocban_core::domain::{
     AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
 };
 

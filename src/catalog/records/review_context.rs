@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::catalog::db::row::from_row;
-use crate::domain::{ContentHash, ReviewOrder};
+use mocban_core::domain::{ContentHash, ReviewOrder};
 
 /// Context of a verdict. All fields are `None` if the context is unknown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

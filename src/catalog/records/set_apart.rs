@@ -13,7 +13,7 @@ use crate::catalog::db::rows::json_array;
 use crate::catalog::records::faulty_rows::FaultyRow;
 use crate::catalog::records::left_out::LeftOut;
 use crate::catalog::{Catalog, Result};
-use crate::domain::{UnixMillis, one_line};
+use mocban_core::domain::{UnixMillis, one_line};
 
 /// Number of rows that [`SetApart`] names.
 const NAMED: usize = 20;

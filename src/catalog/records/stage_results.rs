@@ -8,7 +8,7 @@ use crate::catalog::db::query::{query, query_as};
 use crate::catalog::db::row::FromRow as _;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::records::model::StageRecord;
-use crate::domain::{ContentHash, ThresholdMetric};
+use mocban_core::domain::{ContentHash, ThresholdMetric};
 
 pub(crate) const STAGE_RESULTS: &str = "
 SELECT r.pair, r.stage, r.mesh_hash, r.print_hash, r.outcome, r.files, r.result_hash, r.ms, r.at,

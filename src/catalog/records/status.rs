@@ -9,7 +9,7 @@ use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
 use crate::catalog::queue::staleness::count_stale;
 use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::{Catalog, Result};
-use crate::domain::{JobStatus, Stage, Verdict};
+use mocban_core::domain::{JobStatus, Stage, Verdict};
 
 /// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the verdicts
 /// that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
@@ -90,7 +90,7 @@ async fn verdicts(conn: &mut Conn) -> Result<BTreeMap<Verdict, u64>> {
 mod tests {
     use super::by_stage;
     use crate::catalog::StageCounts;
-    use crate::domain::{JobStatus, Stage};
+    use mocban_core::domain::{JobStatus, Stage};
 
     #[test]
     fn every_pair_is_counted_once_at_every_stage() {

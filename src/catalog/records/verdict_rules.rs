@@ -1,7 +1,7 @@
 //! Which values a new verdict may have, wherever it comes from: the review page, a command or a file.
 
 use crate::catalog::records::verdicts::NewVerdict;
-use crate::domain::{UnixMillis, Verdict, is_hidden};
+use mocban_core::domain::{UnixMillis, Verdict, is_hidden};
 
 /// Maximum length of a reviewer's name in characters.
 const REVIEWER_CHARS: usize = 100;
@@ -99,7 +99,7 @@ pub fn check_event(event: &str) -> Result<(), InvalidVerdict> {
 mod tests {
     use super::{DAY_MS, InvalidVerdict, NOTE_CHARS, check_event, check_reviewer};
     use crate::catalog::{NewVerdict, ReviewContext};
-    use crate::domain::{Reason, Verdict};
+    use mocban_core::domain::{Reason, Verdict};
 
     const NOW: i64 = 1_800_000_000_000;
 

@@ -12,7 +12,7 @@ use crate::catalog::records::checksums::{self, ChecksummedTable};
 use crate::catalog::records::left_out::{LeftOut, is_counted};
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::domain::{
+use mocban_core::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
 };
 

@@ -5,7 +5,7 @@ use crate::catalog::db::query::query;
 use crate::catalog::{
     AnsweredOn, Catalog, CatalogError, ManualAlignment, NewVerdict, ReviewContext, Shown,
 };
-use crate::domain::{
+use mocban_core::domain::{
     Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
     Verdict,
 };

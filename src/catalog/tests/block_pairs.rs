@@ -8,7 +8,7 @@ use crate::catalog::{
     BlockAttributes, BlockInputVersions, BlockReason, CharacterMaps, CheckpointOutcome, CutOrigin,
     CutReply, NewCharacter, NewVerdict, ReviewContext,
 };
-use crate::domain::{
+use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockStage, JobStatus, PrintFromMesh, Stage, ThresholdMetric,
     TrueBox, Verdict,
 };

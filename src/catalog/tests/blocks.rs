@@ -8,7 +8,7 @@ use crate::catalog::{
     BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutPair, CutReply, CutSummary,
     DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy,
 };
-use crate::domain::{
+use mocban_core::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, BlockStageRecord, ContentHash,
     Failure, FailureClass, WorkerId,
 };
@@ -239,7 +239,7 @@ async fn changes_make_the_right_stages_stale() {
         world.finish_block(vec![character("a", "a")]).await;
     }
     let other_side = BlockAttributes {
-        side: Some(crate::domain::BlockSide::Back),
+        side: Some(mocban_core::domain::BlockSide::Back),
         ..attributes("b")
     };
     world.import_block(other_side).await;

@@ -2,7 +2,7 @@
 
 use super::{World, register};
 use crate::catalog::{CheckpointOutcome, Lease};
-use crate::domain::Stage;
+use mocban_core::domain::Stage;
 
 fn pairs(leases: &[Lease]) -> Vec<i64> {
     leases.iter().map(|lease| lease.pair().0).collect()

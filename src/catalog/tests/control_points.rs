@@ -2,7 +2,7 @@
 
 use super::blocks::{attributes, block, character, version, world};
 use crate::catalog::{BlockReason, ControlPointsChange};
-use crate::domain::{BlockSide, BlockStage, ControlPoint, ControlPoints};
+use mocban_core::domain::{BlockSide, BlockStage, ControlPoint, ControlPoints};
 
 #[tokio::test]
 async fn control_points_make_the_alignment_stale_only_for_their_files() {

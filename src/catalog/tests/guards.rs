@@ -6,7 +6,7 @@ use crate::catalog::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds, Lease,
     RerunPolicy, StageFailure,
 };
-use crate::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
+use mocban_core::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
 
 async fn status(world: &World) -> JobStatus {
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -376,7 +376,7 @@ async fn a_poisoned_pair_is_requeued_with_another_mesh() {
     let seen = |text: &str| {
         let mut seen = inputs(Stage::Fit);
         let mesh = seen.mesh.as_mut().expect("a mesh");
-        mesh.hash = crate::domain::ContentHash::of(text.as_bytes());
+        mesh.hash = mocban_core::domain::ContentHash::of(text.as_bytes());
         vec![(PairId(1), seen)]
     };
     let stored = world.catalog.record_poisoned_inputs(seen("fatal")).await;

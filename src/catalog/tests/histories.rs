@@ -13,7 +13,7 @@ use crate::catalog::{
     Catalog, CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
     StageFailure,
 };
-use crate::domain::{Failure, FailureClass, Stage};
+use mocban_core::domain::{Failure, FailureClass, Stage};
 
 /// Number of pairs at the start of a history.
 const PAIRS: usize = 5;

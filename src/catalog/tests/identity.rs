@@ -2,7 +2,7 @@
 
 use super::{Place, World};
 use crate::catalog::Catalog;
-use crate::domain::{ArtifactRef, ContentHash, Stage};
+use mocban_core::domain::{ArtifactRef, ContentHash, Stage};
 
 #[tokio::test]
 async fn a_catalog_keeps_its_identity_and_a_copy_has_one_of_its_own() {

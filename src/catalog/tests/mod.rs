@@ -35,7 +35,7 @@ use super::{
     InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, RerunPolicy, StageCheckpoint,
     WorkerInfo, WorkerSettings,
 };
-use crate::domain::{
+use mocban_core::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
     Scores, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };

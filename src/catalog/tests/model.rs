@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::state_machine::{Event, JobState, transition};
 use crate::catalog::{FingerprintIds, Lease, RerunPolicy};
-use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId, is_poisoned};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, is_poisoned};
 
 /// How long a worker counts as alive without a heartbeat.
 pub(super) const LEASE: i64 = 100;

@@ -8,7 +8,7 @@ use crate::catalog::{
     BlockCheckpoint, Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction,
     RerunPolicy, RetrySelection, StageCheckpoint, StageFailure,
 };
-use crate::domain::{
+use mocban_core::domain::{
     BlockStage, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
 };
 

@@ -3,7 +3,7 @@
 use super::protocol::status;
 use super::{World, name, observed, register};
 use crate::catalog::{CheckpointOutcome, ClaimRequest, DeadWorker};
-use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, Stage};
+use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, Stage};
 
 #[tokio::test]
 async fn the_third_crash_quarantines_the_pair_with_a_message() {

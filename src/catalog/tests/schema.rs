@@ -3,7 +3,7 @@
 use crate::catalog::db::query::query;
 
 use super::World;
-use crate::domain::{
+use mocban_core::domain::{
     FailureClass, JobStatus, LengthUnit, Reason, ReviewOrder, ThresholdMetric, Verdict,
 };
 

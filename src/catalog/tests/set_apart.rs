@@ -3,7 +3,7 @@
 use super::{World, name};
 use crate::catalog::db::query::query;
 use crate::catalog::{Catalog, ChecksummedTable, NewVerdict, ReviewContext, RowFault};
-use crate::domain::Verdict;
+use mocban_core::domain::Verdict;
 
 /// A verdict without a checksum, as a reviewer's login could store it.
 const FORGED: &str = "

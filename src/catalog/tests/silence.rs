@@ -5,7 +5,7 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::{CheckpointOutcome, RerunPolicy};
-use crate::domain::Stage;
+use mocban_core::domain::Stage;
 
 /// The transaction of the operation that was given up must not contain later ones, which would be lost with it.
 #[tokio::test]

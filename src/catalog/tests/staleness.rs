@@ -5,7 +5,7 @@ use crate::catalog::{
     FailureAction, Fingerprints, InputVersion, InputVersions, Plan, RerunPolicy, StageFailure,
     StaleReason,
 };
-use crate::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
+use mocban_core::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
 
 async fn cursor(world: &World, pair: &str) -> Option<Stage> {
     let detail = world.catalog.pair(&name(pair)).await.expect("a read");

@@ -1,6 +1,6 @@
 //! The state machine of a job. The SQL of the queue is tested against this specification.
 
-use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
 /// The state of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -183,7 +183,7 @@ fn leased(stage: Stage, holder: WorkerId, event: Event) -> Option<JobState> {
 #[cfg(test)]
 mod tests {
     use super::{Event, JobState, transition};
-    use crate::domain::{Stage, WorkerId};
+    use mocban_core::domain::{Stage, WorkerId};
 
     const ME: WorkerId = WorkerId(1);
     const OTHER: WorkerId = WorkerId(2);

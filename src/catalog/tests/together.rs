@@ -3,7 +3,7 @@
 use super::{World, fingerprints, name};
 use crate::catalog::db::query::query_as;
 use crate::catalog::{CheckpointOutcome, Lease, PairDetail, RerunPolicy};
-use crate::domain::Stage;
+use mocban_core::domain::Stage;
 
 /// Stores stages under a lease in one commit.
 async fn store(world: &World, lease: Lease, stages: &[Stage]) -> CheckpointOutcome {

@@ -3,7 +3,7 @@
 use super::{World, name};
 use crate::catalog::db::query::query;
 use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
-use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
+use mocban_core::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
 /// Number of metrics with a result, of a pair that is done.
 const METRICS: usize = ThresholdMetric::ALL.len();

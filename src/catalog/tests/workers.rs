@@ -6,7 +6,7 @@ use super::{World, observed, register};
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::query_scalar;
 use crate::catalog::{WorkerRecord, WorkerState};
-use crate::domain::{ComputeTimes, Stage, WorkerId, WorkerMetrics};
+use mocban_core::domain::{ComputeTimes, Stage, WorkerId, WorkerMetrics};
 
 fn metrics(done: u64) -> WorkerMetrics {
     WorkerMetrics {

@@ -10,7 +10,7 @@ use crate::catalog::db::query::{Query, converted, limited, query};
 use crate::catalog::db::row::Row;
 use crate::catalog::db::value::{Argument, Value};
 use crate::catalog::{CatalogError, Result};
-use crate::domain::ContentHash;
+use mocban_core::domain::ContentHash;
 
 /// Rows in one statement. SQLite allows 32,766 parameters, and a table has at most 23 columns.
 const PAGE: i64 = 1_000;

@@ -10,7 +10,7 @@ use super::solid::BlockSolid;
 use super::text_cell::TextCell;
 use super::true_map::TruePageMap;
 use crate::demo::polygon::BoundsMm;
-use crate::domain::{LengthUnit, TrueBox};
+use mocban_core::domain::{LengthUnit, TrueBox};
 
 /// Number of landmarks of a character.
 const LANDMARKS: usize = 12;

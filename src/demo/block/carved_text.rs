@@ -9,7 +9,7 @@ use crate::demo::artwork::{chip_edges, knife_outline};
 use crate::demo::glyph::Glyphs;
 use crate::demo::polygon::BoundsMm;
 use crate::demo::scalar_field::{SampleFrame, ScalarField};
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Margin of a character's own samples around its strokes, mm.
 const MARGIN_MM: f64 = 1.0;

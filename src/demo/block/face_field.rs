@@ -1,7 +1,7 @@
 //! The outlines of all strokes of a page, as signed distances on a large grid in the face frame.
 
 use crate::demo::polygon::BoundsMm;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Sample spacing, mm.
 const STEP_MM: f64 = 0.08;

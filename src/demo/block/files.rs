@@ -185,7 +185,7 @@ mod tests {
     use super::{BlockOptions, block_options, find_block, write_block};
     use crate::demo::DatasetError;
     use crate::demo::block::BlockKind;
-    use crate::mesh::{MeshLimits, read};
+    use mocban_core::mesh::{MeshLimits, read};
 
     const OPTIONS: BlockOptions = BlockOptions {
         kind: BlockKind::Mixed,

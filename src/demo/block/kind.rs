@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::demo::kind::NumberRange;
-use crate::domain::enum_names;
+use mocban_core::domain::enum_names;
 
 /// What is special about a generated block or its page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

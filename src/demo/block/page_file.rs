@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::raster::{Grid, jpeg_rgb8, png_grey8, png_rgb8};
+use mocban_core::raster::{Grid, jpeg_rgb8, png_grey8, png_rgb8};
 
 /// An encoded page image.
 #[derive(Debug, Clone)]

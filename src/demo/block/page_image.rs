@@ -7,7 +7,7 @@ use super::leaf::PrintedLeaf;
 use super::page_sheet::PageSheet;
 use super::true_map::TruePageMap;
 use crate::demo::noise::lerp;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Side of the cells in which the inverse map is interpolated, pixels. The error is below 0.01 px, because the map is
 /// smooth over 80 mm.

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::block_truth::{BlockCharacterTruth, BlockTruth};
 use crate::demo::scan_pose::TopsPlane;
-use crate::domain::{Affine2, PrintFromMesh, box_iou};
+use mocban_core::domain::{Affine2, PrintFromMesh, box_iou};
 
 /// Least intersection over union of a box with the ink of a character that it belongs to.
 const MIN_OVERLAP: f64 = 0.3;
@@ -111,7 +111,7 @@ fn fitted(points: &[[f64; 2]], values: &[f64]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use crate::demo::block::{BlockKind, BlockWorld};
-    use crate::domain::Affine2;
+    use mocban_core::domain::Affine2;
 
     #[test]
     fn map_of_a_pair_leads_from_its_landmarks_to_the_print() {

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::demo::scan_pose::any_rotation;
-use crate::domain::LengthUnit;
+use mocban_core::domain::LengthUnit;
 
 /// A side of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

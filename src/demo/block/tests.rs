@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use super::{BlockKind, BlockMeshFormat, BlockTruth, BlockWorld, FaceSide};
-use crate::mesh::{Mesh, MeshLimits, read};
-use crate::raster::{Grid, ImageLimits, decode};
+use mocban_core::mesh::{Mesh, MeshLimits, read};
+use mocban_core::raster::{Grid, ImageLimits, decode};
 
 const SPACING_MM: f64 = 0.6;
 

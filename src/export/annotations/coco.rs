@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::rle::{compressed, run_lengths};
-use crate::domain::PairName;
-use crate::raster::Mask;
+use mocban_core::domain::PairName;
+use mocban_core::raster::Mask;
 
 /// Category of pairs whose character is unknown.
 const STROKE: &str = "stroke";
@@ -149,7 +149,7 @@ pub(super) mod tests {
     use serde_json::{Value, json};
 
     use super::{CocoCategories, CocoText, StrokeAnnotation};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     /// Returns the annotation of a square of four pixels on a print of 9 x 7 pixels.
     pub(crate) fn square(pair: &str, character: Option<&str>, file_name: &str) -> StrokeAnnotation {

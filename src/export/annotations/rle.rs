@@ -1,6 +1,6 @@
 //! Run-length encoding of masks as `pycocotools` reads it.
 
-use crate::raster::Mask;
+use mocban_core::raster::Mask;
 
 /// Returns the lengths of the alternating runs of a mask, column by column: first pixels that are not set, then set
 /// ones, and so on.
@@ -49,7 +49,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{compressed, run_lengths};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     /// Reads the text back, as `rleFrString` of the COCO API does.
     fn expanded(text: &str) -> Vec<u32> {

@@ -12,13 +12,13 @@ use crate::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
 };
 use crate::catalog::{BlockDetail, Catalog};
-use crate::domain::{
+use crate::export::pictures::{Rgb, resized};
+use crate::store::Project;
+use mocban_core::domain::{
     Affine2, ArtifactSet, BlockName, BlockSide, BlockStage, ContentHash, ControlPoint,
     ControlPoints,
 };
-use crate::export::pictures::{Rgb, resized};
-use crate::raster::ImageLimits;
-use crate::store::Project;
+use mocban_core::raster::ImageLimits;
 
 /// Longer side of a picture, pixels. One pixel is then about 0.1 mm.
 const LONGEST_SIDE: f64 = 3000.0;

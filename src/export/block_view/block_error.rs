@@ -2,10 +2,10 @@
 
 use crate::block::BlockError;
 use crate::catalog::CatalogError;
-use crate::domain::{BlockName, BlockStage, ThresholdMetric};
 use crate::export::source_print::SourcePrintError;
-use crate::raster::PngError;
 use crate::store;
+use mocban_core::domain::{BlockName, BlockStage, ThresholdMetric};
+use mocban_core::raster::PngError;
 
 /// Why a block cannot be shown.
 #[derive(Debug, thiserror::Error)]

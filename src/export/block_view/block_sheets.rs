@@ -109,11 +109,11 @@ fn boxes_legend(block: &str, characters: &[CharacterView]) -> PictureLegend {
 #[cfg(test)]
 mod tests {
     use super::{boxes_legend, marked, scale};
-    use crate::domain::BlockCharacterState;
     use crate::export::block_view::characters::tests::stored;
     use crate::export::block_view::page_layers::tests::ridges;
     use crate::export::block_view::{CharacterStatus, CharacterView};
     use crate::report::test_fixtures;
+    use mocban_core::domain::BlockCharacterState;
 
     fn characters() -> Vec<CharacterView> {
         let done = test_fixtures::with_confidence("b_c1", 0.9);

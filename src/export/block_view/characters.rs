@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::catalog::{MetricRecord, PairResults, StoredCharacter};
-use crate::domain::{BlockCharacterState, JobStatus, ThresholdMetric, enum_names};
 use crate::export::pictures::{BLUE, ORANGE, VERMILLION};
 use crate::report::Consensus;
+use mocban_core::domain::{BlockCharacterState, JobStatus, ThresholdMetric, enum_names};
 
 /// Colour of characters whose pairs have no result yet.
 const GREY: [u8; 3] = [120, 120, 120];
@@ -173,8 +173,8 @@ fn status(
 pub(super) mod tests {
     use super::{CharacterStatus, CharacterView, PositionConfidence};
     use crate::catalog::{PairResults, StoredCharacter};
-    use crate::domain::{BlockCharacterState, FailureClass, ThresholdMetric, Verdict};
     use crate::report::test_fixtures;
+    use mocban_core::domain::{BlockCharacterState, FailureClass, ThresholdMetric, Verdict};
 
     /// A character at a box of the page.
     pub(in crate::export::block_view) fn stored(

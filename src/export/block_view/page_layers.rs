@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use crate::block::{CarvedFace, PageInk, PageMap};
-use crate::domain::cancel::ThreadToken;
-use crate::domain::enum_names;
 use crate::export::pictures::{BLUE, Rgb, VERMILLION, resized, shaded};
-use crate::raster::{Grid, jpeg_rgb8};
+use mocban_core::domain::cancel::ThreadToken;
+use mocban_core::domain::enum_names;
+use mocban_core::raster::{Grid, jpeg_rgb8};
 
 /// Pixels of a picture between points whose place on the face is computed; those between are interpolated linearly.
 const NODE_STEP: usize = 16;
@@ -259,9 +259,9 @@ impl FacePlaces {
 pub(super) mod tests {
     use super::{BOTH, INK_BESIDE, PageLayer, PageLayers, PageRegion};
     use crate::block::{CarvedFace, HeightHeader, Orientation, PageInk, PageMap, StoredHeights};
-    use crate::domain::Affine2;
     use crate::export::pictures::{BLUE, Rgb, VERMILLION};
-    use crate::raster::Grid;
+    use mocban_core::domain::Affine2;
+    use mocban_core::raster::Grid;
 
     /// Columns of the page with ink.
     const INK: std::ops::Range<usize> = 300..340;

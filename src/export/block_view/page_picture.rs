@@ -2,11 +2,11 @@
 
 use super::block_error::BlockViewError;
 use crate::block::PageInk;
-use crate::domain::ContentHash;
 use crate::export::pictures::{Rgb, eight_bits};
 use crate::export::source_print::SourcePrint;
-use crate::raster::ImageLimits;
 use crate::store::Project;
+use mocban_core::domain::ContentHash;
+use mocban_core::raster::ImageLimits;
 
 /// The image of a page.
 #[derive(Debug)]

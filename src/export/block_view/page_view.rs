@@ -10,11 +10,11 @@ use super::page_layers::PageLayers;
 use super::page_picture::PagePicture;
 use super::registered_face::RegisteredFace;
 use crate::catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
-use crate::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
 use crate::export::pair_pictures::{InputFileLimits, PictureError};
 use crate::export::scan_view::ScanView;
-use crate::raster::ImageLimits;
 use crate::store::Project;
+use mocban_core::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
+use mocban_core::raster::ImageLimits;
 
 /// A block that is aligned with its page, and the results of its characters.
 #[derive(Debug)]

@@ -8,9 +8,9 @@ use crate::block::{
     StoredPageMap, Support, heights_role,
 };
 use crate::catalog::{BlockDetail, BlockStageDetail};
-use crate::domain::{ArtifactSet, BlockSide, BlockStage, ContentHash, LengthUnit};
-use crate::raster;
 use crate::store::Project;
+use mocban_core::domain::{ArtifactSet, BlockSide, BlockStage, ContentHash, LengthUnit};
+use mocban_core::raster;
 
 /// The registration of a block, and where its heights are.
 #[derive(Debug)]

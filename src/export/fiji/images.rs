@@ -2,10 +2,10 @@
 
 use super::imagej_tags::{ImageDisplay, PixelSize};
 use super::tiff_stack::{float_stack, integer_image};
-use crate::domain::{Affine2, DepthScale, LengthUnit};
 use crate::export::pictures::Rgb;
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Grid, Mask};
+use mocban_core::domain::{Affine2, DepthScale, LengthUnit};
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Name of the unit of lengths if the unit of the mesh is unknown.
 const UNKNOWN_UNIT: &str = "mesh unit";
@@ -115,8 +115,8 @@ fn numbered(mask: &Mask) -> (Grid<u16>, u16) {
 #[cfg(test)]
 mod tests {
     use super::{height_channel, luminance, numbered, pixel_size};
-    use crate::domain::{Affine2, LengthUnit};
-    use crate::raster::{DepthMap, Grid, Mask};
+    use mocban_core::domain::{Affine2, LengthUnit};
+    use mocban_core::raster::{DepthMap, Grid, Mask};
 
     #[test]
     fn heights_are_millimetres_and_nan_without_data() {

@@ -8,7 +8,7 @@ use tiff::encoder::colortype::{ColorType, Gray16, Gray32Float};
 use tiff::tags::{ResolutionUnit, Tag};
 
 use super::imagej_tags::{ImageDisplay, PixelSize, description, metadata};
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Tags of `ImageJ`'s metadata: its content, and the lengths of the parts of the content.
 const METADATA_LENGTHS: Tag = Tag::Unknown(50_838);
@@ -82,7 +82,7 @@ mod tests {
 
     use super::super::imagej_tags::{ImageDisplay, PixelSize};
     use super::{METADATA, float_stack, integer_image};
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     const SIZE: PixelSize = PixelSize {
         px_per_unit: 20.0,

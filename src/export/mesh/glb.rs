@@ -246,7 +246,7 @@ mod tests {
     use super::{GlbContent, write_glb};
     use crate::export::mesh::placed_mesh::PlacedMesh;
     use crate::export::mesh::placed_mesh::tests::{placed, print};
-    use crate::raster::png_rgb8;
+    use mocban_core::raster::png_rgb8;
 
     const SIZE: [usize; 2] = [200, 100];
 

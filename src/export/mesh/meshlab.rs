@@ -1,7 +1,7 @@
 //! The project file of `MeshLab`.
 
 use super::matrix::matrix_text;
-use crate::domain::PairName;
+use mocban_core::domain::PairName;
 
 /// The rows of the matrix of a mesh that is in its place.
 const IDENTITY: [[f64; 4]; 4] = [

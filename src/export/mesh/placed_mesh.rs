@@ -1,9 +1,9 @@
 //! A scan in the frame of exported meshes, with the colours of the print and stroke labels.
 
 use super::placement::MeshPlacement;
-use crate::domain::cancel::polled;
 use crate::export::pictures::Rgb;
-use crate::mesh::Mesh;
+use mocban_core::domain::cancel::polled;
+use mocban_core::mesh::Mesh;
 
 /// A placed scan. All lists of vertices have the same order and length.
 #[derive(Debug)]
@@ -61,10 +61,10 @@ fn colour_at(print: &Rgb, pixel: [f64; 2]) -> Option<[u8; 3]> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::{PlacedMesh, colour_at};
-    use crate::domain::LengthUnit;
     use crate::export::mesh::placement::tests::{mesh_point, placement};
     use crate::export::pictures::Rgb;
-    use crate::mesh::Mesh;
+    use mocban_core::domain::LengthUnit;
+    use mocban_core::mesh::Mesh;
 
     /// Returns a print in which every pixel has its own colour.
     pub(crate) fn print() -> Rgb {

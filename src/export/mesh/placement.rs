@@ -5,7 +5,7 @@
 //! writing, and no rigid motion of a block makes it readable. The frame therefore shows the block as it is: y runs
 //! against the rows of the print, and x against its columns. Only texture coordinates contain the reflection.
 
-use crate::domain::{
+use mocban_core::domain::{
     Affine2, DepthScale, FitOutcome, HeightFromMesh, LengthUnit, MetricOutcome, PrintFromMesh,
     Rigid3,
 };
@@ -133,7 +133,7 @@ fn upright_axes(print_from_plane: &Affine2) -> [[f64; 2]; 2] {
 #[cfg(test)]
 pub(super) mod tests {
     use super::MeshPlacement;
-    use crate::domain::{
+    use mocban_core::domain::{
         Affine2, Bow, DepthScale, Disagreement, FitOutcome, LengthUnit, MetricOutcome, Rigid3,
         ScanRegion, Scores, SideEvidence, ThresholdMetric,
     };

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::placed_mesh::PlacedMesh;
-use crate::domain::LengthUnit;
+use mocban_core::domain::LengthUnit;
 
 /// Colour of vertices outside of the print.
 const WHITE: [u8; 3] = [255; 3];
@@ -45,9 +45,9 @@ pub(super) fn write_ply(
 #[cfg(test)]
 mod tests {
     use super::write_ply;
-    use crate::domain::LengthUnit;
     use crate::export::mesh::placed_mesh::tests::placed;
-    use crate::mesh::{MeshLimits, Vertices, read};
+    use mocban_core::domain::LengthUnit;
+    use mocban_core::mesh::{MeshLimits, Vertices, read};
 
     #[test]
     fn positions_and_faces_are_read_back() {

@@ -10,10 +10,10 @@ use super::meshlab::project_text;
 use super::placed_mesh::PlacedMesh;
 use super::placement::MeshPlacement;
 use super::ply::write_ply;
-use crate::domain::{LengthUnit, PairName, ThresholdMetric};
 use crate::export::pictures::Rgb;
-use crate::mesh::Mesh;
-use crate::raster::{png_grey8, png_rgb8};
+use mocban_core::domain::{LengthUnit, PairName, ThresholdMetric};
+use mocban_core::mesh::Mesh;
+use mocban_core::raster::{png_grey8, png_rgb8};
 
 /// Name of the PLY, which the project refers to.
 const PLY: &str = "scan.ply";
@@ -114,7 +114,7 @@ fn extras(placement: &MeshPlacement, title: &ScanTitle<'_>) -> Value {
 mod tests {
     use super::print_png;
     use crate::export::pictures::Rgb;
-    use crate::raster::{ImageLimits, decode, decode_grey8};
+    use mocban_core::raster::{ImageLimits, decode, decode_grey8};
 
     #[test]
     fn grey_prints_are_grey_files_with_the_same_pixels() {

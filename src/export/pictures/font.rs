@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 
 use super::paint::{Rgb, fill};
-use crate::raster::fonts::{LABEL_SANS, MINCHO};
+use mocban_core::raster::fonts::{LABEL_SANS, MINCHO};
 
 /// Height of a line, in sizes of the font.
 const LINE: f32 = 1.36;

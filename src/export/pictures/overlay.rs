@@ -2,8 +2,8 @@
 
 use super::paint::{BLUE, Rgb, VERMILLION, eight_bits, resized};
 use super::relief::shaded;
-use crate::domain::{Affine2, MetricOutcome};
-use crate::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
+use mocban_core::domain::{Affine2, MetricOutcome};
+use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
 /// Colour of the edges of stroke masks.
 const EDGE: [u8; 3] = VERMILLION;
@@ -154,9 +154,9 @@ fn edges(mask: &Mask, width: usize) -> Grid<bool> {
 #[cfg(test)]
 mod tests {
     use super::{EDGE, PrintView, TRUE_EDGE, edges};
-    use crate::domain::{Affine2, ThresholdMetric};
-    use crate::raster::{DepthMap, Grid, Mask, PrintImage};
     use crate::report::test_fixtures;
+    use mocban_core::domain::{Affine2, ThresholdMetric};
+    use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
 
     /// A bar of 4 x 20 px at (8, 5) on a lower level in a map of 30 x 30 px.
     fn depth() -> DepthMap {

@@ -1,6 +1,6 @@
 //! Drawing on colour images: copying, resizing, rectangles.
 
-use crate::raster::{Grid, PrintImage};
+use mocban_core::raster::{Grid, PrintImage};
 
 /// An 8-bit colour image.
 pub type Rgb = Grid<[u8; 3]>;
@@ -105,7 +105,7 @@ pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8
 #[cfg(test)]
 mod tests {
     use super::{Rgb, copy, eight_bits, fill, resized};
-    use crate::raster::{Grid, PrintImage};
+    use mocban_core::raster::{Grid, PrintImage};
 
     #[test]
     fn shrinking_averages_and_growing_repeats_pixels() {

@@ -1,7 +1,7 @@
 //! Hill shading of depth maps.
 
 use super::paint::Rgb;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Altitude of the light above the horizon, in radians. A low light shows shallow relief.
 const LIGHT_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
@@ -83,7 +83,7 @@ fn range(levels: &Grid<u16>) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::{NO_DATA, shaded};
-    use crate::raster::Grid;
+    use mocban_core::raster::Grid;
 
     #[test]
     fn walls_facing_the_light_are_bright_and_others_dark() {

@@ -1,10 +1,10 @@
 //! Reads what the 3D view of a result shows, and encodes its textures.
 
-use crate::domain::{Affine2, DepthScale, MetricOutcome};
 use crate::export::mesh::{MeshPlacement, PlacedMesh};
 use crate::export::pair_pictures::{PairPictures, PictureError};
 use crate::export::pictures::{PrintView, eight_bits};
-use crate::raster::{Grid, Mask, PrintImage, png_rgb8};
+use mocban_core::domain::{Affine2, DepthScale, MetricOutcome};
+use mocban_core::raster::{Grid, Mask, PrintImage, png_rgb8};
 
 /// Maximum number of triangles, or of points of a point set. Larger scans are simplified.
 pub(super) const MAX_ELEMENTS: usize = 500_000;

@@ -5,11 +5,11 @@ use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 use quick_xml::reader::Reader;
 
-use crate::domain::cancel::{PollCounter, polled};
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::{line_at, quoted};
 use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, checked, filled, polygon};
+use mocban_core::domain::cancel::{PollCounter, polled};
 
 /// Elements that may stand for characters, the smallest first.
 const LEVELS: [&str; 4] = ["Glyph", "Word", "TextLine", "TextRegion"];

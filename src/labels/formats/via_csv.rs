@@ -6,13 +6,13 @@ use csv::StringRecord;
 use serde_json::{Map, Value};
 
 use super::via_shape::region;
-use crate::domain::cancel::polled;
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::line_at;
 use crate::labels::model::PageFile;
 use crate::labels::page_choice::{PageEntry, choose_page};
 use crate::labels::page_fit::check_count;
 use crate::labels::region::PageRegions;
+use mocban_core::domain::cancel::polled;
 
 /// Column of shapes, by which the format is recognized.
 const SHAPE: &str = "region_shape_attributes";

@@ -1,11 +1,11 @@
 //! YOLO text: one region per line, in fractions of the page.
 
-use crate::domain::cancel::polled;
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::quoted;
 use crate::labels::model::PageFile;
 use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, box_between, polygon};
+use mocban_core::domain::cancel::polled;
 
 /// Fractions beyond this are taken for pixels.
 const MAX_FRACTION: f64 = 2.0;

@@ -11,7 +11,7 @@ use self::columns::columns;
 use self::rows::rows;
 use self::spot::{Spot, full_size};
 use self::straighten::straighten;
-use crate::domain::BoxName;
+use mocban_core::domain::BoxName;
 
 /// Returns the names of boxes, in the order of the boxes. All names differ. Takes left, top, right and bottom of each
 /// box in any unit, y down; the result does not depend on the unit, and hardly on the order of the boxes.

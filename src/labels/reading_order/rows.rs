@@ -1,7 +1,7 @@
 //! Rows of a column, with notes two by two.
 
 use super::spot::Spot;
-use crate::domain::NotePart;
+use mocban_core::domain::NotePart;
 
 /// Distance from the middle between notes beyond which a small box is on one side, in the usual size.
 const BESIDE: f64 = 0.17;

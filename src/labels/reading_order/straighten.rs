@@ -1,7 +1,7 @@
 //! Straightening of a page from the centres of its boxes: rotation, keystone, and columns that are bent.
 
 use super::spot::Spot;
-use crate::domain::cancel::polled;
+use mocban_core::domain::cancel::polled;
 
 /// Largest angle that is searched, in degrees.
 const MAX_DEGREES: f64 = 6.0;

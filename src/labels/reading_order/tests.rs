@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use proptest::prelude::*;
 
 use super::reading_order;
-use crate::domain::{BoxName, NotePart};
+use mocban_core::domain::{BoxName, NotePart};
 
 /// Distance of columns and rows of the generated pages in pixels.
 const PITCH: [f64; 2] = [120.0, 105.0];

@@ -1,10 +1,10 @@
 //! The table of whole blocks.
 
 use super::table::Table;
-use crate::domain::{ThresholdMetric, one_line};
 use crate::report::block_accuracy::{BlockAccuracy, BoxAccuracy};
 use crate::report::model::Report;
 use crate::report::stats::ratio;
+use mocban_core::domain::{ThresholdMetric, one_line};
 
 /// Maximum length of the name of a block in a table, characters. The table then fits a terminal.
 const MAX_NAME_CHARS: usize = 20;

@@ -129,9 +129,9 @@ pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
 #[cfg(test)]
 mod tests {
     use super::{mean_intervals, score_comparisons};
-    use crate::domain::ThresholdMetric;
     use crate::report::render::text::aligned;
     use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::ThresholdMetric;
 
     /// Twenty pairs on which one metric has the best IoU.
     fn with_best(best: ThresholdMetric) -> Report {

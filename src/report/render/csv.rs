@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use crate::domain::Reason;
 use crate::report::comparison::Basis;
 use crate::report::model::{MetricRow, Report};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
+use mocban_core::domain::Reason;
 
 /// The columns.
 const HEADER: &str = "metric,quantity,n,value,low,high\r\n";
@@ -177,9 +177,9 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::{HEADER, quantities, render};
-    use crate::domain::{Reason, Verdict};
     use crate::report::stats::wilson_95;
     use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::{Reason, Verdict};
 
     /// Returns n, value, low and high of each quantity of a metric.
     fn quantities_of(report: &Report, metric: &str) -> BTreeMap<String, [String; 4]> {

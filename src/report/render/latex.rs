@@ -141,8 +141,8 @@ mod tests {
     use std::process::Command;
 
     use super::render;
-    use crate::domain::FailureClass;
     use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::FailureClass;
 
     /// Compiles a report in a document of the class `article` with its default margins and font size. Returns the log, or
     /// `None` if the engine is not installed.

@@ -1,6 +1,6 @@
 //! Text that LaTeX shows unchanged.
 
-use crate::domain::{one_line, visible};
+use mocban_core::domain::{one_line, visible};
 
 /// Longest word that must not be broken, characters.
 const MAX_WORD: usize = 20;

@@ -6,10 +6,10 @@ use super::provenance_lines::provenance_lines;
 use super::report_tables::tables;
 use super::risk_coverage_tables::full_tables;
 use super::table::{ColumnFormat, Table};
-use crate::domain::one_line;
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
+use mocban_core::domain::one_line;
 
 /// Returns the report as Markdown.
 pub(super) fn render(report: &Report) -> String {
@@ -99,8 +99,8 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{escape, render};
-    use crate::domain::FailureClass;
     use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::FailureClass;
 
     #[test]
     fn messages_cannot_add_markup() {

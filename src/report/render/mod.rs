@@ -19,7 +19,7 @@ mod text;
 
 use super::gallery::Gallery;
 use super::model::Report;
-use crate::domain::{enum_names, visible, visible_json};
+use mocban_core::domain::{enum_names, visible, visible_json};
 
 pub use agreement_text::agreement_text;
 pub use html::{Cover, MAX_PAGE_BYTES, page};
@@ -72,8 +72,8 @@ fn json(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::{ReportFormat, render};
-    use crate::domain::Verdict;
     use crate::report::{IntervalMethod, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::Verdict;
     use serde_json::{Value, json};
 
     #[test]

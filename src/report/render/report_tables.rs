@@ -3,13 +3,13 @@
 use super::block_table::blocks;
 use super::comparison_tables::mean_intervals;
 use super::table::Table;
-use crate::domain::Reason;
 use crate::report::manual_alignment::ManualAlignmentErrors;
 use crate::report::model::{MetricRow, Report};
 use crate::report::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
 use crate::report::number_format::format_count;
 use crate::report::stats::Rate;
 use crate::report::truth_summary::TruthSummary;
+use mocban_core::domain::Reason;
 
 /// Returns the tables of a report. A table without content is left out, except the table of scores.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
@@ -228,11 +228,11 @@ pub(super) fn times(report: &Report) -> Option<Table> {
 #[cfg(test)]
 mod tests {
     use super::{attention_checks, fail_reasons, thresholds, times};
-    use crate::domain::{Reason, Stage, Verdict};
     use crate::report::render::table::Table;
     use crate::report::{
         AttentionCheckRates, Rate, ReportAccumulator, TruthEvaluation, test_fixtures,
     };
+    use mocban_core::domain::{Reason, Stage, Verdict};
 
     fn cells(table: &Table, row: usize) -> Vec<&str> {
         table.rows[row]

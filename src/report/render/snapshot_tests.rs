@@ -3,8 +3,8 @@
 use insta::assert_snapshot;
 
 use super::{ReportFormat, agreement_text, render};
-use crate::domain::{FailureClass, Verdict};
 use crate::report::{IntervalMethod, Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+use mocban_core::domain::{FailureClass, Verdict};
 
 /// Two results without verdicts or ground truth.
 fn unjudged() -> Report {

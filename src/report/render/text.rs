@@ -5,10 +5,10 @@ use super::provenance_lines::provenance_lines;
 use super::report_tables::{scores, tables, truth};
 use super::risk_coverage_tables::short_tables;
 use super::table::{ColumnFormat, Table, TableColumn};
-use crate::domain::{one_line, visible};
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
+use mocban_core::domain::{one_line, visible};
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;

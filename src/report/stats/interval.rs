@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::binomial::binomial_cdf;
-use crate::domain::enum_names;
+use mocban_core::domain::enum_names;
 
 /// The 97.5 % point of the standard normal distribution.
 pub(super) const Z_975: f64 = 1.959_963_984_540_054;

@@ -6,8 +6,8 @@ use super::held::{HeldFaces, HeldInputs};
 use crate::block::{
     self, AlignOutcome, BlockError, CarvedFace, PageAlignment, PageInk, StoredPageMap,
 };
-use crate::domain::{BlockSide, ControlPoints, FailureClass};
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
+use mocban_core::domain::{BlockSide, ControlPoints, FailureClass};
 
 /// Aligns the page with a face of the block: from the control points, if there are some, or else by a search.
 pub(super) fn align(

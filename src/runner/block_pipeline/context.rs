@@ -4,10 +4,10 @@ use std::sync::atomic::AtomicBool;
 
 use serde::de::DeserializeOwned;
 
-use crate::domain::{BlockStage, BlockStageRecord};
-use crate::mesh::MeshLimits;
-use crate::raster::ImageLimits;
 use crate::runner::block_stages::{BlockArtifacts, BlockInputs, BlockStageError};
+use mocban_core::domain::{BlockStage, BlockStageRecord};
+use mocban_core::mesh::MeshLimits;
+use mocban_core::raster::ImageLimits;
 
 /// What a stage reads and writes.
 pub(super) struct StageContext<'a> {

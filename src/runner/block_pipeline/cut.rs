@@ -13,11 +13,11 @@ use crate::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
-use crate::domain::cancel::{ThreadToken, poll};
-use crate::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
-use crate::mesh::write::MeshFormat;
-use crate::raster::png_rgb8;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
+use mocban_core::domain::cancel::{ThreadToken, poll};
+use mocban_core::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
+use mocban_core::mesh::write::MeshFormat;
+use mocban_core::raster::png_rgb8;
 
 /// Meshes with fewer triangles show no character.
 const MIN_TRIANGLES: usize = 200;

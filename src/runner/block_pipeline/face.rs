@@ -6,9 +6,9 @@ use super::scan_stream::ScanStream;
 use crate::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
-use crate::domain::{BlockSide, LengthUnit};
-use crate::raster::png_grey16;
 use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
+use mocban_core::domain::{BlockSide, LengthUnit};
+use mocban_core::raster::png_grey16;
 
 /// Least longer side of a face, mm, if the user gave the unit. A character has 6 to 30 mm.
 const MIN_SIDE_MM: f64 = 60.0;

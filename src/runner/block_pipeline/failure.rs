@@ -5,9 +5,9 @@ use std::io;
 use serde::Serialize;
 
 use crate::block::BlockError;
-use crate::domain::FailureClass;
-use crate::mesh::MeshReadError;
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use mocban_core::domain::FailureClass;
+use mocban_core::mesh::MeshReadError;
 
 /// Returns the output of a stage with an outcome and no characters.
 pub(super) fn output(outcome: &impl Serialize) -> Result<BlockStageOutput, BlockStageError> {

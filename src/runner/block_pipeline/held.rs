@@ -5,9 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::context::StageContext;
 use super::failure::failed;
 use crate::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
-use crate::domain::{BlockSide, BlockStage, ContentHash};
-use crate::raster::{self, PrintImage};
 use crate::runner::block_stages::BlockStageError;
+use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
+use mocban_core::raster::{self, PrintImage};
 
 /// What the last stage read.
 #[derive(Debug, Default)]

@@ -21,9 +21,9 @@ use super::block_stages::{
     BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
 };
 use super::options::RunOptions;
-use crate::domain::{BlockStage, BlockStageRecord};
-use crate::mesh::MeshLimits;
-use crate::raster::ImageLimits;
+use mocban_core::domain::{BlockStage, BlockStageRecord};
+use mocban_core::mesh::MeshLimits;
+use mocban_core::raster::ImageLimits;
 
 /// Version of each stage, in the order of the stages. A change of what a stage returns needs a new number.
 const REVISIONS: [u32; 4] = [2, 1, 2, 2];

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::failure::{StopRequested, failed};
 use crate::block::BlockError;
-use crate::mesh::{
+use crate::runner::block_stages::{BlockFile, BlockStageError};
+use mocban_core::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
     binary_stl_triangles, pass_over_binary_stl,
 };
-use crate::runner::block_stages::{BlockFile, BlockStageError};
 
 /// Bytes that are read at a time.
 const BUFFER: usize = 1 << 20;

@@ -4,8 +4,8 @@ use std::sync::atomic::Ordering;
 
 use super::values::pair_row;
 use super::{RunFixture, options};
-use crate::domain::{BlockStage, JobStatus, Stage};
 use crate::runner::{RunEvent, RunOptions};
+use mocban_core::domain::{BlockStage, JobStatus, Stage};
 
 #[tokio::test]
 async fn failed_blocks_count_for_the_limit_of_failures() {

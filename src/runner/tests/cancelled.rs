@@ -4,8 +4,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use super::{RunFixture, options};
-use crate::domain::Stage;
 use crate::runner::RunOptions;
+use mocban_core::domain::Stage;
 
 #[tokio::test]
 async fn a_stage_that_times_out_has_ended_before_its_memory_is_given_to_others() {

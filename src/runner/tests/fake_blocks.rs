@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 use super::fake_executor::compute_without_end;
 use super::gate::Gate;
-use crate::domain::{BlockStage, BlockStageRecord, Failure, FailureClass};
 use crate::runner::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
     CharacterOutput, CutFiles,
 };
+use mocban_core::domain::{BlockStage, BlockStageRecord, Failure, FailureClass};
 
 /// Runs fake stages. The part of a block's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]

@@ -7,9 +7,9 @@ use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
 use crate::catalog::{Catalog, DeadWorker, Lease};
-use crate::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
 use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
+use mocban_core::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
 
 impl RunFixture {
     /// Creates a fixture whose catalog delays every deferrable commit until a flush.

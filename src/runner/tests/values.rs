@@ -3,7 +3,7 @@
 use serde_json::Map;
 
 use crate::catalog::{BlockAttributes, ImportRow, PairAttributes};
-use crate::domain::{BlockName, MetricOutcome, PairName, ThresholdMetric, test_values};
+use mocban_core::domain::{BlockName, MetricOutcome, PairName, ThresholdMetric, test_values};
 
 /// Returns a pair without optional attributes.
 pub(in crate::runner) fn pair_attributes(mesh_path: &str, print_path: &str) -> PairAttributes {

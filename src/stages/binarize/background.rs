@@ -1,8 +1,8 @@
 //! Estimates the brightness of the background by a grey-scale closing. The closing removes narrow dark areas, which are
 //! ink, and keeps wide dark areas, which are stains.
 
-use crate::raster::blur::gaussian_blur;
-use crate::raster::{Grid, Mask, resample};
+use mocban_core::raster::blur::gaussian_blur;
+use mocban_core::raster::{Grid, Mask, resample};
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
@@ -84,7 +84,7 @@ fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f3
 #[cfg(test)]
 mod tests {
     use super::{NARROW, level};
-    use crate::raster::{Grid, Mask};
+    use mocban_core::raster::{Grid, Mask};
 
     #[test]
     fn background_ignores_strokes_and_follows_stains() {

@@ -2,11 +2,11 @@
 
 use super::background::{self, NARROW, STROKE};
 use super::polarity::polarity;
-use crate::domain::cancel::poll;
-use crate::raster::components::{ConnectedComponents, remove_specks};
-use crate::raster::otsu::{self, Split};
-use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::pose::SoftMask;
+use mocban_core::domain::cancel::poll;
+use mocban_core::raster::components::{ConnectedComponents, remove_specks};
+use mocban_core::raster::otsu::{self, Split};
+use mocban_core::raster::{Grid, Mask, PrintImage};
 
 /// A pixel is white if its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
@@ -281,7 +281,7 @@ fn require_ink(
 #[cfg(test)]
 mod tests {
     use super::{BinarizeError, InkMask, hypotheses};
-    use crate::raster::{Grid, PrintImage};
+    use mocban_core::raster::{Grid, PrintImage};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {
         PrintImage {

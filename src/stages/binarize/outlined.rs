@@ -1,9 +1,9 @@
 //! Binarizes the part of a print inside an outline.
 
 use super::ink::{BinarizeError, InkMask, hypotheses};
-use crate::domain::PrintOutline;
-use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::pose::SoftMask;
+use mocban_core::domain::PrintOutline;
+use mocban_core::raster::{Grid, Mask, PrintImage};
 
 /// Binarizes the smallest box around the outline like a print of its own, because a part of a print has smaller specks
 /// and may be shaded differently. Returns masks of the whole print, in which pixels outside the outline are unknown. If
@@ -65,8 +65,8 @@ pub(crate) fn inside(outline: &PrintOutline, [width, height]: [usize; 2]) -> Mas
 #[cfg(test)]
 mod tests {
     use super::{hypotheses_within, inside};
-    use crate::domain::PrintOutline;
-    use crate::raster::{Grid, PrintImage};
+    use mocban_core::domain::PrintOutline;
+    use mocban_core::raster::{Grid, PrintImage};
 
     fn outline() -> PrintOutline {
         PrintOutline::around(&[[30.0, 10.0], [80.0, 20.0], [70.0, 70.0], [25.0, 60.0]])

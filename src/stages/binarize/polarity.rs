@@ -1,7 +1,7 @@
 //! Polarity of the print: whether ink is darker or lighter than the background.
 
-use crate::raster::otsu::Split;
-use crate::raster::{Grid, Mask};
+use mocban_core::raster::otsu::Split;
+use mocban_core::raster::{Grid, Mask};
 
 /// If the sum of the evidence is below minus this value, ink is clearly darker than the background.
 const CLEAR: f64 = 0.8;
@@ -71,7 +71,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{RIM, rim_share};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     proptest! {
         #[test]

@@ -10,8 +10,8 @@
 use super::height_samples::quantile;
 use super::print_agreement::InkPyramids;
 use super::side_surface::FittedSide;
-use crate::domain::SideEvidence;
 use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::SideEvidence;
 
 /// If the relief of a side is below this share of the other side's relief, the side is the back of the block.
 const BACK: f64 = 0.35;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::pca::Axes;
-use crate::mesh::Mesh;
+use mocban_core::mesh::Mesh;
 
 /// Largest number of faces that are sampled.
 const SAMPLES: usize = 30_000;

@@ -1,11 +1,11 @@
 //! The heights of a rendering as points, without the side walls, the foot and the table below the carved face.
 
 use super::least_squares::{Coefficients, OPEN, Points};
-use crate::domain::Rigid3;
-use crate::raster::Grid;
 use crate::stages::binarize;
 use crate::stages::face::{Face, PositionedHeight};
 use crate::stages::zbuffer::{NO_HIT, Viewport};
+use mocban_core::domain::Rigid3;
+use mocban_core::raster::Grid;
 
 /// Fewer points do not determine a surface.
 const LEAST_POINTS: usize = 16;

@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::simd::dispatch;
+use mocban_core::simd::dispatch;
 
 /// Points in a block.
 const LANES: usize = 4;

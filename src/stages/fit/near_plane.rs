@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use super::directions::{Facet, SAME, angle};
 use super::pca::frame;
-use crate::domain::Rigid3;
-use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
+use mocban_core::domain::Rigid3;
+use mocban_core::mesh::Mesh;
 
 /// Heights of the cut part above and below the middle of the plane, as a share of the plane's longer side.
 const REACH: f64 = 0.2;
@@ -79,8 +79,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::near_plane;
-    use crate::mesh::Mesh;
     use crate::stages::fit::directions::facets;
+    use mocban_core::mesh::Mesh;
 
     /// Adds a square of side `side` around `centre`, of two faces for each unit square, at the height of the centre.
     fn add_square(mesh: &mut Mesh, centre: [f64; 3], side: usize) {

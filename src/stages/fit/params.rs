@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::FailureClass;
 use crate::stages::zbuffer::LARGEST_OVERLAP;
+use mocban_core::domain::FailureClass;
 
 /// Settings of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

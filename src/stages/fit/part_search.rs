@@ -7,9 +7,9 @@ use super::print_agreement::InkPyramids;
 use super::print_parts::print_parts;
 use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
 use super::wider_search::{FoundSide, LEAST, evidence};
-use crate::domain::{PrintOutline, Rigid3};
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::{PrintOutline, Rigid3};
 
 /// Compares both sides of `start`'s plane with the parts of the print. Returns the side that resembles a part best,
 /// with the outline of the part. Returns `None` if no agreement reaches [`LEAST`], or if the finer fit of the side

@@ -3,11 +3,11 @@
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::params::FitError;
-use crate::domain::Rigid3;
-use crate::domain::cancel::polled;
-use crate::mesh::Mesh;
-use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
+use mocban_core::domain::Rigid3;
+use mocban_core::domain::cancel::polled;
+use mocban_core::mesh::Mesh;
+use mocban_core::mesh::robust_bounds::is_in_box;
 
 /// A mesh without faces needs at least this many points, about 25 along a side, to show one or two strokes.
 const LEAST_POINTS: usize = 600;
@@ -120,8 +120,8 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::{Axes, frame};
-    use crate::mesh::Mesh;
     use crate::stages::zbuffer::IndexedSurface;
+    use mocban_core::mesh::Mesh;
 
     #[test]
     fn axes_do_not_depend_on_shared_vertices() {

@@ -1,12 +1,12 @@
 //! Measures how well the relief of one side of a block resembles the print.
 
 use super::side_surface::FittedSide;
-use crate::domain::PrintOutline;
 use crate::stages::binarize::inside;
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
 };
 use crate::stages::print::Print;
+use mocban_core::domain::PrintOutline;
 
 /// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;

@@ -6,10 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::domain::PrintOutline;
-use crate::domain::cancel::poll;
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Mask, PixelBox};
+use mocban_core::domain::PrintOutline;
+use mocban_core::domain::cancel::poll;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Mask, PixelBox};
 
 /// Number of cells along the longest side of the ink.
 const CELLS: usize = 160;
@@ -158,9 +158,9 @@ fn window(bounds: PixelBox, share: f64) -> Option<PrintOutline> {
 #[cfg(test)]
 mod tests {
     use super::print_parts;
-    use crate::domain::PrintOutline;
-    use crate::raster::Mask;
     use crate::stages::binarize::inside;
+    use mocban_core::domain::PrintOutline;
+    use mocban_core::raster::Mask;
 
     const SIDE: usize = 360;
     /// Distance between the middles of two characters.

@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 
 use super::directions::{Facet, facets, large_planes};
 use super::pca::Axes;
-use crate::domain::cancel::{PollCounter, polled};
-use crate::mesh::Mesh;
-use crate::mesh::robust_bounds::is_in_box;
 use crate::stages::scan::{of_faces, part_of};
 use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::cancel::{PollCounter, polled};
+use mocban_core::mesh::Mesh;
+use mocban_core::mesh::robust_bounds::is_in_box;
 
 /// Number of cells along the longest side of a scan. Surfaces in neighbouring cells are connected.
 const CELLS: f64 = 64.0;
@@ -256,7 +256,7 @@ impl Cells {
 #[cfg(test)]
 mod tests {
     use super::without_spikes;
-    use crate::mesh::Mesh;
+    use mocban_core::mesh::Mesh;
 
     const SIDE: u32 = 9;
 

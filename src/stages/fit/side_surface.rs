@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use super::height_samples::HeightSamples;
 use super::pca::frame_along;
 use super::surface::Surface;
-use crate::domain::{Bow, Rigid3};
-use crate::raster::Grid;
 use crate::stages::binarize;
 use crate::stages::zbuffer::{IndexedSurface, Viewport};
+use mocban_core::domain::{Bow, Rigid3};
+use mocban_core::raster::Grid;
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;

@@ -5,9 +5,9 @@
 
 use super::height_samples::{HeightSamples, quantile};
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Grid, Mask};
 use crate::stages::pose::SoftMask;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Weight of points above the surface in the first passes, which solve a convex problem. Points below weigh
 /// `1 - ENVELOPE`. The resulting surface is the 0.97 expectile of the heights.

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 
 use super::{FitError, fit};
-use crate::domain::{FailureClass, FitOutcome, ScanRegion};
-use crate::mesh::Mesh;
 use crate::stages::Print;
 use crate::stages::paper_method;
 use crate::stages::testing::{SyntheticSheet, grid_print, print, settings, some_turn};
+use mocban_core::domain::{FailureClass, FitOutcome, ScanRegion};
+use mocban_core::mesh::Mesh;
 
 fn normal_error_deg(world: &SyntheticSheet, found: &FitOutcome) -> f64 {
     let [x, y, z, _] = found.plane_from_mesh.0[2];

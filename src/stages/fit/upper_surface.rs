@@ -9,10 +9,10 @@ use super::pca::{Axes, frame};
 use super::print_agreement::InkPyramids;
 use super::side_surface::{FINE, FittedSide, coarse_sides, fit_view};
 use super::wider_search::{self, BETTER, LEAST};
-use crate::domain::{FitOutcome, SideEvidence};
-use crate::mesh::Mesh;
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
+use mocban_core::domain::{FitOutcome, SideEvidence};
+use mocban_core::mesh::Mesh;
 
 /// Fits the surface on which the stroke tops lie, and finds the carved side.
 ///

@@ -17,11 +17,11 @@ use super::pca::{Axes, frame, frame_along};
 use super::print_agreement::InkPyramids;
 use super::scan_parts::{parts, without_spikes};
 use super::side_surface::{COARSE, FINE, FittedSide, fit_view};
-use crate::domain::cancel::polled;
-use crate::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
-use crate::mesh::Mesh;
 use crate::stages::scan::part_of;
 use crate::stages::zbuffer::IndexedSurface;
+use mocban_core::domain::cancel::polled;
+use mocban_core::domain::{PrintOutline, Rigid3, ScanRegion, SideEvidence};
+use mocban_core::mesh::Mesh;
 
 /// Least agreement with the print at which a side is accepted. The search begins if the usual side has a lower one. On generated scans, carved sides reached 0.65 to 0.93
 /// and other sides at most 0.51.

@@ -1,6 +1,6 @@
 //! Histogram of the heights below the tops. The profile of steepness uses the same bins of depth.
 
-use crate::domain::ReliefHeights;
+use mocban_core::domain::ReliefHeights;
 
 /// Width of a bin and depth of the first, as shares of the relief.
 const BIN: f64 = 0.005;
@@ -75,7 +75,7 @@ pub(super) fn smoothed(counts: &[f64], width: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::HeightHistogram;
-    use crate::domain::ReliefHeights;
+    use mocban_core::domain::ReliefHeights;
 
     #[test]
     fn peak_is_the_depth_of_most_tops() {

@@ -16,7 +16,7 @@ pub use params::{NormalizeError, NormalizeParams};
 pub(super) use relief::{relative_depths, soft_stroke};
 
 use super::print::Print;
-use crate::raster::DepthMap;
+use mocban_core::raster::DepthMap;
 
 /// Raised by every change of the code that may change results.
 pub const REVISION: u32 = 15;

@@ -1,10 +1,10 @@
 //! Result of the normalize stage, and the map from an image to the canvas on which masks are compared.
 
 use super::params::{NormalizeError, NormalizeParams};
-use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
-use crate::raster::{Grid, Mask};
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
+use mocban_core::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
+use mocban_core::raster::{Grid, Mask};
 
 /// Masks of one interpretation of the print, in the print image's frame and size.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,7 +120,7 @@ pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2>
 #[cfg(test)]
 mod tests {
     use super::PrintMasks;
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     #[test]
     fn ink_counts_even_where_the_print_is_unknown() {

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::FailureClass;
 use crate::stages::binarize::BinarizeError;
 use crate::stages::score::SsimWindow;
+use mocban_core::domain::FailureClass;
 
 /// Settings of the normalize stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

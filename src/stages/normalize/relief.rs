@@ -3,12 +3,12 @@
 use super::height_histogram::HeightHistogram;
 use super::sampling::sampled;
 use super::steepness::SteepnessProfile;
-use crate::domain::ReliefHeights;
-use crate::raster::{DepthMap, PixelBox};
-use crate::simd::dispatch;
 use crate::stages::binarize::{self, Split};
 use crate::stages::face::{Face, PositionedHeight};
 use crate::stages::pose::SoftMask;
+use mocban_core::domain::ReliefHeights;
+use mocban_core::raster::{DepthMap, PixelBox};
+use mocban_core::simd::dispatch;
 
 /// If the tops are closer to the fitted surface than this share of the relief, they are first assumed to lie on it.
 const ANCHORED: f64 = 0.5;
@@ -111,7 +111,7 @@ fn samples(depth: &DepthMap, bounds: PixelBox) -> Vec<PositionedHeight> {
 #[cfg(test)]
 mod tests {
     use super::relief_heights;
-    use crate::raster::{DepthMap, Grid};
+    use mocban_core::raster::{DepthMap, Grid};
 
     const SIDE: usize = 80;
 

@@ -7,8 +7,8 @@
 
 use super::height_histogram::{BINS, bin_of, bin_with, middle, smoothed};
 use super::sampling::sampled;
-use crate::domain::ReliefHeights;
-use crate::raster::{DepthMap, PixelBox};
+use mocban_core::domain::ReliefHeights;
+use mocban_core::raster::{DepthMap, PixelBox};
 
 /// A slope is measured between two points, each this share of the map's longest side away from the sample.
 const REACH: f64 = 1.0 / 256.0;
@@ -145,8 +145,8 @@ fn tops_and_walls(steepness: &[Option<f64>]) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::{SteepnessProfile, TopsEnd, UNKNOWN_DEVIATION, USUAL};
-    use crate::domain::ReliefHeights;
-    use crate::raster::{DepthMap, Grid, PixelBox};
+    use mocban_core::domain::ReliefHeights;
+    use mocban_core::raster::{DepthMap, Grid, PixelBox};
 
     const SIDE: usize = 256;
 

@@ -6,11 +6,11 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::domain::cancel::{PollCounter, poll, polled};
-use crate::domain::{FitOutcome, SideEvidence};
-use crate::mesh::Vertices;
 use crate::stages::fit::{Axes, FitError, FitParams, frame, quantile};
 use crate::stages::scan::Scan;
+use mocban_core::domain::cancel::{PollCounter, poll, polled};
+use mocban_core::domain::{FitOutcome, SideEvidence};
+use mocban_core::mesh::Vertices;
 
 /// Fits a plane to the highest points on the carved side (III-A). The plane frame is in mesh units.
 ///

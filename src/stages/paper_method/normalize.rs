@@ -4,13 +4,13 @@
 //! If the text leaves a choice open, the authors' program decides. Depths become greys, the nearest the darkest: 1 % of
 //! the pixels get at most 49, and 95 % get at most 201. Each threshold is tried at four rotations by 90 degrees.
 
-use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
-use crate::raster::components::remove_specks;
-use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::binarize::{self, InkMask};
 use crate::stages::normalize::{NormalizeError, NormalizeParams, Normalized, box_wrap};
 use crate::stages::print::Print;
 use crate::stages::score::SsimReference;
+use mocban_core::domain::{Affine2, ThresholdChoice, ThresholdMetric};
+use mocban_core::raster::components::remove_specks;
+use mocban_core::raster::{DepthMap, Mask, warp_mask};
 
 /// Percentiles and their greys.
 const STRETCH: [(f64, f64); 2] = [(0.01, 49.0), (0.95, 201.0)];

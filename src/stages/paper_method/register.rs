@@ -5,13 +5,13 @@
 //! tries 60 angles, and 60 more about the best. The text of the paper has only one angle in each of six sectors, so the
 //! angle could be off by half a sector.
 
-use crate::domain::{Affine2, ThresholdMetric};
-use crate::raster::components::remove_specks;
-use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::normalize::Normalized;
 use crate::stages::register::{
     Alignment, RegisterError, RegisterParams, Registered, StrokeMap, canvas_print, score_alignments,
 };
+use mocban_core::domain::{Affine2, ThresholdMetric};
+use mocban_core::raster::components::remove_specks;
+use mocban_core::raster::{DepthMap, Mask, warp_mask};
 
 /// The paper's method has one interpretation of the print.
 const INK: usize = 0;
@@ -300,7 +300,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::Packed;
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     proptest! {
         #[test]

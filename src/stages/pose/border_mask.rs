@@ -6,9 +6,9 @@
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
 use super::pyramid::BilinearCell;
-use crate::domain::Affine2;
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{Grid, Mask};
+use mocban_core::domain::Affine2;
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{Grid, Mask};
 
 /// Amounts above this are strokes.
 const MIN_STROKE: f32 = 0.3;
@@ -163,9 +163,9 @@ fn without_border_band(weight: &Grid<f32>) -> Grid<f32> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::BorderStrokes;
-    use crate::domain::Affine2;
-    use crate::raster::{Grid, Mask};
     use crate::stages::pose::{ImagePyramid, PyramidLevel, SoftMask};
+    use mocban_core::domain::Affine2;
+    use mocban_core::raster::{Grid, Mask};
 
     pub(crate) const SIDE: usize = 64;
     /// A cross in the middle, and bars at the left and the right border.

@@ -1,6 +1,6 @@
 //! Candidate poses, the range that is searched, and the beam width.
 
-use crate::domain::Affine2;
+use mocban_core::domain::Affine2;
 
 /// Refined poses are duplicates only if their rotations differ by less than this, in degrees.
 const NEAR_DEG: f64 = 3.0;

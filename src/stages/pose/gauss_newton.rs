@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::simd::dispatch;
+use mocban_core::simd::dispatch;
 
 /// Threshold of Huber's loss, as a multiple of the median absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
 const HUBER_MEDIANS: f32 = 2.5;

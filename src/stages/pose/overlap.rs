@@ -2,8 +2,8 @@
 
 use super::PyramidLevel;
 use super::pyramid::BilinearCell;
-use crate::domain::Affine2;
-use crate::raster::Grid;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::Grid;
 
 /// A moving level at a pose, with its valid mask. `moving_from_fixed` maps between working pixels.
 pub(super) struct PlacedLevel<'a> {

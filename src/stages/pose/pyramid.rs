@@ -1,9 +1,9 @@
 //! Image pyramid of a soft mask: one level per working size, smoothed and high-pass filtered.
 
-use crate::domain::Affine2;
-use crate::raster::blur::{gaussian_blur, gaussian_blur_transposed};
-use crate::raster::{Grid, Mask, resample, resample_transposed};
-use crate::simd::dispatch;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::blur::{gaussian_blur, gaussian_blur_transposed};
+use mocban_core::raster::{Grid, Mask, resample, resample_transposed};
+use mocban_core::simd::dispatch;
 
 /// An amount for each pixel of an image, and a mask of the pixels where the amount is known.
 #[derive(Debug, Clone)]

@@ -9,10 +9,10 @@ use super::gauss_newton::{Loss, NormalEquations, Workspace};
 use super::overlap::{PlacedLevel, PoseOverlap};
 use super::pyramid::{BilinearCell, PyramidLevel};
 use super::tiebreak::tiebreak_scores;
-use crate::domain::Affine2;
-use crate::domain::cancel::poll;
-use crate::raster::Grid;
-use crate::simd::dispatch;
+use mocban_core::domain::Affine2;
+use mocban_core::domain::cancel::poll;
+use mocban_core::raster::Grid;
+use mocban_core::simd::dispatch;
 
 /// The refinement has converged if a step moves the level's border by less than this many working pixels.
 const CONVERGED_PX: f64 = 0.03;

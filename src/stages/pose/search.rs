@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use super::PyramidLevel;
 use super::candidate::{PoseCandidate, SearchRange, prune};
 use super::fft_correlation::{FFT_SIZE, FftCorrelator, best_shift};
-use crate::domain::Affine2;
-use crate::domain::cancel::poll;
-use crate::simd::{dispatch, floor_f32, index_from_f32};
+use mocban_core::domain::Affine2;
+use mocban_core::domain::cancel::poll;
+use mocban_core::simd::{dispatch, floor_f32, index_from_f32};
 
 /// Lanes of one SIMD vector.
 const LANES: usize = 8;

@@ -4,7 +4,7 @@
 
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
-use crate::raster::Grid;
+use mocban_core::raster::Grid;
 
 /// Scores two poses on the pixels that are valid for both. A score, 0..=1, is the correlation (0 if negative) times the
 /// share of the moving level's amount that the fixed level covers.
@@ -68,9 +68,9 @@ impl TiebreakSums {
 mod tests {
     use super::super::border_mask::valid_mask;
     use super::{PlacedLevel, tiebreak_scores};
-    use crate::domain::Affine2;
     use crate::stages::pose::PyramidLevel;
     use crate::stages::pose::border_mask::tests::{SIDE, level};
+    use mocban_core::domain::Affine2;
 
     fn scores(print: &PyramidLevel, relief: &PyramidLevel) -> [f64; 2] {
         let last = (relief.amount.width() - 1) as f64;

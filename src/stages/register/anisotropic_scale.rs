@@ -1,8 +1,8 @@
 //! Fits different scales along two perpendicular axes, as far as the print shows them: sheets shrink by 1 to 4 % across
 //! their grain, and a photograph taken at an angle is foreshortened.
 
-use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
+use mocban_core::domain::Affine2;
 
 /// Largest number of rounds of scaling and refining.
 const MAX_ROUNDS: usize = 6;

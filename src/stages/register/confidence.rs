@@ -8,7 +8,7 @@
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
 //! percent off. On generated pairs, the mean confidence is slightly below the share that is right.
 
-use crate::domain::{MetricOutcome, PoseFeatures};
+use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
 /// Number of inputs of the pose model: the constant 1, and the logarithms of the first five pose features.
 const POSE_INPUTS: usize = 6;
@@ -167,7 +167,7 @@ pub(super) fn set_confidence(
 #[cfg(test)]
 mod tests {
     use super::{MASK, logistic, mask_inputs, of_character, of_pose};
-    use crate::domain::PoseFeatures;
+    use mocban_core::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, probability_right: f64) -> f64 {
         logistic(&MASK, &mask_inputs(features, probability_right))

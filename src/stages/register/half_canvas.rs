@@ -1,9 +1,9 @@
 //! Print and depth map on a canvas of half the side length, so comparing masks takes a quarter of the time.
 
 use super::ink_edge::InkEdge;
-use crate::domain::Affine2;
-use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
 use crate::stages::normalize::PrintMasks;
+use mocban_core::domain::Affine2;
+use mocban_core::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
 
 /// Print and depth map in one frame.
 pub(super) struct HalfCanvas {

@@ -1,7 +1,7 @@
 //! Distances to the edge of the ink, from which the spread of the ink is estimated and corrected.
 
-use crate::raster::{Grid, Mask};
-use crate::simd::{dispatch, min_f32};
+use mocban_core::raster::{Grid, Mask};
+use mocban_core::simd::{dispatch, min_f32};
 
 /// Largest distance that is measured, in pixels. Larger distances are set to this.
 pub(super) const REACH: usize = 8;
@@ -116,7 +116,7 @@ fn nearest_in_row(padded: &[f32], nearest: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::{InkEdge, REACH, distances};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     #[test]
     fn distances_equal_those_of_a_search_over_all_pixels() {

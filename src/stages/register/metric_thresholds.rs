@@ -7,9 +7,9 @@
 use super::half_canvas::HalfCanvas;
 use super::params::{RegisterError, RegisterParams};
 use super::tops_edge::TopsEdge;
-use crate::domain::{ReliefHeights, ThresholdChoice, ThresholdMetric};
-use crate::raster::{DepthMap, Mask};
 use crate::stages::score::{SsimReference, SsimWindow};
+use mocban_core::domain::{ReliefHeights, ThresholdChoice, ThresholdMetric};
+use mocban_core::raster::{DepthMap, Mask};
 
 /// Number of candidates between the smallest and the largest depth.
 const CANDIDATES: u32 = 40;
@@ -225,13 +225,13 @@ mod tests {
     //! The choices follow the formulas of [`ThresholdMetric`].
 
     use super::{FULL_PX, MISSING_PX, PRIOR, candidate_levels, choose};
-    use crate::domain::{ReliefHeights, ThresholdMetric};
-    use crate::raster::{DepthMap, Grid, Mask};
     use crate::stages::register::RegisterParams;
     use crate::stages::register::half_canvas::HalfCanvas;
     use crate::stages::register::tops_edge::TopsEdge;
     use crate::stages::score::SsimReference;
     use crate::stages::testing::settings;
+    use mocban_core::domain::{ReliefHeights, ThresholdMetric};
+    use mocban_core::raster::{DepthMap, Grid, Mask};
 
     const SIDE: usize = 128;
     const RELIEF: ReliefHeights = ReliefHeights {

@@ -26,11 +26,11 @@ pub(super) use scoring::{Alignment, canvas_print, score_alignments};
 pub use stroke_map::StrokeMap;
 
 use super::normalize::{Normalized, relative_depths};
-use crate::domain::{Affine2, InkHypothesis, PoseFeatures};
-use crate::raster::DepthMap;
 use crate::stages::binarize::rim_share;
 use half_canvas::HalfCanvas;
 use metric_thresholds::ChosenThreshold;
+use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures};
+use mocban_core::raster::DepthMap;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{FailureClass, ThresholdMetric};
 use crate::stages::score::SsimWindow;
+use mocban_core::domain::{FailureClass, ThresholdMetric};
 
 /// Settings of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,13 +1,13 @@
 //! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
 use super::params::{RegisterError, RegisterParams};
-use crate::domain::Affine2;
-use crate::raster::PixelBox;
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, Loss, PoseCandidate, RefinementPass, Refiner, SearchRange, SoftMask,
     search_coarse_to_fine,
 };
+use mocban_core::domain::Affine2;
+use mocban_core::raster::PixelBox;
 
 /// Refinement passes after the search.
 const PASSES: [RefinementPass; 2] = [

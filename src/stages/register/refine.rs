@@ -4,12 +4,12 @@ use super::anisotropic_scale::with_anisotropic_scale;
 use super::params::RegisterParams;
 use super::pose_search::PoseSearch;
 use super::soft_thresholds::{FEW_CUTS, SoftThresholds, cuts_near};
-use crate::domain::{Affine2, PoseFeatures};
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
     BorderStrokes, ImagePyramid, LevelBuilder, Loss, PoseCandidate, PoseOverlap, PyramidLevel,
     Refiner, SoftMask,
 };
+use mocban_core::domain::{Affine2, PoseFeatures};
 
 /// An upright pose competes with the best pose only if their angles differ by more than this.
 const SAME_POSE_DEG: f64 = 15.0;

@@ -3,12 +3,12 @@
 use super::confidence::ConfidenceInputs;
 use super::params::RegisterError;
 use super::stroke_map::StrokeMap;
-use crate::domain::{
-    Affine2, Disagreement, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
-};
-use crate::raster::{DepthMap, Grid, Mask, warp_mask};
 use crate::stages::normalize::Normalized;
 use crate::stages::score::{self, SsimReference, SsimWindow};
+use mocban_core::domain::{
+    Affine2, Disagreement, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
+};
+use mocban_core::raster::{DepthMap, Grid, Mask, warp_mask};
 
 /// A metric's threshold and pose before they are scored.
 #[derive(Debug, Clone, Copy)]

@@ -3,10 +3,10 @@
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
 use super::unmatched::{BORDER_PX, tolerance_px};
-use crate::domain::{Affine2, Disagreement};
-use crate::raster::components::ConnectedComponents;
-use crate::raster::{DepthMap, Grid, Mask};
 use crate::stages::normalize::PrintMasks;
+use mocban_core::domain::{Affine2, Disagreement};
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{DepthMap, Grid, Mask};
 
 /// Smallest area beyond the tolerance of a piece, in squares of the stroke width. Ends of strokes that are rounded or
 /// printed short have less.
@@ -111,8 +111,8 @@ fn outside(mask: &Mask, edge: &InkEdge, distance_px: f64) -> Mask {
 #[cfg(test)]
 mod tests {
     use super::StrokeMap;
-    use crate::raster::{Grid, Mask};
     use crate::stages::register::half_canvas::HalfCanvas;
+    use mocban_core::raster::{Grid, Mask};
 
     const SIDE: usize = 96;
     const TOP: u16 = 1000;

@@ -3,17 +3,17 @@
 use super::{
     ChosenThreshold, RegisterError, RegisterParams, require_character, require_match, require_tops,
 };
-use crate::domain::{
-    Affine2, InkHypothesis, MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice,
-    ThresholdMetric,
-};
-use crate::mesh::Mesh;
-use crate::raster::{DepthMap, Grid};
 use crate::stages::StageError;
 use crate::stages::testing::{
     SyntheticSheet, grid_print, landmark_error_px, paper_settings, print, run, settings,
     shrunk_print, some_turn,
 };
+use mocban_core::domain::{
+    Affine2, InkHypothesis, MetricOutcome, PoseFeatures, PrintFromMesh, ThresholdChoice,
+    ThresholdMetric,
+};
+use mocban_core::mesh::Mesh;
+use mocban_core::raster::{DepthMap, Grid};
 
 #[test]
 fn any_pose_unit_and_winding_is_aligned() {

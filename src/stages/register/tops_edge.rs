@@ -7,7 +7,7 @@
 
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::InkEdge;
-use crate::domain::ReliefHeights;
+use mocban_core::domain::ReliefHeights;
 
 /// Typical spread of the ink, and its deviation, as shares of the stroke width. Dry ink has negative spreads.
 const SPREAD: f64 = 0.03;
@@ -128,9 +128,9 @@ fn edge_distances(canvas: &HalfCanvas, firsts: &[usize], candidates: usize) -> V
 #[cfg(test)]
 mod tests {
     use super::TopsEdge;
-    use crate::domain::ReliefHeights;
-    use crate::raster::{Grid, Mask};
     use crate::stages::register::half_canvas::HalfCanvas;
+    use mocban_core::domain::ReliefHeights;
+    use mocban_core::raster::{Grid, Mask};
 
     const SIDE: usize = 96;
     const TOP: u16 = 1000;

@@ -5,8 +5,8 @@
 
 use super::half_canvas::HalfCanvas;
 use super::ink_edge::{InkEdge, REACH};
-use crate::raster::Mask;
-use crate::raster::components::ConnectedComponents;
+use mocban_core::raster::Mask;
+use mocban_core::raster::components::ConnectedComponents;
 
 /// Distance from the strokes of the other image, as a share of the stroke width, from which a pixel has no partner.
 /// Smaller distances are due to the spread of ink and to local misalignment.
@@ -93,8 +93,8 @@ fn mean_deviation(values: &mut [f32], most: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{TOLERANCE_PX, Unmatched, mean_deviation, tolerance_px};
-    use crate::raster::{Grid, Mask};
     use crate::stages::register::half_canvas::HalfCanvas;
+    use mocban_core::raster::{Grid, Mask};
 
     const SIDE: usize = 96;
     const TOP: u16 = 1000;

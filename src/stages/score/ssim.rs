@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::raster::{Grid, Mask, PixelBox};
-use crate::simd::dispatch;
+use mocban_core::raster::{Grid, Mask, PixelBox};
+use mocban_core::simd::dispatch;
 
 /// Stabilising constants for a data range of 1.
 const C1: f64 = 0.01 * 0.01;
@@ -330,7 +330,7 @@ fn weighted_sum<const HALF: usize>(
 #[cfg(test)]
 mod tests {
     use super::{GAUSSIAN_WEIGHTS, SsimReference, SsimWindow};
-    use crate::raster::Mask;
+    use mocban_core::raster::Mask;
 
     #[test]
     fn weights_of_the_gaussian_follow_its_formula() {

@@ -5,7 +5,7 @@ use super::draw_effort::DrawEffort;
 use super::small_triangles::SmallTriangles;
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use super::triangle_fill::fill_triangle;
-use crate::simd::{floor_f32, max_f32, min_f32};
+use mocban_core::simd::{floor_f32, max_f32, min_f32};
 
 /// Fills the triangles that contain a pixel centre. `u`, `v` and `z` compute the column, row and height of a corner.
 /// Calls `emit` in the same way as [`fill_triangle`].

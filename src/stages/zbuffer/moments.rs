@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::surface::IndexedSurface;
 use super::triangle_block::{LANES, LaneArray, TriangleBlock};
-use crate::domain::cancel::poll;
-use crate::mesh::robust_bounds::Bounds;
-use crate::simd::dispatch;
+use mocban_core::domain::cancel::poll;
+use mocban_core::mesh::robust_bounds::Bounds;
+use mocban_core::simd::dispatch;
 
 /// The distinct products of two axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -134,8 +134,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::Moments;
-    use crate::mesh::Mesh;
     use crate::stages::zbuffer::IndexedSurface;
+    use mocban_core::mesh::Mesh;
 
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;

@@ -6,11 +6,11 @@ use super::surface::IndexedSurface;
 use super::triangle_block::{AffineForm, LANES, TriangleBlock};
 use super::triangle_fill::pixel_range;
 use super::viewport::Viewport;
-use crate::domain::Rigid3;
-use crate::domain::cancel::{poll, polled};
-use crate::mesh::robust_bounds::bulk_along;
-use crate::raster::Grid;
-use crate::simd::{dispatch, max_f32};
+use mocban_core::domain::Rigid3;
+use mocban_core::domain::cancel::{poll, polled};
+use mocban_core::mesh::robust_bounds::bulk_along;
+use mocban_core::raster::Grid;
+use mocban_core::simd::{dispatch, max_f32};
 
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
@@ -198,8 +198,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{DrawEffort, IndexedSurface, NO_HIT, Viewport};
-    use crate::domain::{Affine2, Rigid3};
-    use crate::mesh::Mesh;
+    use mocban_core::domain::{Affine2, Rigid3};
+    use mocban_core::mesh::Mesh;
 
     const UPRIGHT: Rigid3 = Rigid3([
         [1.0, 0.0, 0.0, 0.0],

@@ -5,7 +5,7 @@
 //! -0.0 may be swapped at pixels that two triangles share.
 
 use super::triangle_block::{LANES, LaneArray};
-use crate::simd::{ceil_f32, floor_f32, index_from_f32, max_f32, min_f32};
+use mocban_core::simd::{ceil_f32, floor_f32, index_from_f32, max_f32, min_f32};
 
 /// Triangles that span more columns or rows are filled one at a time.
 const MAX_SPAN_PX: f32 = 4.0;
@@ -177,7 +177,7 @@ mod tests {
     use super::super::triangle_block::{AffineForm, LANES, TriangleBlock};
     use super::super::triangle_fill::fill_triangle;
     use super::super::viewport::Viewport;
-    use crate::simd::max_f32;
+    use mocban_core::simd::max_f32;
 
     const SIZE: [usize; 2] = [9, 7];
     const IDENTITY: [AffineForm; 3] = [

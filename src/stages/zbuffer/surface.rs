@@ -3,12 +3,12 @@
 use super::block_bounds::BlockBounds;
 use super::draw_effort::GivenUp;
 use super::triangle_block::{AffineForm, Coordinate, LANES, LaneArray, TriangleBlock, pack_block};
-use crate::domain::Rigid3;
-use crate::domain::cancel::{poll, polled};
-use crate::mesh::robust_bounds::{Bounds, BulkRange, bulk_box};
-use crate::mesh::{Mesh, Vertices};
-use crate::page_vec::PageVec;
-use crate::simd::dispatch;
+use mocban_core::domain::Rigid3;
+use mocban_core::domain::cancel::{poll, polled};
+use mocban_core::mesh::robust_bounds::{Bounds, BulkRange, bulk_box};
+use mocban_core::mesh::{Mesh, Vertices};
+use mocban_core::page_vec::PageVec;
+use mocban_core::simd::dispatch;
 
 /// Largest number of blocks that are sampled to decide the winding. Tens of thousands of triangles are enough.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;

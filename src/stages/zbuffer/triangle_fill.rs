@@ -1,8 +1,8 @@
 //! Scan conversion of one triangle: finds the pixel centres in the triangle, and the triangle's height at each centre.
 
 use super::draw_effort::DrawEffort;
-use crate::domain::cancel::poll;
-use crate::simd::{max_f32, min_f32};
+use mocban_core::domain::cancel::poll;
+use mocban_core::simd::{max_f32, min_f32};
 
 /// If a triangle spans more columns than this, its rows are clipped before their pixels are tested.
 const MAX_UNCLIPPED_COLUMNS: usize = 12;

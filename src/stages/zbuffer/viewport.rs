@@ -1,7 +1,7 @@
 //! The pixel grid of a rendering.
 
-use crate::domain::Affine2;
-use crate::mesh::robust_bounds::Bounds;
+use mocban_core::domain::Affine2;
+use mocban_core::mesh::robust_bounds::Bounds;
 
 /// The position of a rendering's pixels in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,7 +16,7 @@ use super::bucket_error::BucketError;
 use super::client::LazyClient;
 use super::object_stat::ObjectStat;
 use super::request::start;
-use crate::domain::without_password;
+use mocban_core::domain::without_password;
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]

@@ -8,7 +8,7 @@ use rand::rngs::SysRng;
 
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
-use crate::domain::{ArtifactRef, ContentHash, PackLocation};
+use mocban_core::domain::{ArtifactRef, ContentHash, PackLocation};
 
 /// Folder of the packs.
 pub(in crate::store) const PACKS: &str = "packs";

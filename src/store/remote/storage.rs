@@ -11,7 +11,7 @@ use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
 use super::pack::{key, read_pack};
 use super::recent::Recent;
-use crate::domain::is_address;
+use mocban_core::domain::is_address;
 
 /// The settings of a storage.
 #[derive(Debug, Clone, Default)]

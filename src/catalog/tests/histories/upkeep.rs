@@ -7,7 +7,7 @@ use super::super::state_machine::JobState;
 use super::super::{fingerprints, name, observed, row};
 use super::{Game, LONGEST, MOST_PAIRS};
 use crate::catalog::{DeadWorker, NewVerdict, RerunPolicy, RetrySelection, ReviewContext};
-use crate::domain::{JobStatus, Stage, ThresholdMetric, Verdict};
+use mocban_core::domain::{JobStatus, Stage, ThresholdMetric, Verdict};
 
 impl Game {
     pub(super) async fn end(&mut self) {

@@ -9,9 +9,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::album::Album;
 use self::markup::sentence;
-use crate::domain::visible;
 use crate::report::gallery::Gallery;
 use crate::report::model::Report;
+use mocban_core::domain::visible;
 
 /// Maximum size of a page in bytes.
 pub const MAX_PAGE_BYTES: usize = 10_000_000;
@@ -83,9 +83,9 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::{Cover, MAX_PAGE_BYTES, page};
-    use crate::domain::{PairName, ThresholdMetric, Verdict};
     use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
     use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::{PairName, ThresholdMetric, Verdict};
 
     fn report() -> Report {
         let mut report = ReportAccumulator::default();
@@ -93,7 +93,7 @@ mod tests {
             let pair = test_fixtures::done(name, 0.75, &[Verdict::Pass, second]);
             report.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
-        let class = crate::domain::FailureClass::BadInput;
+        let class = mocban_core::domain::FailureClass::BadInput;
         let failed = test_fixtures::failed("c", class, "<script>alert(1)</script>.stl is empty");
         report.add(&failed, &TruthEvaluation::default());
         report.finish()

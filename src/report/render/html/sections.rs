@@ -5,7 +5,6 @@ use maud::{Markup, html};
 use super::album::Album;
 use super::markup::{prose, table};
 use super::plots;
-use crate::domain::one_line;
 use crate::report::comparison::Basis;
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
@@ -18,6 +17,7 @@ use crate::report::render::report_tables as tables;
 use crate::report::render::risk_coverage_tables::{full_tables, short_tables};
 use crate::report::render::table::Table;
 use crate::report::score_comparison::conclusions;
+use mocban_core::domain::one_line;
 
 /// Longest error message that is shown in full, characters.
 const MAX_ERROR_CHARS: usize = 600;

@@ -94,8 +94,8 @@ fn dot_plot(rows: &[PlotRow], axis: &PlotAxis, title: &str, caption: &str) -> Ma
 #[cfg(test)]
 mod tests {
     use super::{accuracy, times};
-    use crate::domain::{Stage, Verdict};
     use crate::report::{Basis, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use mocban_core::domain::{Stage, Verdict};
 
     #[test]
     fn points_are_at_their_numbers_on_the_axis() {

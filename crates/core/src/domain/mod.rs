@@ -1,0 +1,76 @@
+//! Domain types: small values that do not use files, SQL, async code or image buffers.
+
+mod address;
+mod alignment_prior;
+mod artifact;
+pub mod artifact_role;
+mod attention_check;
+mod block;
+mod box_iou;
+mod box_name;
+pub mod cancel;
+mod catalog_identity;
+mod control_points;
+mod enum_names;
+mod failure;
+mod file_kind;
+mod hash;
+mod height_from_mesh;
+mod ids;
+mod job;
+mod metric;
+mod outcome;
+mod pair_name;
+mod print_outline;
+mod review_order;
+mod sanitize;
+mod seeded_random;
+mod stage;
+#[cfg(any(test, feature = "test-helpers"))]
+pub mod test_values;
+mod transform;
+mod unique_keys;
+mod unit;
+mod verdict;
+mod worker_metrics;
+
+pub use address::{has_password, is_address, without_password};
+pub use alignment_prior::AlignmentPrior;
+pub use artifact::{ARTIFACTS, ArtifactRef, ArtifactSet, PackLocation};
+pub use attention_check::AttentionCheck;
+pub use block::{
+    BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
+};
+pub use box_iou::box_iou;
+pub use box_name::{BoxName, NotePart};
+pub use catalog_identity::{CatalogIdentity, UNKNOWN_SERVER};
+pub use control_points::{ControlPoint, ControlPoints};
+pub use enum_names::enum_names;
+use enum_names::stage_order;
+pub use failure::{Failure, FailureClass};
+pub use file_kind::FileKind;
+pub use hash::{ContentHash, ContentHashError};
+pub use height_from_mesh::HeightFromMesh;
+pub use ids::{PairId, WorkerId};
+pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
+pub use metric::ThresholdMetric;
+pub use outcome::{
+    Bow, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
+    NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
+    SideEvidence, ThresholdChoice,
+};
+pub use pair_name::{PairName, PairNameError};
+pub use print_outline::PrintOutline;
+pub use review_order::ReviewOrder;
+pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
+pub use seeded_random::SeededRandom;
+pub use stage::Stage;
+pub use transform::{Affine2, PrintFromMesh, Rigid3};
+pub use unique_keys::KEY_TWICE;
+pub use unique_keys::UniqueKeys;
+pub use unit::LengthUnit;
+pub use verdict::{Reason, Verdict};
+pub use worker_metrics::{ComputeTimes, WaitReason, WorkerMetrics};
+
+/// Milliseconds since the Unix epoch. The current time is always passed as an argument.
+pub type UnixMillis = i64;

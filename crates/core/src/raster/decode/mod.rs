@@ -1,0 +1,368 @@
+//! Decoder of print images: PNG, JPEG and TIFF, recognised by their content.
+
+mod error;
+mod limits;
+mod orientation;
+mod print_image;
+mod tiff;
+mod tiff_pages;
+
+use std::io::{BufRead, Cursor, Seek};
+
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+
+use crate::domain::FileKind;
+use crate::domain::cancel::PolledReader;
+
+use error::broken;
+use print_image::colours_on_white;
+
+pub use error::DecodeError;
+pub use limits::ImageLimits;
+pub use print_image::PrintImage;
+
+/// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.
+///
+/// The image is returned upright: an EXIF orientation is applied. The size in the header is checked before any pixel is
+/// decoded.
+///
+/// ```
+/// use mocban_core::raster::{Grid, ImageLimits, decode, png_rgb8};
+///
+/// let png = png_rgb8(&Grid::new(2, 1, [255, 0, 51]));
+/// let image = decode(&png, &ImageLimits::SUGGESTED)?;
+/// assert_eq!(image.rgb.at(1, 0), [65535, 0, 51 * 257]);
+/// # Ok::<(), mocban_core::raster::DecodeError>(())
+/// ```
+///
+/// # Errors
+/// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
+pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
+    limits.check_bytes(bytes)?;
+    let kind = FileKind::of(bytes);
+    let format = format_of(kind)?;
+    let (rgb, orientation) = match kind {
+        FileKind::Tiff => {
+            let page = tiff_pages::find_print_page(bytes)?;
+            let bytes = page.reordered.as_deref().unwrap_or(bytes);
+            let rgb = match tiff::decode_uncommon(bytes, limits)? {
+                Some(rgb) => rgb,
+                None => colours_on_white(&decode_pixels(bytes, format, kind, limits)?.0),
+            };
+            (rgb, orientation::of_tag(page.orientation))
+        }
+        FileKind::Png => {
+            check_png_header(bytes, limits)?;
+            let (pixels, _) = decode_pixels(bytes, format, kind, limits)?;
+            (colours_on_white(&pixels), orientation::of_png(bytes))
+        }
+        _ => {
+            let (pixels, orientation) = decode_pixels(bytes, format, kind, limits)?;
+            (colours_on_white(&pixels), orientation)
+        }
+    };
+    Ok(PrintImage {
+        rgb: orientation::upright(rgb, orientation),
+        turned: Some(orientation.to_exif()).filter(|number| *number != 1),
+    })
+}
+
+/// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
+pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
+    let reader = ImageReader::new(file).with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    Some(u64::from(width) * u64::from(height))
+}
+
+fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
+    match kind {
+        FileKind::Png => Ok(ImageFormat::Png),
+        FileKind::Jpeg => Ok(ImageFormat::Jpeg),
+        FileKind::Tiff => Ok(ImageFormat::Tiff),
+        _ => Err(DecodeError::NotAnImage(kind)),
+    }
+}
+
+/// Checks the size at its fixed offset in a PNG, because the decoder first reads all chunks that precede the pixels.
+fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
+    let side = |at: usize| {
+        let field = bytes.get(at..).and_then(|rest| rest.first_chunk());
+        let side = field.map(|field| u32::from_be_bytes(*field));
+        side.ok_or(DecodeError::Truncated(FileKind::Png))
+    };
+    limits.check_size(side(16)?, side(20)?)
+}
+
+/// Decodes the pixels in stored order. Returns them with the orientation from the metadata, which is not yet applied.
+fn decode_pixels(
+    bytes: &[u8],
+    format: ImageFormat,
+    kind: FileKind,
+    limits: &ImageLimits,
+) -> Result<(DynamicImage, Orientation), DecodeError> {
+    let whole = kind != FileKind::Jpeg || has_end_marker(bytes);
+    let refused = |error: ImageError| {
+        if whole {
+            decoder_error(kind, &error)
+        } else {
+            DecodeError::Truncated(kind)
+        }
+    };
+    let mut reader = ImageReader::with_format(PolledReader(Cursor::new(bytes)), format);
+    let mut memory = image::Limits::no_limits();
+    memory.max_alloc = Some(limits.max_decoder_bytes());
+    reader.limits(memory);
+    let mut decoder = reader.into_decoder().map_err(refused)?;
+    let (width, height) = decoder.dimensions();
+    limits.check_size(width, height)?;
+    if !whole {
+        return Err(DecodeError::Truncated(kind));
+    }
+    let orientation = orientation::of_decoder(&mut decoder);
+    let pixels = DynamicImage::from_decoder(decoder).map_err(refused)?;
+    Ok((pixels, orientation))
+}
+
+fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
+    let reason = error.to_string();
+    let early_end = match error {
+        ImageError::IoError(io) => io.kind() == std::io::ErrorKind::UnexpectedEof,
+        _ => reason.contains("unexpected end of file") || reason.contains("UnexpectedEof"),
+    };
+    if early_end {
+        return DecodeError::Truncated(kind);
+    }
+    broken(kind, &reason)
+}
+
+/// Returns whether the segments of a JPEG lead to its end marker. If not, the image is truncated, and the decoder would
+/// fill it with grey. Searching for the marker is not enough, because a thumbnail has its own end marker.
+fn has_end_marker(bytes: &[u8]) -> bool {
+    let mut at = 2;
+    while let Some(marker) = bytes.get(at..at + 2) {
+        match (marker[0], marker[1]) {
+            (0xff, 0xd9) => return true,
+            (0xff, 0xff | 0x00 | 0x01 | 0xd0..=0xd8) => at += 1,
+            (0xff, _) => match bytes.get(at + 2..at + 4) {
+                Some(length) => at += 2 + usize::from(u16::from_be_bytes([length[0], length[1]])),
+                None => return false,
+            },
+            // Entropy-coded data: continue at the next byte that may begin a marker.
+            _ => match bytes[at..].iter().position(|byte| *byte == 0xff) {
+                Some(step) => at += step,
+                None => return false,
+            },
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use image::{DynamicImage, ImageFormat};
+    use proptest::prelude::*;
+
+    use super::error::broken;
+    use super::{DecodeError, decode};
+
+    #[test]
+    fn decoder_messages_are_sanitized_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(161)] {
+            let said = broken(FileKind::of(b""), &rude).to_string();
+            assert!(!said.contains(&rude), "{said:?}");
+        }
+    }
+
+    use crate::domain::FileKind;
+    use crate::raster::ImageLimits;
+
+    const LIMITS: ImageLimits = ImageLimits {
+        max_bytes: 1 << 20,
+        max_pixels: 10_000,
+    };
+
+    fn file(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut out = Cursor::new(Vec::new());
+        image.write_to(&mut out, format).expect("encodes");
+        out.into_inner()
+    }
+
+    fn grey_ramp() -> image::GrayImage {
+        image::GrayImage::from_fn(16, 9, |x, y| image::Luma([(x * 16 + y) as u8]))
+    }
+
+    fn png_header(width: u32, height: u32) -> Vec<u8> {
+        let mut body = b"IHDR".to_vec();
+        body.extend(width.to_be_bytes());
+        body.extend(height.to_be_bytes());
+        body.extend([8, 0, 0, 0, 0]);
+        let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
+        bytes.extend(&body);
+        bytes.extend(crc32(&body).to_be_bytes());
+        bytes
+    }
+
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0, |crc, byte| {
+            (0..8).fold(crc ^ u32::from(*byte), |c, _| {
+                (c >> 1) ^ (0xedb8_8320 & (c & 1).wrapping_neg())
+            })
+        })
+    }
+
+    #[test]
+    fn eight_and_sixteen_bits_give_the_same_grey() {
+        let narrow = DynamicImage::ImageLuma8(grey_ramp());
+        let wide = DynamicImage::ImageLuma16(narrow.to_luma16());
+        for format in [ImageFormat::Png, ImageFormat::Tiff] {
+            let a = decode(&file(&narrow, format), &LIMITS).expect("decodes");
+            let b = decode(&file(&wide, format), &LIMITS).expect("decodes");
+            assert_eq!(a, b, "{format:?}");
+            assert_eq!(a.rgb.at(15, 8), [248 * 257; 3]);
+        }
+    }
+
+    #[test]
+    fn colours_survive_without_loss() {
+        let rgb = image::RgbImage::from_fn(7, 5, |x, y| image::Rgb([x as u8, y as u8, 200]));
+        for format in [ImageFormat::Png, ImageFormat::Tiff] {
+            let bytes = file(&DynamicImage::ImageRgb8(rgb.clone()), format);
+            let picture = decode(&bytes, &LIMITS).expect("decodes");
+            assert_eq!(picture.rgb.at(6, 4), [6 * 257, 4 * 257, 200 * 257]);
+        }
+    }
+
+    #[test]
+    fn transparency_is_white() {
+        let at = |a| image::RgbaImage::from_pixel(2, 2, image::Rgba([0, 255, 0, a]));
+        let read = |a| {
+            let bytes = file(&DynamicImage::ImageRgba8(at(a)), ImageFormat::Png);
+            decode(&bytes, &LIMITS).expect("decodes").rgb.at(1, 1)
+        };
+        assert_eq!(read(0), [65535; 3]);
+        assert_eq!(read(255), [0, 65535, 0]);
+        assert_eq!(read(51), [52428, 65535, 52428]);
+        let grey = image::GrayAlphaImage::from_pixel(2, 2, image::LumaA([0, 0]));
+        let bytes = file(&DynamicImage::ImageLumaA8(grey), ImageFormat::Png);
+        assert_eq!(
+            decode(&bytes, &LIMITS).expect("decodes").rgb.at(0, 0),
+            [65535; 3]
+        );
+    }
+
+    #[test]
+    fn palette_and_one_bit_images_decode() {
+        let encode = |depth, palette: Option<&[u8]>, data: &[u8]| {
+            let mut out = Vec::new();
+            let mut encoder = png::Encoder::new(&mut out, 4, 1);
+            encoder.set_depth(depth);
+            encoder.set_color(match palette {
+                Some(_) => png::ColorType::Indexed,
+                None => png::ColorType::Grayscale,
+            });
+            if let Some(colours) = palette {
+                encoder.set_palette(colours.to_vec());
+            }
+            let mut writer = encoder.write_header().expect("writes");
+            writer.write_image_data(data).expect("writes");
+            writer.finish().expect("writes");
+            out
+        };
+        let one_bit = encode(png::BitDepth::One, None, &[0b0101_0000]);
+        let picture = decode(&one_bit, &LIMITS).expect("decodes");
+        assert_eq!(picture.rgb.data(), [[0; 3], [65535; 3], [0; 3], [65535; 3]]);
+        let colours = [255, 0, 0, 0, 0, 255];
+        let indexed = encode(png::BitDepth::Two, Some(&colours), &[0b0001_0001]);
+        let picture = decode(&indexed, &LIMITS).expect("decodes");
+        assert_eq!(picture.rgb.at(1, 0), [0, 0, 65535]);
+    }
+
+    #[test]
+    fn huge_header_is_refused_before_decoding() {
+        for bytes in [png_header(60_000, 60_000), {
+            let mut jpeg = file(&DynamicImage::ImageLuma8(grey_ramp()), ImageFormat::Jpeg);
+            let frame = jpeg
+                .windows(2)
+                .position(|w| w == [0xff, 0xc0])
+                .expect("SOF");
+            jpeg[frame + 5..frame + 9].copy_from_slice(&[0xea, 0x60, 0xea, 0x60]);
+            jpeg
+        }] {
+            let error = decode(&bytes, &LIMITS).expect_err("refused");
+            assert_eq!(
+                error.to_string(),
+                "the image is 60000 x 60000 pixels; limits.image.max_pixels is 10000"
+            );
+        }
+    }
+
+    #[test]
+    fn image_without_pixels_is_refused() {
+        assert_eq!(
+            decode(&png_header(0, 5), &LIMITS),
+            Err(DecodeError::NoPixels {
+                width: 0,
+                height: 5
+            })
+        );
+    }
+
+    #[test]
+    fn error_names_the_type_of_other_files() {
+        assert_eq!(decode(b"", &LIMITS), Err(DecodeError::Empty));
+        assert_eq!(
+            decode(b"id,mesh,print\n", &LIMITS),
+            Err(DecodeError::NotAnImage(FileKind::Text))
+        );
+        let error = decode(b"GIF89a......", &LIMITS).expect_err("not read");
+        assert_eq!(
+            error.to_string(),
+            "the file is a GIF image; PNG, JPEG and TIFF images are read"
+        );
+    }
+
+    #[test]
+    fn truncated_images_are_reported_as_such() {
+        for (format, kind) in [
+            (ImageFormat::Png, FileKind::Png),
+            (ImageFormat::Jpeg, FileKind::Jpeg),
+            (ImageFormat::Tiff, FileKind::Tiff),
+        ] {
+            let whole = file(&DynamicImage::ImageLuma8(grey_ramp()), format);
+            assert!(decode(&whole, &LIMITS).is_ok(), "{format:?}");
+            for len in 1..whole.len() {
+                let error = decode(&whole[..len], &LIMITS);
+                // A PNG is complete once its pixels are, even without its last chunk.
+                if kind == FileKind::Png && len + 16 >= whole.len() {
+                    continue;
+                }
+                assert!(error.is_err(), "{format:?} of {len} bytes");
+            }
+            let error = decode(&whole[..whole.len() / 2], &LIMITS);
+            assert_eq!(error, Err(DecodeError::Truncated(kind)), "{format:?}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+        #[test]
+        fn flipped_bytes_never_panic(
+            format in prop_oneof![
+                Just(ImageFormat::Png), Just(ImageFormat::Jpeg), Just(ImageFormat::Tiff)
+            ],
+            flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        ) {
+            let mut bytes = file(&DynamicImage::ImageLuma8(grey_ramp()), format);
+            for (at, value) in flips {
+                let at = at.index(bytes.len());
+                bytes[at] = value;
+            }
+            if let Ok(picture) = decode(&bytes, &LIMITS) {
+                prop_assert!(picture.rgb.data().len() as u64 <= LIMITS.max_pixels);
+            }
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! Encodes and decodes artifacts as lossless PNG, and encodes images for viewing as JPEG. Equal grids give equal bytes.
+
+use std::io::Cursor;
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+
+use super::{Grid, Mask};
+
+/// Why an artifact could not be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum PngError {
+    /// Not a complete PNG.
+    #[error("the PNG is damaged: {0}")]
+    Damaged(#[from] png::DecodingError),
+    /// A PNG of another kind than expected.
+    #[error("the PNG holds {found:?} of {bits:?} bits, not grey of {wanted} bits")]
+    Kind {
+        /// Colour type found.
+        found: png::ColorType,
+        /// Bits per channel found.
+        bits: png::BitDepth,
+        /// Bits per channel expected.
+        wanted: u8,
+    },
+    /// A mask with a value that is neither 0 nor 255.
+    #[error("the mask holds the value {0}, which is neither 0 nor 255")]
+    NotAMask(u8),
+}
+
+/// Encodes a grid as a 16-bit grey PNG.
+///
+/// ```
+/// use mocban_core::raster::{Grid, decode_grey16, png_grey16};
+///
+/// let levels = Grid::from_fn(3, 2, |x, y| (1000 * x + y) as u16);
+/// assert_eq!(decode_grey16(&png_grey16(&levels))?, levels);
+/// # Ok::<(), mocban_core::raster::PngError>(())
+/// ```
+///
+/// # Panics
+/// Panics if the grid has no pixels, as every encoder of this module does. Every stage produces grids with pixels.
+pub fn png_grey16(grid: &Grid<u16>) -> Vec<u8> {
+    let samples: Vec<u8> = grid.data().iter().flat_map(|v| v.to_be_bytes()).collect();
+    png_of(
+        grid,
+        png::ColorType::Grayscale,
+        png::BitDepth::Sixteen,
+        &samples,
+    )
+}
+
+/// Encodes a grid as an 8-bit grey PNG.
+pub fn png_grey8(grid: &Grid<u8>) -> Vec<u8> {
+    png_of(
+        grid,
+        png::ColorType::Grayscale,
+        png::BitDepth::Eight,
+        grid.data(),
+    )
+}
+
+/// Encodes a mask as an 8-bit grey PNG: 255 where it is set (stroke), 0 elsewhere.
+///
+/// ```
+/// use mocban_core::raster::{Mask, decode_grey8, decode_mask, png_mask};
+///
+/// let mask = Mask::from_fn(4, 4, |x, y| x == y);
+/// let png = png_mask(&mask);
+/// assert_eq!(decode_grey8(&png)?.at(2, 2), 255);
+/// assert_eq!(decode_mask(&png)?, mask);
+/// # Ok::<(), mocban_core::raster::PngError>(())
+/// ```
+pub fn png_mask(mask: &Mask) -> Vec<u8> {
+    png_grey8(&mask.map(|set| if *set { 255 } else { 0 }))
+}
+
+/// Encodes a grid as an 8-bit RGB PNG.
+pub fn png_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
+    let samples = grid.data().as_flattened();
+    png_of(grid, png::ColorType::Rgb, png::BitDepth::Eight, samples)
+}
+
+/// Encodes like [`png_rgb8`] a sixth smaller and five times as slowly, for pictures in which pixels are repeated.
+///
+/// ```
+/// use mocban_core::raster::{Grid, ImageLimits, compact_rgb8, decode, png_rgb8};
+///
+/// let enlarged = Grid::from_fn(400, 300, |x, y| [(37 * (x / 4) * (y / 4) % 251) as u8, 80, 9]);
+/// let png = compact_rgb8(&enlarged);
+/// assert!(png.len() < png_rgb8(&enlarged).len());
+/// let read = decode(&png, &ImageLimits::SUGGESTED)?.rgb;
+/// assert_eq!(read, enlarged.map(|colour| colour.map(|value| u16::from(value) * 257)));
+/// # Ok::<(), mocban_core::raster::DecodeError>(())
+/// ```
+pub fn compact_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
+    encode(
+        grid,
+        (png::ColorType::Rgb, png::BitDepth::Eight),
+        grid.data().as_flattened(),
+        png::DeflateCompression::Level(2),
+    )
+}
+
+/// Encodes a grid as an 8-bit RGB JPEG of quality 1..=100, for viewing.
+pub fn jpeg_rgb8(grid: &Grid<[u8; 3]>, quality: u8) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (grid.width() as u32, grid.height() as u32);
+    let samples = grid.data().as_flattened();
+    JpegEncoder::new_with_quality(&mut out, quality)
+        .encode(samples, width, height, ExtendedColorType::Rgb8)
+        .expect("a grid with pixels is written to memory");
+    out
+}
+
+fn png_of<T: Copy>(
+    grid: &Grid<T>,
+    color: png::ColorType,
+    depth: png::BitDepth,
+    samples: &[u8],
+) -> Vec<u8> {
+    // A depth map of 512 px takes 0.8 ms and 278 kB with this setting, and 2.2 ms and 251 kB with level 1 of miniz.
+    let deflate = png::DeflateCompression::FdeflateUltraFast;
+    encode(grid, (color, depth), samples, deflate)
+}
+
+fn encode<T: Copy>(
+    grid: &Grid<T>,
+    (color, depth): (png::ColorType, png::BitDepth),
+    samples: &[u8],
+    deflate: png::DeflateCompression,
+) -> Vec<u8> {
+    let mut out = Vec::with_capacity(samples.len() / 2 + 1024);
+    let mut encoder = png::Encoder::new(&mut out, grid.width() as u32, grid.height() as u32);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_deflate_compression(deflate);
+    encoder.set_filter(png::Filter::Paeth);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(samples)?;
+            writer.finish()
+        })
+        .expect("a grid with pixels is written to memory");
+    out
+}
+
+/// Decodes a PNG that [`png_grey16`] encoded.
+///
+/// # Errors
+/// Returns an error if the bytes are damaged, or are not a 16-bit grey PNG.
+pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, PngError> {
+    let (width, height, samples) = grey_samples(bytes, png::BitDepth::Sixteen)?;
+    let (pairs, _) = samples.as_chunks::<2>();
+    let levels = pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+    Ok(Grid::from_vec(width, height, levels).expect("two bytes for each pixel"))
+}
+
+/// Decodes a PNG that [`png_grey8`] encoded.
+///
+/// # Errors
+/// Returns an error if the bytes are damaged, or are not an 8-bit grey PNG.
+pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, PngError> {
+    let (width, height, samples) = grey_samples(bytes, png::BitDepth::Eight)?;
+    Ok(Grid::from_vec(width, height, samples).expect("one byte for each pixel"))
+}
+
+/// Decodes a PNG that [`png_mask`] encoded.
+///
+/// # Errors
+/// Returns an error if the bytes are damaged, are not an 8-bit grey PNG, or contain a value other than 0 and 255.
+pub fn decode_mask(bytes: &[u8]) -> Result<Mask, PngError> {
+    let grey = decode_grey8(bytes)?;
+    match grey.data().iter().find(|v| !matches!(**v, 0 | 255)) {
+        Some(value) => Err(PngError::NotAMask(*value)),
+        None => Ok(grey.map(|value| *value == 255)),
+    }
+}
+
+/// Decodes a grey PNG of the given bit depth. Returns its width, height and bytes.
+fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec<u8>), PngError> {
+    let wanted = depth as u8;
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
+    let info = reader.info();
+    let (width, height) = (info.width as usize, info.height as usize);
+    if info.color_type != png::ColorType::Grayscale || info.bit_depth != depth {
+        return Err(PngError::Kind {
+            found: info.color_type,
+            bits: info.bit_depth,
+            wanted,
+        });
+    }
+    let mut samples = vec![0; width * height * usize::from(wanted / 8)];
+    reader.next_frame(&mut samples)?;
+    reader.finish()?;
+    Ok((width, height, samples))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{
+        PngError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
+        png_mask, png_rgb8,
+    };
+    use crate::raster::{Grid, ImageLimits, Mask, decode};
+
+    #[test]
+    fn mask_is_white_where_stroke_is() {
+        let mask = Mask::from_fn(5, 3, |x, y| x == y);
+        let bytes = png_mask(&mask);
+        assert_eq!(decode_grey8(&bytes).expect("reads").at(1, 1), 255);
+        assert_eq!(decode_mask(&bytes).expect("reads"), mask);
+    }
+
+    #[test]
+    fn grey_image_is_rejected_as_a_mask() {
+        let bytes = png_grey8(&Grid::new(2, 2, 7));
+        assert!(matches!(decode_mask(&bytes), Err(PngError::NotAMask(7))));
+        assert!(matches!(decode_grey16(&bytes), Err(PngError::Kind { .. })));
+    }
+
+    #[test]
+    fn colours_are_read_back_by_the_print_decoder() {
+        let grid = Grid::from_fn(4, 4, |x, y| [x as u8 * 60, y as u8 * 60, 9]);
+        let picture = decode(&png_rgb8(&grid), &ImageLimits::SUGGESTED).expect("reads");
+        assert_eq!(
+            picture.rgb,
+            grid.map(|c| c.map(|value| u16::from(value) * 257))
+        );
+    }
+
+    #[test]
+    fn jpeg_is_close_to_its_source() {
+        let grid = Grid::from_fn(40, 24, |x, y| [x as u8 * 5, y as u8 * 9, 90]);
+        let picture = decode(&jpeg_rgb8(&grid, 85), &ImageLimits::SUGGESTED).expect("reads");
+        assert_eq!((picture.rgb.width(), picture.rgb.height()), (40, 24));
+        let far = |(a, b): (&[u16; 3], &[u8; 3])| {
+            let apart = a
+                .iter()
+                .zip(b)
+                .map(|(a, b)| (a / 257).abs_diff(u16::from(*b)));
+            apart.max().unwrap_or(0)
+        };
+        let pixels = picture.rgb.data().iter().zip(grid.data());
+        assert!(pixels.map(far).max().expect("pixels") < 16);
+    }
+
+    #[test]
+    fn truncated_artifact_is_damaged() {
+        let bytes = png_grey16(&Grid::from_fn(40, 30, |x, y| (x * y) as u16));
+        for len in 0..bytes.len() {
+            assert!(decode_grey16(&bytes[..len]).is_err(), "{len} bytes");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn grey_is_read_back_exactly(
+            width in 1_usize..20, height in 1_usize..20, seed in any::<u32>(),
+        ) {
+            let noise = |x: usize, y: usize| {
+                (seed ^ (x as u32).wrapping_mul(0x9e37_79b1)).wrapping_mul(y as u32 | 1)
+            };
+            let wide = Grid::from_fn(width, height, |x, y| (noise(x, y) >> 16) as u16);
+            prop_assert_eq!(&decode_grey16(&png_grey16(&wide)).expect("reads"), &wide);
+            let narrow = wide.map(|value| (value >> 8) as u8);
+            prop_assert_eq!(&decode_grey8(&png_grey8(&narrow)).expect("reads"), &narrow);
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Images and masks in memory, their decoders and encoders, and warps. [`Grid`] states the pixel convention.
+
+pub mod blur;
+pub mod components;
+mod decode;
+mod depth_map;
+pub mod encode;
+pub mod fonts;
+mod grid;
+mod mask;
+mod minmax_pyramid;
+pub mod otsu;
+mod resample;
+mod supersample;
+mod warp_depth;
+mod warp_mask;
+mod warp_rgb;
+
+pub use decode::{DecodeError, ImageLimits, PrintImage, decode, header_pixel_count};
+pub use depth_map::DepthMap;
+pub use encode::{
+    PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
+    png_grey16, png_mask, png_rgb8,
+};
+pub use grid::Grid;
+pub use mask::{Mask, MaskOverlap, PixelBox};
+pub use resample::{resample, resample_transposed};
+pub use warp_depth::warp_depth;
+pub use warp_mask::warp_mask;
+pub use warp_rgb::warp_rgb;
