@@ -54,7 +54,7 @@
 //! rows that no run can compute again), `cli/report.rs`, `report/headline.rs` (the answer in three
 //! sentences), `report/provenance.rs` (settings and hashes), `report/render/table.rs` and `report/number_format.rs` (the
 //! text of a cell).
-//! `src/failpoint.rs` lists the points of this path at which tests kill the process.
+//! `crates/system/src/failpoint.rs` lists the points of this path at which tests kill the process.
 //!
 //! ## Whole blocks
 //!
@@ -269,11 +269,9 @@ pub mod config;
 pub mod demo;
 pub mod documentation;
 pub mod export;
-mod failpoint;
 pub mod labels;
 pub mod local_server;
 pub mod manifest;
-mod platform;
 #[cfg(test)]
 #[path = "../tests/support/postgres_server.rs"]
 mod postgres_server;

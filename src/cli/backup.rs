@@ -15,10 +15,10 @@ use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
-use crate::platform::stat;
 use crate::store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
 };
+use mocban_system::platform::stat;
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]

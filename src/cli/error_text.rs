@@ -8,9 +8,9 @@ use super::time_text::local;
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use crate::config::ConfigError;
 use crate::export::FolderError;
-use crate::platform;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
+use mocban_system::platform;
 
 /// Returns the exit code of an error.
 pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {

@@ -2,8 +2,8 @@
 
 use tokio::task::JoinHandle;
 
-use crate::platform;
 use crate::runner::Stop;
+use mocban_system::platform;
 
 /// Watches Ctrl-C, a request to end and a closed terminal until the handle is aborted.
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {

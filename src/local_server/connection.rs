@@ -15,7 +15,7 @@ use tokio::net::TcpStream;
 use tokio::sync::{Notify, watch};
 use tokio::time::Instant;
 
-use crate::platform;
+use mocban_system::platform;
 
 /// Maximum number of bytes of a request header, and of a response that waits for a slow client.
 const BUFFER_BYTES: usize = 64 * 1024;

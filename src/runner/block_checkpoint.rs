@@ -17,9 +17,9 @@ use crate::catalog::{
     BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
     NewCharacter,
 };
-use crate::failpoint::{self, Point};
 use crate::store::{Project, stat_input};
 use mocban_core::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
+use mocban_system::failpoint::{self, Point};
 
 /// Calls an idempotent operation again while the database server is unavailable.
 macro_rules! while_unavailable {

@@ -19,11 +19,11 @@ use super::events::RunEvent;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
-use crate::failpoint::{self, Point};
-use crate::platform::sleep_active;
 use crate::store::ArtifactError;
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
+use mocban_system::failpoint::{self, Point};
+use mocban_system::platform::sleep_active;
 
 /// Times that a stage may find the result of an earlier stage unusable before the block fails.
 const MAX_RERUNS: usize = 4;

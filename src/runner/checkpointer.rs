@@ -14,8 +14,8 @@ use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
 use crate::catalog::{CheckpointOutcome, Lease};
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
+use mocban_system::failpoint::{self, Point};
 
 /// The task that holds a pair's lease and stores its stages.
 pub(super) struct Checkpointer {

@@ -17,11 +17,11 @@ use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, StageCheckpoint};
-use crate::failpoint::{self, Point};
-use crate::platform::sleep_active;
 use crate::store::{ArtifactError, NewArtifact};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
 use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
+use mocban_system::failpoint::{self, Point};
+use mocban_system::platform::sleep_active;
 
 /// A computed stage: its catalog row, and the files that must be on the disk before the row is stored.
 pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);

@@ -11,7 +11,7 @@ use tokio::time::sleep;
 
 use super::options::RunOptions;
 use super::stop::{Stop, StopLevel};
-use crate::platform::ActiveClock;
+use mocban_system::platform::ActiveClock;
 
 /// Reads in progress at the same time, not counting overdue reads.
 pub(super) const THREADS: usize = 8;
@@ -254,8 +254,8 @@ mod tests {
     use std::time::Duration;
 
     use super::{LONGEST_SLEEP, PendingReads, ReadItem, ReadLimits, SLOW, THREADS, read_each};
-    use crate::platform::ActiveClock;
     use crate::runner::stop::{Stop, StopLevel};
+    use mocban_system::platform::ActiveClock;
 
     /// Opened when hanging reads may return.
     type Gate = Arc<(Mutex<bool>, Condvar)>;

@@ -17,10 +17,10 @@ use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, Lease, PairAttributes, PairWork};
-use crate::failpoint::{self, Point};
-use crate::platform::ActiveClock;
 use crate::store::ArtifactError;
 use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
+use mocban_system::failpoint::{self, Point};
+use mocban_system::platform::ActiveClock;
 
 /// What is left to do for a pair when its stages are computed.
 pub(super) enum PairOutcome {

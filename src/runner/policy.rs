@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::catalog::{BlockFailureAction, FailureAction};
-use crate::failpoint;
 use mocban_core::domain::{BlockId, FailureClass, PairId, UnixMillis};
+use mocban_system::failpoint;
 
 /// Attempts of a stage that fails to read or write.
 const IO_ATTEMPTS: u32 = 3;

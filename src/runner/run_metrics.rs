@@ -13,8 +13,8 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::{Registry, Unit};
 
-use crate::platform;
 use mocban_core::domain::{ComputeTimes, Stage, WaitReason, WorkerMetrics};
+use mocban_system::platform;
 
 /// Version of this program.
 const VERSION: &str = env!("CARGO_PKG_VERSION");

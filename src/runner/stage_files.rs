@@ -13,10 +13,10 @@ use super::error::RunError;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::StageCheckpoint;
-use crate::failpoint::{self, Point};
-use crate::platform::sleep_active;
 use crate::store::{ArtifactError, NewArtifact};
 use mocban_core::domain::{PairName, Stage};
+use mocban_system::failpoint::{self, Point};
+use mocban_system::platform::sleep_active;
 
 /// A pack waits this long for the next stages of its pair, so that a pair is usually one object.
 const PACK_WAIT: Duration = Duration::from_secs(2);

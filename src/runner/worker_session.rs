@@ -9,8 +9,8 @@ use super::liveness::Liveness;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{CatalogError, DeadWorker, WorkerInfo};
-use crate::platform;
 use mocban_core::domain::{UnixMillis, WorkerId};
+use mocban_system::platform;
 
 /// The worker that this process is registered as.
 #[derive(Debug)]

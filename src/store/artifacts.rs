@@ -13,8 +13,8 @@ use super::atomic_write::{set_modified_now, write_synced};
 use super::input_error::InputError;
 use super::open_file::{open_regular, regular_metadata};
 use super::parent_folder::{parent_folder, sync_folder};
-use crate::platform::rename;
 use mocban_core::domain::{ArtifactRef, ContentHash};
+use mocban_system::platform::rename;
 
 /// An artifact that is not on disk yet.
 #[derive(Debug, Clone, PartialEq, Eq)]

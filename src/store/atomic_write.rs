@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
-use crate::platform::{canonicalize, rename, sync_file};
+use mocban_system::platform::{canonicalize, rename, sync_file};
 
 /// Name of the new file in its staging folder.
 const NEW: &str = "new";

@@ -4,8 +4,8 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::remote::BucketError;
-use crate::platform::{is_out_of_files, is_system_out_of_files};
 use mocban_core::domain::FailureClass;
+use mocban_system::platform::{is_out_of_files, is_system_out_of_files};
 
 /// Why an input file could not be read.
 #[derive(Debug, thiserror::Error)]

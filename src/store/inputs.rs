@@ -7,9 +7,9 @@ use super::input_error::InputError;
 use super::input_place::{Input, InputLocation};
 use super::open_file::{open_regular, regular_metadata};
 use super::remote::BucketError;
-use crate::platform::generation;
 use mocban_core::domain::ContentHash;
 use mocban_core::page_vec::PageVec;
+use mocban_system::platform::generation;
 
 /// Returns size, modification time and inode of a file as text. If all three are unchanged, the content is assumed to
 /// be unchanged.

@@ -12,7 +12,7 @@ use std::time::Duration;
 use super::Project;
 use super::input_error::InputError;
 use super::open_file::open_regular;
-use crate::platform::unlock;
+use mocban_system::platform::unlock;
 
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";

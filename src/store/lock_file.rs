@@ -4,7 +4,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read as _, Result, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::platform::{is_without_locks, stat_link, stat_open};
+use mocban_system::platform::{is_without_locks, stat_link, stat_open};
 
 /// Number of attempts to lock a file that other processes keep removing.
 const ATTEMPTS: u32 = 100;

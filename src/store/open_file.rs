@@ -5,7 +5,7 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 use super::input_error::{InputError, with_advice};
-use crate::platform::{is_pipe, is_socket, let_reads_wait, open_without_waiting};
+use mocban_system::platform::{is_pipe, is_socket, let_reads_wait, open_without_waiting};
 
 /// Returns the metadata of a regular file.
 ///

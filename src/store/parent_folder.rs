@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::platform::{open_folder, sync_names};
+use mocban_system::platform::{open_folder, sync_names};
 
 /// Returns the folder that holds the name of a file or folder.
 pub(super) fn parent_folder(path: &Path) -> PathBuf {

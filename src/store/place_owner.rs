@@ -13,8 +13,8 @@ use super::project::CATALOG_FILE;
 use super::referenced::{ReferencedArtifacts, UnreferencedKind};
 use super::remote::{Bucket, BucketError, PACKS};
 use super::{Project, ProjectStorage, StagingFolder};
-use crate::platform::{generation, stat};
 use mocban_core::domain::{ARTIFACTS, ArtifactRef, CatalogIdentity};
+use mocban_system::platform::{generation, stat};
 
 /// Why a catalog may not use a place of artifacts.
 #[derive(Debug, thiserror::Error)]

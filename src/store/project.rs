@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
-use crate::platform::{FileId, stat, with_slashes};
 use mocban_core::domain::ARTIFACTS;
+use mocban_system::platform::{FileId, stat, with_slashes};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
 use super::target_lock::{TargetLock, TargetLockError};
-use crate::platform::{canonicalize, exchange, rename, sync_tree};
+use mocban_system::platform::{canonicalize, exchange, rename, sync_tree};
 
 /// The new content in the staging folder.
 const NEW: &str = "new";

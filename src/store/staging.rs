@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::lock_file::{LockAttempt, LockFile};
 use super::parent_folder::parent_folder;
-use crate::platform::file_name_of;
+use mocban_system::platform::file_name_of;
 
 /// End of the name of every staging folder.
 const SUFFIX: &str = ".mocban-partial";

@@ -5,8 +5,8 @@ use crate::catalog::db::conn::Conn;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::queue::lease::was_written_long_ago;
 use crate::catalog::{Catalog, Result};
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{BlockId, BlockStage, UnixMillis, WorkerId};
+use mocban_system::failpoint::{self, Point};
 
 /// Number of attempts kept per block. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;

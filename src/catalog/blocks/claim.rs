@@ -8,8 +8,8 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::query::{query, query_as, query_scalar};
 use crate::catalog::db::row::{FromRow as _, from_row};
 use crate::catalog::{Catalog, CatalogError, Result};
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{BlockId, UnixMillis, WorkerId};
+use mocban_system::failpoint::{self, Point};
 
 /// Selects the lease that a worker holds already. A worker has at most one: another claim means that the reply to the
 /// claim before was lost.

@@ -4,8 +4,8 @@ use crate::catalog::blocks::checkpoint::{self, BlockAttempt, fenced};
 use crate::catalog::blocks::model::{BlockFailure, BlockFailureAction, BlockLease};
 use crate::catalog::db::query::query_scalar;
 use crate::catalog::{Catalog, Result};
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{BlockId, BlockName, FailureClass, JobStatus};
+use mocban_system::failpoint::{self, Point};
 
 const FAIL: &str = concat!(
     "

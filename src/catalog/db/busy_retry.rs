@@ -8,7 +8,7 @@ use tokio::time::{Sleep, sleep};
 use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::lock_owner;
-use crate::platform::ActiveClock;
+use mocban_system::platform::ActiveClock;
 
 /// Longest wait.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::platform::{DeviceNumber, device_number};
+use mocban_system::platform::{DeviceNumber, device_number};
 
 /// Offset of the byte in the `-shm` file that a writer locks (see "WAL-index locks" in SQLite's file format).
 const WRITE_LOCK: &str = "120";

@@ -11,8 +11,8 @@ use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::{CatalogError, LogLoss, Result};
 use crate::catalog::db::lock_owner::sidecar;
-use crate::platform::{FileId, stat};
 use mocban_core::domain::UnixMillis;
+use mocban_system::platform::{FileId, stat};
 
 /// Length of the log's header in bytes.
 const LOG_HEADER: u64 = 32;

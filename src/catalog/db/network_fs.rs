@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::platform::{DeviceNumber, device_number, file_system_magic, is_share};
+use mocban_system::platform::{DeviceNumber, device_number, file_system_magic, is_share};
 
 /// Number (`f_type`) and name of each network file system, from statfs(2) and the kernel's `magic.h`.
 const MAGICS: [(u64, &str); 20] = [

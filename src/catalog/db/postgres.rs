@@ -10,7 +10,7 @@ use crate::catalog::db::error_kind::{CatalogErrorKind, connection_error};
 use crate::catalog::db::open::SCHEMA_VERSION;
 use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::db::query::limited;
-use crate::platform::timeout_active;
+use mocban_system::platform::timeout_active;
 
 /// Oldest supported major version of the server.
 const OLDEST_SERVER: u32 = 15;

@@ -13,7 +13,7 @@ use crate::catalog::db::dialect::Sql;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::row::{FromRow, Row};
 use crate::catalog::db::value::{Argument, FromValue};
-use crate::platform::timeout_active;
+use mocban_system::platform::timeout_active;
 
 /// Longest time for one statement on a server. Without a limit, a statement on a connection that broke silently would
 /// wait forever.

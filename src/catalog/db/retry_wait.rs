@@ -8,8 +8,8 @@ use tokio::sync::Notify;
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::query::no_reply;
-use crate::failpoint;
-use crate::platform::sleep_active;
+use mocban_system::failpoint;
+use mocban_system::platform::sleep_active;
 
 /// First wait before another attempt.
 const FIRST_WAIT: Duration = Duration::from_millis(100);

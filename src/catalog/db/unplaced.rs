@@ -12,7 +12,7 @@ use tempfile::TempPath;
 
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::lock_owner::sidecar;
-use crate::platform::{let_all_read, open_folder, sync_file, sync_names};
+use mocban_system::platform::{let_all_read, open_folder, sync_file, sync_names};
 
 /// A catalog file under a hidden name. The file is removed when this value is dropped.
 #[derive(Debug)]

@@ -11,10 +11,10 @@ use crate::catalog::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{
     ContentHash, JobStatus, MetricOutcome, PairId, Stage, ThresholdMetric, UnixMillis, WorkerId,
 };
+use mocban_system::failpoint::{self, Point};
 
 /// A lease, and the finished stages to store under it, in the order they were computed.
 pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);

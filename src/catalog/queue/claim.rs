@@ -10,8 +10,8 @@ use crate::catalog::db::script::{Script, Statement};
 use crate::catalog::queue::counters::{Cursor, Deltas, cursor};
 use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::catalog::queue::selection::PairSelection;
-use crate::failpoint::{self, Point};
 use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId};
+use mocban_system::failpoint::{self, Point};
 
 /// Which pairs a worker wants to lease.
 #[derive(Debug, Clone)]

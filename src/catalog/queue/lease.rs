@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use crate::catalog::db::row::from_row;
 use crate::catalog::queue::counters::{CounterKey, cursor};
-use crate::failpoint;
 use mocban_core::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, Stage, UnixMillis,
     WorkerId,
 };
+use mocban_system::failpoint;
 
 /// The right to run stages of one pair. A claim creates the lease, and a checkpoint continues it. Results and failures
 /// of stages are stored only under a valid lease.

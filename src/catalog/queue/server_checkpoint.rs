@@ -13,7 +13,7 @@ use crate::catalog::db::query::limited;
 use crate::catalog::db::row::{FromRow as _, Row};
 use crate::catalog::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
 use crate::catalog::queue::lease::{FencedRow, InputVersion, MetricResult, StageCheckpoint};
-use crate::failpoint::{self, Point};
+use mocban_system::failpoint::{self, Point};
 
 column_arrays! {
     /// A job to advance.

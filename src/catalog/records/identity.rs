@@ -7,8 +7,8 @@ use crate::catalog::Catalog;
 use crate::catalog::db::conn::Conn;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::query::query_scalar;
-use crate::platform::{canonicalize, generation, host_name};
 use mocban_core::domain::{ArtifactRef, ArtifactSet, CatalogIdentity, UNKNOWN_SERVER};
+use mocban_system::platform::{canonicalize, generation, host_name};
 
 const ID: &str = "SELECT id FROM catalog_identity";
 

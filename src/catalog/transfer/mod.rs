@@ -16,8 +16,8 @@ use crate::catalog::db::conn::{Conn, Held};
 use crate::catalog::db::postgres_address::PostgresAddress;
 use crate::catalog::db::query::{query, query_scalar};
 use crate::catalog::{Catalog, CatalogError, NewCatalog, Result};
-use crate::platform::stat;
 use mocban_core::domain::ContentHash;
+use mocban_system::platform::stat;
 
 /// The key that a copy takes over from its original.
 const KEY: &str = "SELECT key FROM review_key";

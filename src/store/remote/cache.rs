@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 use super::bucket::Bucket;
 use super::bucket_error::BucketError;
 use super::cache_files;
-use crate::platform::rename;
 use mocban_core::domain::ContentHash;
+use mocban_system::platform::rename;
 
 /// The store is not asked again whether an object has changed within this time.
 const FRESH: Duration = Duration::from_mins(1);

@@ -6,7 +6,7 @@ use std::time::Duration;
 use object_store::aws::AmazonS3Builder;
 use object_store::{BackoffConfig, ClientOptions, ObjectStore, RetryConfig};
 
-use crate::failpoint;
+use mocban_system::failpoint;
 
 /// Longest time to open a connection.
 const CONNECT: Duration = Duration::from_secs(10);

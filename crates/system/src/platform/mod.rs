@@ -13,44 +13,44 @@ mod unix;
 )]
 mod windows;
 
-pub(crate) use active_time::{ActiveClock, sleep_active, timeout_active};
+pub use active_time::{ActiveClock, sleep_active, timeout_active};
 #[cfg(unix)]
-pub(crate) use unix::*;
+pub use unix::*;
 #[cfg(windows)]
-pub(crate) use windows::*;
+pub use windows::*;
 
 /// Identifies a file or folder on this machine as long as it exists: device and inode, or volume and file index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct FileId {
+pub struct FileId {
     device: u64,
     inode: u64,
 }
 
 /// Identity and length of a file or folder.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FileStat {
+pub struct FileStat {
     /// Its identity.
-    pub(crate) id: FileId,
+    pub id: FileId,
     /// Its length in bytes.
-    pub(crate) len: u64,
+    pub len: u64,
 }
 
 /// Memory of this process in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ProcessMemory {
+pub struct ProcessMemory {
     /// Memory now.
-    pub(crate) resident: u64,
+    pub resident: u64,
     /// Largest memory so far.
-    pub(crate) peak: u64,
+    pub peak: u64,
 }
 
 /// Device and inode of a file as Linux's tables in `/proc` show them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct DeviceNumber {
+pub struct DeviceNumber {
     /// Major number of the device.
-    pub(crate) major: u32,
+    pub major: u32,
     /// Minor number of the device.
-    pub(crate) minor: u32,
+    pub minor: u32,
     /// The inode.
-    pub(crate) inode: u64,
+    pub inode: u64,
 }

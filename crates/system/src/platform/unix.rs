@@ -31,7 +31,7 @@ fn stat_of(meta: &Metadata) -> FileStat {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
+pub fn stat(path: &Path) -> io::Result<FileStat> {
     std::fs::metadata(path).map(|meta| stat_of(&meta))
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
+pub fn stat_link(path: &Path) -> io::Result<FileStat> {
     std::fs::symlink_metadata(path).map(|meta| stat_of(&meta))
 }
 
@@ -47,18 +47,18 @@ pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
 ///
 /// # Errors
 /// Returns an error if the system does not give them.
-pub(crate) fn stat_open(file: &File) -> io::Result<FileStat> {
+pub fn stat_open(file: &File) -> io::Result<FileStat> {
     file.metadata().map(|meta| stat_of(&meta))
 }
 
 /// Returns a number that changes if another file replaces this one at its path: the inode.
-pub(crate) fn generation(meta: &Metadata) -> u64 {
+pub fn generation(meta: &Metadata) -> u64 {
     meta.ino()
 }
 
 /// Returns device and inode of a file as `/proc` shows them, or `None` on other systems than Linux.
 #[cfg(target_os = "linux")]
-pub(crate) fn device_number(path: &Path) -> Option<DeviceNumber> {
+pub fn device_number(path: &Path) -> Option<DeviceNumber> {
     let meta = std::fs::metadata(path).ok()?;
     Some(DeviceNumber {
         major: rustix::fs::major(meta.dev()),
@@ -68,24 +68,24 @@ pub(crate) fn device_number(path: &Path) -> Option<DeviceNumber> {
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn device_number(_path: &Path) -> Option<DeviceNumber> {
+pub fn device_number(_path: &Path) -> Option<DeviceNumber> {
     None
 }
 
 /// Returns the number of a folder's file system (`f_type` of statfs(2)), or `None` on other systems than Linux.
 #[cfg(target_os = "linux")]
-pub(crate) fn file_system_magic(folder: &Path) -> Option<u64> {
+pub fn file_system_magic(folder: &Path) -> Option<u64> {
     let magic = rustix::fs::statfs(folder).ok()?.f_type;
     Some(u64::try_from(magic).ok()? & 0xffff_ffff)
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn file_system_magic(_folder: &Path) -> Option<u64> {
+pub fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
 /// Returns `false`: only Windows names the shares of other machines in paths.
-pub(crate) const fn is_share(_folder: &Path) -> bool {
+pub const fn is_share(_folder: &Path) -> bool {
     false
 }
 
@@ -93,7 +93,7 @@ pub(crate) const fn is_share(_folder: &Path) -> bool {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
+pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
     std::fs::canonicalize(path)
 }
 
@@ -101,7 +101,7 @@ pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened.
-pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
+pub fn open_without_waiting(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true);
     let without_waiting = OFlags::NONBLOCK | OFlags::NOCTTY;
@@ -113,17 +113,17 @@ pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// Returns an error if the system refuses it.
-pub(crate) fn let_reads_wait(file: &File) -> io::Result<()> {
+pub fn let_reads_wait(file: &File) -> io::Result<()> {
     Ok(fcntl_setfl(file, OFlags::empty())?)
 }
 
 /// Returns whether an entry is a pipe with a name.
-pub(crate) fn is_pipe(file_type: FileType) -> bool {
+pub fn is_pipe(file_type: FileType) -> bool {
     file_type.is_fifo()
 }
 
 /// Returns whether an entry is a socket.
-pub(crate) fn is_socket(file_type: FileType) -> bool {
+pub fn is_socket(file_type: FileType) -> bool {
     file_type.is_socket()
 }
 
@@ -131,7 +131,7 @@ pub(crate) fn is_socket(file_type: FileType) -> bool {
 ///
 /// # Errors
 /// Returns an error if the folder cannot be opened.
-pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
+pub fn open_folder(folder: &Path) -> io::Result<File> {
     File::open(folder)
 }
 
@@ -139,7 +139,7 @@ pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// Returns an error if the disk fails.
-pub(crate) fn sync_names(folder: &File) -> io::Result<()> {
+pub fn sync_names(folder: &File) -> io::Result<()> {
     folder.sync_all()
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn sync_names(folder: &File) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened or the disk fails.
-pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
+pub fn sync_file(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
@@ -156,12 +156,12 @@ pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
 /// # Errors
 /// Returns an error if the folder cannot be opened or the disk fails.
 #[cfg(target_os = "linux")]
-pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+pub fn sync_tree(folder: &Path) -> io::Result<()> {
     Ok(rustix::fs::syncfs(File::open(folder)?)?)
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+pub fn sync_tree(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
@@ -169,34 +169,34 @@ pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if the system refuses it.
-pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     std::fs::rename(from, to)
 }
 
 /// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
 #[cfg(target_os = "linux")]
-pub(crate) fn exchange(one: &Path, other: &Path) -> bool {
+pub fn exchange(one: &Path, other: &Path) -> bool {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok()
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(crate) fn exchange(_one: &Path, _other: &Path) -> bool {
+pub fn exchange(_one: &Path, _other: &Path) -> bool {
     false
 }
 
 /// Lets all users read the temporary files that a builder creates. By default, only their owner may.
-pub(crate) fn let_all_read(builder: &mut tempfile::Builder) {
+pub fn let_all_read(builder: &mut tempfile::Builder) {
     builder.permissions(Permissions::from_mode(0o644));
 }
 
 /// Returns the file name with these bytes of an `OsStr`, which must end at the end of a character.
-pub(crate) fn file_name_of(bytes: &[u8]) -> OsString {
+pub fn file_name_of(bytes: &[u8]) -> OsString {
     OsString::from_vec(bytes.to_vec())
 }
 
 /// Returns a path below a folder with slashes between its parts, so that all systems can read it.
-pub(crate) fn with_slashes(path: String) -> String {
+pub fn with_slashes(path: String) -> String {
     path
 }
 
@@ -204,12 +204,12 @@ pub(crate) fn with_slashes(path: String) -> String {
 ///
 /// # Errors
 /// Returns an error if the system refuses it.
-pub(crate) fn unlock(file: &File) -> io::Result<()> {
+pub fn unlock(file: &File) -> io::Result<()> {
     file.unlock()
 }
 
 /// Returns whether an error of a lock means that the file system has no locks.
-pub(crate) fn is_without_locks(error: &io::Error) -> bool {
+pub fn is_without_locks(error: &io::Error) -> bool {
     let codes = [
         Errno::NOTSUP,
         Errno::NOSYS,
@@ -221,12 +221,12 @@ pub(crate) fn is_without_locks(error: &io::Error) -> bool {
 }
 
 /// Returns whether this process has too many open files.
-pub(crate) fn is_out_of_files(error: &io::Error) -> bool {
+pub fn is_out_of_files(error: &io::Error) -> bool {
     is_code(error, Errno::MFILE)
 }
 
 /// Returns whether all processes together have too many open files.
-pub(crate) fn is_system_out_of_files(error: &io::Error) -> bool {
+pub fn is_system_out_of_files(error: &io::Error) -> bool {
     is_code(error, Errno::NFILE)
 }
 
@@ -235,18 +235,18 @@ fn is_code(error: &io::Error, code: Errno) -> bool {
 }
 
 /// Returns the number of files that this process may have open at the same time.
-pub(crate) fn max_open_files() -> u64 {
+pub fn max_open_files() -> u64 {
     getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
 }
 
 /// Returns the name of this machine.
-pub(crate) fn host_name() -> String {
+pub fn host_name() -> String {
     let system = rustix::system::uname();
     system.nodename().to_string_lossy().into_owned()
 }
 
 /// Returns the memory of this process (`proc_pid_status(5)`), or `None` on other systems than Linux.
-pub(crate) fn process_memory() -> Option<ProcessMemory> {
+pub fn process_memory() -> Option<ProcessMemory> {
     parse_memory(&std::fs::read_to_string("/proc/self/status").ok()?)
 }
 
@@ -267,7 +267,7 @@ fn parse_memory(status: &str) -> Option<ProcessMemory> {
 ///
 /// # Errors
 /// Returns an error if the system refuses to watch a signal.
-pub(crate) fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
+pub fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
     let is_ignored = IgnoredSignals::of_this_process().contains(SignalKind::hangup());
     let hang_up = (!is_ignored).then(|| signal(SignalKind::hangup()));
     let mut hang_up = hang_up.transpose()?;

@@ -37,7 +37,7 @@ fn open_for_stat(path: &Path, flags: u32) -> io::Result<File> {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
+pub fn stat(path: &Path) -> io::Result<FileStat> {
     stat_open(&open_for_stat(path, 0)?)
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn stat(path: &Path) -> io::Result<FileStat> {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
+pub fn stat_link(path: &Path) -> io::Result<FileStat> {
     stat_open(&open_for_stat(path, LINK_ITSELF)?)
 }
 
@@ -53,7 +53,7 @@ pub(crate) fn stat_link(path: &Path) -> io::Result<FileStat> {
 ///
 /// # Errors
 /// Returns an error if the system does not give them.
-pub(crate) fn stat_open(file: &File) -> io::Result<FileStat> {
+pub fn stat_open(file: &File) -> io::Result<FileStat> {
     let found = winapi_util::file::information(file)?;
     Ok(FileStat {
         id: FileId {
@@ -66,23 +66,23 @@ pub(crate) fn stat_open(file: &File) -> io::Result<FileStat> {
 
 /// Returns a number that changes if another file replaces this one at its path: the time of its creation, in steps of
 /// 100 ns. The file index is only known after the file was opened.
-pub(crate) fn generation(meta: &Metadata) -> u64 {
+pub fn generation(meta: &Metadata) -> u64 {
     meta.creation_time()
 }
 
 /// Returns `None`: Windows has no `/proc`.
-pub(crate) const fn device_number(_path: &Path) -> Option<DeviceNumber> {
+pub const fn device_number(_path: &Path) -> Option<DeviceNumber> {
     None
 }
 
 /// Returns `None`: Windows does not number its file systems.
-pub(crate) const fn file_system_magic(_folder: &Path) -> Option<u64> {
+pub const fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
 /// Returns whether a folder is on a share of another machine, as in `\\server\share`. The resolved path of a drive letter
 /// that stands for a share names the share.
-pub(crate) fn is_share(folder: &Path) -> bool {
+pub fn is_share(folder: &Path) -> bool {
     let whole = std::fs::canonicalize(folder).or_else(|_| std::path::absolute(folder));
     let first = whole
         .as_ref()
@@ -96,7 +96,7 @@ pub(crate) fn is_share(folder: &Path) -> bool {
 ///
 /// # Errors
 /// Returns an error if the path does not exist or may not be accessed.
-pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
+pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
     dunce::canonicalize(path)
 }
 
@@ -104,7 +104,7 @@ pub(crate) fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened.
-pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
+pub fn open_without_waiting(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
@@ -112,17 +112,17 @@ pub(crate) fn open_without_waiting(path: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// Returns no error.
-pub(crate) const fn let_reads_wait(_file: &File) -> io::Result<()> {
+pub const fn let_reads_wait(_file: &File) -> io::Result<()> {
     Ok(())
 }
 
 /// Returns `false`: pipes are not in folders.
-pub(crate) const fn is_pipe(_file_type: FileType) -> bool {
+pub const fn is_pipe(_file_type: FileType) -> bool {
     false
 }
 
 /// Returns `false`: sockets do not differ from files.
-pub(crate) const fn is_socket(_file_type: FileType) -> bool {
+pub const fn is_socket(_file_type: FileType) -> bool {
     false
 }
 
@@ -130,7 +130,7 @@ pub(crate) const fn is_socket(_file_type: FileType) -> bool {
 ///
 /// # Errors
 /// Returns an error if the folder cannot be opened.
-pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
+pub fn open_folder(folder: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).custom_flags(FOLDERS_TOO);
     options.open(folder)
@@ -141,7 +141,7 @@ pub(crate) fn open_folder(folder: &Path) -> io::Result<File> {
 ///
 /// # Errors
 /// Returns no error.
-pub(crate) const fn sync_names(_folder: &File) -> io::Result<()> {
+pub const fn sync_names(_folder: &File) -> io::Result<()> {
     Ok(())
 }
 
@@ -149,7 +149,7 @@ pub(crate) const fn sync_names(_folder: &File) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened or the disk fails.
-pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
+pub fn sync_file(path: &Path) -> io::Result<()> {
     OpenOptions::new().write(true).open(path)?.sync_all()
 }
 
@@ -157,7 +157,7 @@ pub(crate) fn sync_file(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if a file cannot be opened or the disk fails.
-pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
+pub fn sync_tree(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_type()?.is_dir() {
@@ -174,7 +174,7 @@ pub(crate) fn sync_tree(folder: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if the system refuses it.
-pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     for _ in 0..RENAME_ATTEMPTS {
         match std::fs::rename(from, to) {
             Err(error) if is_in_use(&error) => std::thread::sleep(RETRY_RENAME_AFTER),
@@ -192,20 +192,20 @@ fn is_in_use(error: &io::Error) -> bool {
 }
 
 /// Returns `false`: Windows cannot swap two folders.
-pub(crate) const fn exchange(_one: &Path, _other: &Path) -> bool {
+pub const fn exchange(_one: &Path, _other: &Path) -> bool {
     false
 }
 
 /// Does nothing: new files have the permissions of their folder.
-pub(crate) const fn let_all_read(_builder: &mut tempfile::Builder) {}
+pub const fn let_all_read(_builder: &mut tempfile::Builder) {}
 
 /// Returns the file name with these bytes of an `OsStr`, which must end at the end of a character.
-pub(crate) fn file_name_of(bytes: &[u8]) -> OsString {
+pub fn file_name_of(bytes: &[u8]) -> OsString {
     String::from_utf8_lossy(bytes).into_owned().into()
 }
 
 /// Returns a path below a folder with slashes between its parts, so that all systems can read it.
-pub(crate) fn with_slashes(path: String) -> String {
+pub fn with_slashes(path: String) -> String {
     path.replace('\\', "/")
 }
 
@@ -214,7 +214,7 @@ pub(crate) fn with_slashes(path: String) -> String {
 ///
 /// # Errors
 /// Returns an error if the system refuses it.
-pub(crate) fn unlock(file: &File) -> io::Result<()> {
+pub fn unlock(file: &File) -> io::Result<()> {
     match file.unlock() {
         Err(error) if error.raw_os_error() == Some(ERROR_LOCK_VIOLATION) => Ok(()),
         unlocked => unlocked,
@@ -222,7 +222,7 @@ pub(crate) fn unlock(file: &File) -> io::Result<()> {
 }
 
 /// Returns whether an error of a lock means that the file system has no locks.
-pub(crate) fn is_without_locks(error: &io::Error) -> bool {
+pub fn is_without_locks(error: &io::Error) -> bool {
     matches!(
         error.raw_os_error(),
         Some(ERROR_INVALID_FUNCTION | ERROR_NOT_SUPPORTED)
@@ -230,22 +230,22 @@ pub(crate) fn is_without_locks(error: &io::Error) -> bool {
 }
 
 /// Returns whether this process has too many open files.
-pub(crate) fn is_out_of_files(error: &io::Error) -> bool {
+pub fn is_out_of_files(error: &io::Error) -> bool {
     error.raw_os_error() == Some(ERROR_TOO_MANY_OPEN_FILES)
 }
 
 /// Returns `false`: Windows has no limit for all processes.
-pub(crate) const fn is_system_out_of_files(_error: &io::Error) -> bool {
+pub const fn is_system_out_of_files(_error: &io::Error) -> bool {
     false
 }
 
 /// Returns the largest number: Windows limits open files by memory only.
-pub(crate) const fn max_open_files() -> u64 {
+pub const fn max_open_files() -> u64 {
     u64::MAX
 }
 
 /// Returns the name of this machine, or an empty text if the system does not give it.
-pub(crate) fn host_name() -> String {
+pub fn host_name() -> String {
     use winapi_util::sysinfo::{ComputerNameKind, get_computer_name};
     let name = get_computer_name(ComputerNameKind::PhysicalDnsHostname);
     name.map_or_else(
@@ -255,7 +255,7 @@ pub(crate) fn host_name() -> String {
 }
 
 /// Returns `None`: the memory is not asked for.
-pub(crate) const fn process_memory() -> Option<ProcessMemory> {
+pub const fn process_memory() -> Option<ProcessMemory> {
     None
 }
 
@@ -264,7 +264,7 @@ pub(crate) const fn process_memory() -> Option<ProcessMemory> {
 ///
 /// # Errors
 /// Returns an error if the system refuses to watch them.
-pub(crate) fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
+pub fn watch_signals(on_signal: impl Fn() + Send + 'static) -> io::Result<JoinHandle<()>> {
     let (mut interrupt, mut end) = (ctrl_c()?, ctrl_break()?);
     let (mut close, mut shutdown) = (ctrl_close()?, ctrl_shutdown()?);
     Ok(tokio::spawn(async move {

@@ -9,7 +9,7 @@ const PARTS: u32 = 8;
 const LONGEST_PART: Duration = Duration::from_millis(500);
 
 /// Waits until this process has run for as long as `limit`.
-pub(crate) async fn sleep_active(limit: Duration) {
+pub async fn sleep_active(limit: Duration) {
     let part = (limit / PARTS).min(LONGEST_PART);
     let mut left = limit;
     while !left.is_zero() {
@@ -20,10 +20,7 @@ pub(crate) async fn sleep_active(limit: Duration) {
 }
 
 /// Waits for a future, but only while this process runs for at most `limit`. Returns `None` if the limit was reached first.
-pub(crate) async fn timeout_active<T>(
-    limit: Duration,
-    future: impl Future<Output = T>,
-) -> Option<T> {
+pub async fn timeout_active<T>(limit: Duration, future: impl Future<Output = T>) -> Option<T> {
     tokio::select! {
         biased;
         output = future => Some(output),
@@ -34,7 +31,7 @@ pub(crate) async fn timeout_active<T>(
 /// Measures for how long this process has run. It must be read often: a longer time between two readings than
 /// `longest_gap` counts as `longest_gap`.
 #[derive(Debug)]
-pub(crate) struct ActiveClock {
+pub struct ActiveClock {
     longest_gap: Duration,
     active: Duration,
     read_at: Instant,
@@ -42,7 +39,7 @@ pub(crate) struct ActiveClock {
 
 impl ActiveClock {
     /// Starts at 0.
-    pub(crate) fn start(longest_gap: Duration) -> Self {
+    pub fn start(longest_gap: Duration) -> Self {
         Self {
             longest_gap,
             active: Duration::ZERO,
@@ -51,8 +48,8 @@ impl ActiveClock {
     }
 
     /// Continues from a time.
-    #[cfg(test)]
-    pub(crate) fn continued(longest_gap: Duration, active: Duration) -> Self {
+    #[cfg(any(test, feature = "test-helpers"))]
+    pub fn continued(longest_gap: Duration, active: Duration) -> Self {
         Self {
             active,
             ..Self::start(longest_gap)
@@ -60,7 +57,7 @@ impl ActiveClock {
     }
 
     /// Returns the time since the start, without suspensions.
-    pub(crate) fn now(&mut self) -> Duration {
+    pub fn now(&mut self) -> Duration {
         self.advance_to(Instant::now())
     }
 

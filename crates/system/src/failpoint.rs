@@ -20,7 +20,7 @@ use std::fmt::Display;
 
 /// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Point {
+pub enum Point {
     /// The claim is written but not committed. In PostgreSQL, it is committed and its reply is not used yet. `@PAIR` never
     /// matches here.
     Claiming,
@@ -40,7 +40,7 @@ pub(crate) enum Point {
 
 /// Dies, stops, waits or panics here if a test requests it.
 #[cfg(debug_assertions)]
-pub(crate) fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>) {
+pub fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>) {
     let is_at = |failpoint: &Option<test_build::Failpoint>| {
         let failpoint = failpoint.as_ref();
         failpoint.is_some_and(|failpoint| failpoint.fires(&stage, point, name))
@@ -60,10 +60,10 @@ pub(crate) fn hit(stage: impl Display, point: Point, name: Option<&dyn Display>)
 
 /// Does nothing in a release build.
 #[cfg(not(debug_assertions))]
-pub(crate) fn hit(_stage: impl Display, _point: Point, _name: Option<&dyn Display>) {}
+pub fn hit(_stage: impl Display, _point: Point, _name: Option<&dyn Display>) {}
 
 /// Returns the divisor of time limits that a variable of the environment sets for tests, or 1.
-pub(crate) fn time_scale(variable: &str) -> u32 {
+pub fn time_scale(variable: &str) -> u32 {
     let scale = cfg!(debug_assertions)
         .then(|| std::env::var(variable).ok()?.parse().ok())
         .flatten();
