@@ -13,7 +13,7 @@
 //!
 //! Read these files in order to follow a pair through the program:
 //!
-//! 1. `src/manifest/csv.rs`: parses the rows of a manifest
+//! 1. `crates/lists/src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs in one transaction
 //! 3. `src/runner/run.rs`: starts a run: takes the lock, registers this process as a worker, recovers jobs of dead
 //!    workers, stores which inputs changed, requeues stale pairs, ends back-offs that are due
@@ -269,9 +269,7 @@ pub mod config;
 pub mod demo;
 pub mod documentation;
 pub mod export;
-pub mod labels;
 pub mod local_server;
-pub mod manifest;
 #[cfg(test)]
 #[path = "../tests/support/postgres_server.rs"]
 mod postgres_server;
@@ -282,3 +280,4 @@ pub mod stages;
 pub mod store;
 pub mod view;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
+pub use mocban_lists::{labels, manifest};

@@ -12,7 +12,7 @@ use super::exit::Refusal;
 use super::files::refuse_project_file;
 use super::global::{Global, LogFormat};
 use super::screen::{Palette, Screen};
-use crate::manifest::is_named_like_input;
+use mocban_lists::manifest::is_named_like_input;
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {

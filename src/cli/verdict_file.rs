@@ -9,8 +9,8 @@ use super::files::RefusedLine;
 use super::time_text::parse_utc;
 use crate::catalog::{NewVerdict, ReviewContext};
 use crate::config::hint;
-use crate::manifest::{LineCounter, as_utf8, delimiter};
 use mocban_core::domain::{ContentHash, PairName, UnixMillis};
+use mocban_lists::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 7] = [
     "pair", "verdict", "reviewer", "metric", "reason", "note", "at",

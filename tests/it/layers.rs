@@ -17,7 +17,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
 ];
 
 /// Crates without files, processes, clocks and async code.
-const PURE_CRATES: &[&str] = &["core"];
+const PURE_CRATES: &[&str] = &["core", "lists"];
 const IMPURE: &[&str] = &[
     "tokio::",
     "std::fs",

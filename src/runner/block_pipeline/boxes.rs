@@ -10,9 +10,9 @@ use crate::block::{
     find_boxes, place_characters,
 };
 use crate::catalog::Catalog;
-use crate::labels::{self, PageFile, reading_order};
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_core::domain::{BlockStage, FailureClass};
+use mocban_lists::labels::{self, PageFile, reading_order};
 
 /// Boxes on a page, and where they come from.
 struct PageBoxes {

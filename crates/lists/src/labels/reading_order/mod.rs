@@ -38,7 +38,7 @@ use mocban_core::domain::BoxName;
 /// Coordinates that are not finite count as 0.
 ///
 /// ```
-/// use mocban::labels::reading_order;
+/// use mocban_lists::labels::reading_order;
 ///
 /// let boxes = [[0.0, 0.0, 9.0, 9.0], [12.0, 0.0, 21.0, 9.0], [12.0, 11.0, 21.0, 20.0]];
 /// let names: Vec<String> = reading_order(&boxes).iter().map(ToString::to_string).collect();

@@ -1,0 +1,10 @@
+//! What people hand in: lists of pairs and blocks, and boxes of characters on a page.
+//!
+//! - [`manifest`]: rows of CSV, JSON Lines and folders become drafts of pairs and blocks
+//! - [`labels`]: readers of eight formats of boxes, writers of VIA and COCO, names in reading order
+//!
+//! **Invariant:** a row or label is either understood or refused with its line and the reason. Nothing is guessed in
+//! silence, and no file is opened here.
+
+pub mod labels;
+pub mod manifest;
