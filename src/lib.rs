@@ -29,7 +29,7 @@
 //!     `normalize/mod.rs` (ink of the print, heights of tops and ground) and `register/mod.rs` (pose, thresholds,
 //!     stroke maps, scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
-//! 12. `src/store/artifacts.rs`: writes artifact files by content hash
+//! 12. `crates/store/src/artifacts.rs`: writes artifact files by content hash
 //! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
 //!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
 //!     turns by SQLite's lock (`busy_retry.rs`)
@@ -277,7 +277,7 @@ pub mod report;
 pub mod review;
 pub mod runner;
 pub mod stages;
-pub mod store;
 pub mod view;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_lists::{labels, manifest};
+pub use mocban_store as store;

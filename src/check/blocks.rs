@@ -5,8 +5,8 @@ use super::finding::{Finding, Kind};
 use super::pairs::kind_of;
 use crate::catalog::AuditedBlock;
 use crate::runner::result_hash;
-use crate::store::{ArtifactError, Project};
 use mocban_core::domain::{BlockId, BlockStage};
+use mocban_store::{ArtifactError, Project};
 
 /// Result of the check of one block.
 #[derive(Debug)]

@@ -22,9 +22,9 @@ use crate::catalog::{
     SetApart,
 };
 use crate::runner::{RunError, claim_artifacts};
-use crate::store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use damaged_jobs::{DamagedJobs, repair_jobs};
 use mocban_core::domain::{BlockId, BlockStage, UnixMillis};
+use mocban_store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
 /// Number of pairs in memory at a time.

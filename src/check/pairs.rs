@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use super::finding::{Finding, Kind};
 use crate::catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
 use crate::runner::{metric_results, result_hash};
-use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
     ThresholdMetric,
 };
+use mocban_store::{ArtifactError, InputError, Project, hash_input, stat_input};
 
 /// Largest relative difference between a number and its copy in a column.
 const ROUNDING: f64 = 1e-12;

@@ -15,7 +15,7 @@ use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
-use crate::store::{
+use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
 };
 use mocban_system::platform::stat;

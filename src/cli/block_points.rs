@@ -5,9 +5,9 @@ use tokio::runtime::Handle;
 use super::context::Context;
 use crate::catalog::{Catalog, ControlPointsChange};
 use crate::export::block_view::{BlockCorrection, replaced_file};
-use crate::store::Project;
 use crate::view::{CorrectionStore, PointsSaved};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
+use mocban_store::Project;
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
 /// open does not hold it.

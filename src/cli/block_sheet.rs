@@ -12,9 +12,9 @@ use super::select;
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::export::block_view::{BlockView, BlockViewError};
-use crate::store::Project;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
+use mocban_store::Project;
 
 /// What to draw of a block, and where to.
 #[derive(Debug)]

@@ -19,8 +19,8 @@ use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
 use crate::runner::{self, RunError};
-use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
 use mocban_core::domain::one_line;
+use mocban_store::{CATALOG_FILE, LockError, Project, RunLock};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]

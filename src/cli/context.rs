@@ -17,8 +17,8 @@ use super::table::count;
 use crate::catalog::{Catalog, SetApart};
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use crate::runner;
-use crate::store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 use mocban_core::domain::{UnixMillis, has_password, is_hidden};
+use mocban_store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;

@@ -13,8 +13,8 @@ use super::exit::{ExitCode, Refusal};
 use super::table::{columns, count};
 use crate::catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
 use crate::runner;
-use crate::store::{Project, SETTINGS_FILE};
 use mocban_core::domain::is_address;
+use mocban_store::{Project, SETTINGS_FILE};
 
 /// Arguments of `copy`.
 #[derive(Debug, Args)]

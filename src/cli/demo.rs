@@ -25,8 +25,8 @@ use crate::config::{Origin, Tree};
 use crate::demo::block::{BlockKind, BlockOptions};
 use crate::demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
 use crate::runner::{Stop, StopLevel};
-use crate::store::{SETTINGS_FILE, TargetLock, write_atomic};
 use mocban_core::domain::JobStatus;
+use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
 /// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.
 const SPACING_MM: RangeInclusive<f64> = 0.05..=2.0;

@@ -10,7 +10,7 @@ use super::{files, signals};
 use crate::demo::block::{BlockOptions, block_options};
 use crate::demo::{DatasetError, DemoOptions};
 use crate::runner::Stop;
-use crate::store::{CATALOG_FILE, ReplacementFolder};
+use mocban_store::{CATALOG_FILE, ReplacementFolder};
 
 const NOTE: &str = "README.txt";
 const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their prints, with the true \

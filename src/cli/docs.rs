@@ -9,7 +9,7 @@ use clap::Args;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use crate::documentation::web_files;
-use crate::store::ReplacementFolder;
+use mocban_store::ReplacementFolder;
 
 /// The first page.
 const INDEX: &str = "index.html";

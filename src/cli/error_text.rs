@@ -9,7 +9,7 @@ use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_ow
 use crate::config::ConfigError;
 use crate::export::FolderError;
 use crate::runner::RunError;
-use crate::store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
+use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 use mocban_system::platform;
 
 /// Returns the exit code of an error.

@@ -10,10 +10,10 @@ use super::exit::Refusal;
 use crate::catalog::Catalog;
 use crate::config::Config;
 use crate::export::InputFileLimits;
-use crate::store::{
+use mocban_core::domain::sanitize;
+use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
-use mocban_core::domain::sanitize;
 
 /// Longest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 512 << 20;

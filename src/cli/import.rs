@@ -20,9 +20,9 @@ use super::new_project::import_with;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
-use crate::store::Project;
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
+use mocban_store::Project;
 
 /// Maximum number of rows of a chunk that is sent to the catalog, and of the chunks that may wait there.
 const CHUNK_ROWS: usize = 2_000;

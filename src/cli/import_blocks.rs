@@ -13,9 +13,9 @@ use super::missing_files::MissingFiles;
 use super::new_project::import_with;
 use super::table::count;
 use crate::catalog::{BlockAttributes, BlockImportSummary};
-use crate::store::Project;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 use mocban_lists::manifest::{BlockRow, is_block_list, parse_blocks};
+use mocban_store::Project;
 
 /// What an import of blocks changed.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use clap::{Args, Command};
 
 use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
-use crate::store::{StagingFolder, rename_into_place};
+use mocban_store::{StagingFolder, rename_into_place};
 
 /// Arguments of `man`.
 #[derive(Debug, Args)]

@@ -7,11 +7,11 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
-use crate::store::Project;
 use mocban_core::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use mocban_lists::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
 };
+use mocban_store::Project;
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]

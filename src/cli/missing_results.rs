@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::store::Project;
 use mocban_core::domain::JobStatus;
+use mocban_store::Project;
 
 /// Explains what is missing and what to do, for `status` and `run`.
 pub(super) const TEXT: &str = "the depth maps and masks of the results are not here; if their disk is not mounted, mount it; once the scans and prints are in place, `check --repair --accept-missing` lets the next run compute them again; if they are in another folder, restore the backup into a new folder with `--inputs DIR`";

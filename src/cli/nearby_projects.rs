@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::input_paths::plain_letters;
 use crate::config::nearest;
-use crate::store::CATALOG_FILE;
+use mocban_store::CATALOG_FILE;
 
 /// Largest number of entries of a folder that are read.
 const MAX_ENTRIES: usize = 1000;
@@ -57,7 +57,7 @@ fn projects_in(folder: &Path) -> Vec<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::nearby_projects;
-    use crate::store::CATALOG_FILE;
+    use mocban_store::CATALOG_FILE;
 
     #[test]
     fn projects_with_a_similar_name_or_below_are_found() {

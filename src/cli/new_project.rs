@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::catalog::{Catalog, CatalogError, NewCatalog};
-use crate::store::Project;
+use mocban_store::Project;
 
 /// Returns the missing directories of a path, the deepest first.
 fn missing_dirs(dir: &Path) -> Vec<PathBuf> {

@@ -18,7 +18,7 @@ use crate::report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
     summary,
 };
-use crate::store::Project;
+use mocban_store::Project;
 
 /// Seed of the random choice of images; the HTML page states it.
 const IMAGE_SEED: u64 = 1;

@@ -15,7 +15,7 @@ use super::files::{self, is_backup, metadata};
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::config::{LocalSettings, make_local};
-use crate::store::{
+use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
 };
 

@@ -15,8 +15,8 @@ use super::{missing_results, select, signals};
 use crate::catalog::{Catalog, RerunPolicy};
 use crate::config::Config;
 use crate::runner::{self, RunOptions, RunPart, RunPlan, RunSummary, Stop};
-use crate::store::Project;
 use mocban_core::domain::Stage;
+use mocban_store::Project;
 
 /// Arguments of `run`.
 #[derive(Debug, Default, Args)]

@@ -18,10 +18,10 @@ use super::verdict;
 use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use crate::report::ManualCorrection;
 use crate::runner::{self, NamedWork};
-use crate::store::Project;
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
+use mocban_store::Project;
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]

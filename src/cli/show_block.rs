@@ -11,8 +11,8 @@ use super::show_text::state_name;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
-use crate::store::Project;
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_store::Project;
 
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;

@@ -7,11 +7,11 @@ use super::table::columns;
 use super::time_text::{duration, local};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::report::ManualCorrection;
-use crate::store::Project;
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,
 };
+use mocban_store::Project;
 
 /// One pair, its project and the colours.
 pub(super) struct PairPage<'a> {

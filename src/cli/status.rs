@@ -17,8 +17,8 @@ use super::status_hosts;
 use super::table::{columns, count};
 use crate::catalog::{Catalog, StageCounts, StatusCounts};
 use crate::runner;
-use crate::store::Project;
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]

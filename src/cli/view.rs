@@ -17,10 +17,10 @@ use crate::catalog::Catalog;
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
 use crate::runner::{Stop, StopLevel};
-use crate::store::Project;
 use crate::view::{self, ViewServer};
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
+use mocban_store::Project;
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]

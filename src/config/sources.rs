@@ -7,8 +7,8 @@ use toml::{Table, Value};
 
 use super::error::{ConfigError, Origin, hint, quote};
 use super::tree::Tree;
-use crate::store::read_file_or_pipe;
 use mocban_core::domain::enum_names;
+use mocban_store::read_file_or_pipe;
 use mocban_system::platform::is_pipe;
 
 /// Settings that come with the program.

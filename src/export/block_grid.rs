@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::block_view::{BlockViewError, RegisteredFace};
 use crate::block::{CarvedFace, Support};
-use crate::store::Project;
 use mocban_core::domain::LengthUnit;
+use mocban_store::Project;
 
 /// Spacing of the places at which a cell of the grid is searched for scanned surface, mm.
 const PROBE_MM: f64 = 1.0;

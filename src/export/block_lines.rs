@@ -14,8 +14,8 @@ use super::exporter_error::ExportError;
 use super::record::RecordStatus;
 use super::record_fields::{BLOCK_FIELDS, markdown_table, schema_of};
 use crate::catalog::{BlockDetail, Catalog, CatalogError};
-use crate::store::Project;
 use mocban_core::domain::{BlockName, BlockSide, BlockStage, FailureClass, LengthUnit};
+use mocban_store::Project;
 
 /// The file, with its meaning.
 pub(super) const BLOCKS_FILE: [&str; 2] = [

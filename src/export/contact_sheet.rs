@@ -11,9 +11,9 @@ use crate::report::ground_truth::TruthErrors;
 use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::{Consensus, evaluate_pairs};
-use crate::store::Project;
 use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::ImageLimits;
+use mocban_store::Project;
 
 /// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, MANIFEST};
-use crate::store::{Leftover, ReplaceError, ReplacementFolder};
+use mocban_store::{Leftover, ReplaceError, ReplacementFolder};
 
 /// An export that is written next to its target and then replaces the target.
 #[derive(Debug)]

@@ -24,8 +24,8 @@ use super::readme;
 use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
 use crate::catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
-use crate::store::Project;
 use mocban_core::domain::{BlockName, PairName};
+use mocban_store::Project;
 
 /// Pairs whose rows are in memory at a time.
 const PAGE: usize = 32;

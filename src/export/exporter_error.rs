@@ -2,7 +2,7 @@
 
 use super::export_folder::FolderError;
 use crate::catalog::CatalogError;
-use crate::store::ArtifactError;
+use mocban_store::ArtifactError;
 
 /// Why nothing was exported.
 #[derive(Debug, thiserror::Error)]

@@ -11,9 +11,9 @@ use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::format_number;
 use crate::report::pair_artifacts::group_identical;
 use crate::report::{Consensus, TruthEvaluation};
-use crate::store::Project;
 use mocban_core::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use mocban_core::raster::{ImageLimits, jpeg_rgb8};
+use mocban_store::Project;
 
 /// Longest side of an image, pixels.
 const SIDE: usize = 280;

@@ -9,10 +9,10 @@ use super::export_folder::{FolderError, write_below};
 use super::exporter_error::ExportError;
 use super::source_print::SourcePrint;
 use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
-use crate::store::Project;
 use mocban_core::domain::BlockCharacterState;
 use mocban_core::raster::ImageLimits;
 use mocban_lists::labels::{LabelBox, PageFile, write_coco, write_via};
+use mocban_store::Project;
 
 /// The files with their meanings.
 pub(super) const PAGE_FILES: [[&str; 2]; 3] = [

@@ -9,13 +9,13 @@ use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
-use crate::store::{InputError, Project, open_input};
 use mocban_core::domain::artifact_role::DEPTH;
 use mocban_core::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
 use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb,
 };
+use mocban_store::{InputError, Project, open_input};
 
 /// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.
 #[derive(Debug, thiserror::Error)]

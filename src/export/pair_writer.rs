@@ -12,8 +12,8 @@ use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
 use crate::catalog::{CutOrigin, MetricRecord, PairResults};
 use crate::report::pair_artifacts::PairArtifacts;
-use crate::store::Project;
 use mocban_core::domain::{Affine2, Failure, FailureClass};
+use mocban_store::Project;
 
 /// One format of an export.
 pub(super) struct FormatOutput {

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use super::pictures::{PrintView, Rgb, eight_bits};
 use crate::catalog::PairResults;
 use crate::report::pair_artifacts::PairArtifacts;
-use crate::store::{InputError, InputFile, Project, read_input};
 use mocban_core::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use mocban_core::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
+use mocban_store::{InputError, InputFile, Project, read_input};
 
 /// Why a print cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use super::model::Report;
 use super::report_error::ReportError;
 use super::truth_evaluation::{TruthEvaluation, evaluate_pairs};
 use crate::catalog::{Catalog, PairResults, SetApart};
-use crate::store::Project;
+use mocban_store::Project;
 
 /// Pairs in memory at a time.
 pub(super) const PAIRS_PER_PAGE: usize = 256;

@@ -8,8 +8,8 @@ use super::ground_truth::MAX_ANGLE_DEG;
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use super::stats::{Rate, median, quantile};
 use crate::catalog::{PairResults, StoredAlignment};
-use crate::store::Project;
 use mocban_core::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
+use mocban_store::Project;
 
 /// One metric's errors against manual alignments.
 #[derive(Debug, Clone, PartialEq, Serialize)]

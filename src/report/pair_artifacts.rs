@@ -3,13 +3,13 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{MetricRecord, PairResults, StageRecord};
-use crate::store::{self, Project};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use mocban_core::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
     RegisterOutcome, Stage,
 };
 use mocban_core::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
+use mocban_store::Project;
 
 /// Value of ink or strokes in a stored mask.
 const INK: u8 = 255;
@@ -38,7 +38,7 @@ pub enum PairArtifactsError {
     },
     /// The artifact cannot be read.
     #[error(transparent)]
-    Store(#[from] store::ArtifactError),
+    Store(#[from] mocban_store::ArtifactError),
     /// The artifact is not a valid image.
     #[error("{role}: {source}")]
     Image {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::ground_truth::{TruthError, TruthErrors, TruthRecord};
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError, group_identical};
 use crate::catalog::PairResults;
-use crate::store::{Project, read_input};
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
 use mocban_core::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
+use mocban_store::{Project, read_input};
 
 /// Value of pixels in a tops mask that are a true stroke top.
 const TOP: u8 = 255;

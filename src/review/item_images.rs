@@ -21,9 +21,9 @@ use crate::local_server::WorkThread;
 use crate::report::pair_artifacts::PairArtifacts;
 use crate::stages::normalize::PrintMasks;
 use crate::stages::register::StrokeMap;
-use crate::store::Project;
 use mocban_core::domain::{Affine2, Stage};
 use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
+use mocban_store::Project;
 
 /// Longer side of an image in pixels.
 pub(super) const IMAGE_SIDE: usize = 640;

@@ -11,8 +11,8 @@ use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::local_server::{WorkFailed, WorkThread};
 use crate::report::consensus::{is_disputed, partition_verdicts};
 use crate::report::pair_artifacts::{PairArtifacts, group_identical};
-use crate::store::Project;
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
+use mocban_store::Project;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;

@@ -12,7 +12,7 @@ use super::routes;
 use super::state::ServerState;
 use crate::catalog::{Catalog, CatalogError};
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
-use crate::store::Project;
+use mocban_store::Project;
 
 /// Why the server cannot start or run.
 #[derive(Debug, thiserror::Error)]

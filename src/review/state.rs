@@ -9,7 +9,7 @@ use super::options::ReviewOptions;
 use super::review_queue::{QueueError, ReviewQueue};
 use crate::catalog::Catalog;
 use crate::local_server::{AccessControl, WorkThread};
-use crate::store::Project;
+use mocban_store::Project;
 
 /// State of one reviewer's server.
 #[derive(Debug)]

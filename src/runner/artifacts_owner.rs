@@ -3,7 +3,7 @@
 use super::compute_thread::run_blocking;
 use super::error::RunError;
 use crate::catalog::Catalog;
-use crate::store::Project;
+use mocban_store::Project;
 
 /// Results whose files are looked for in a place without the name of an owner.
 const SAMPLES: usize = 20;

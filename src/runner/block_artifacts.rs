@@ -3,10 +3,10 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::block_stages::{BlockArtifacts, BlockStageError};
-use crate::store::{ArtifactError, NewArtifact, Project};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, Failure, FailureClass,
 };
+use mocban_store::{ArtifactError, NewArtifact, Project};
 use mocban_system::failpoint::{self, Point};
 
 /// The artifacts of a stage in progress. In an object store, they are one pack, except for the meshes and prints of

@@ -17,8 +17,8 @@ use crate::catalog::{
     BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
     NewCharacter,
 };
-use crate::store::{Project, stat_input};
 use mocban_core::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
+use mocban_store::{Project, stat_input};
 use mocban_system::failpoint::{self, Point};
 
 /// Calls an idempotent operation again while the database server is unavailable.

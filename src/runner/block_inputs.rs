@@ -8,8 +8,8 @@ use super::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::catalog::{
     BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
 };
-use crate::store::{Input, InputError, Project, hash_input, stat_input};
 use mocban_core::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
+use mocban_store::{Input, InputError, Project, hash_input, stat_input};
 
 /// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
 /// and pages that no stage has read; labels may have been added to a block that was finished without them. A file

@@ -7,9 +7,9 @@ use super::input_reads::ReadItem;
 use super::memory_budget::{mesh_bytes, print_pixels};
 use crate::block::MAX_MAP_PIXELS;
 use crate::catalog::BlockAttributes;
-use crate::store::{Input, Project};
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};
 use mocban_core::raster;
+use mocban_store::{Input, Project};
 
 /// Bytes reserved for the height maps of both sides, their relief and the search for the page. Measured: 120 MB.
 pub(super) const BLOCK_BYTES: u64 = 160 << 20;
@@ -86,8 +86,8 @@ mod tests {
     use crate::block::MAX_MAP_PIXELS;
     use crate::runner::input_reads::ReadItem as _;
     use crate::runner::tests::values;
-    use crate::store::Project;
     use mocban_core::raster::ImageLimits;
+    use mocban_store::Project;
 
     #[test]
     fn a_streamed_scan_needs_little_and_another_format_its_whole_length() {

@@ -6,8 +6,8 @@ use super::error::RunError;
 use super::input_reads::ReadLimits;
 use super::policy;
 use crate::catalog::{BlockSelection, Catalog, RerunPolicy};
-use crate::store::Project;
 use mocban_core::domain::UnixMillis;
+use mocban_store::Project;
 
 /// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `among`, and ends
 /// back-offs that are due.

@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde_json::Value;
 
 use crate::catalog::BlockSettings;
-use crate::store::{ArtifactError, Input, InputError};
 use mocban_core::domain::{
     ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, ControlPoints, Failure,
     FailureClass, LengthUnit,
 };
+use mocban_store::{ArtifactError, Input, InputError};
 
 /// Computes the stages of whole blocks. In tests, fake stages fail, hang or wait.
 ///

@@ -19,9 +19,9 @@ use super::events::RunEvent;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
-use crate::store::ArtifactError;
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
+use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
 

@@ -17,9 +17,9 @@ use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, StageCheckpoint};
-use crate::store::{ArtifactError, NewArtifact};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
 use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
+use mocban_store::{ArtifactError, NewArtifact};
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
 

@@ -1,8 +1,8 @@
 //! Why a run cannot go on.
 
 use crate::catalog::{CatalogError, FieldChange};
-use crate::store::{ArtifactError, LockError, PlaceError, StorageError, StoreError};
 use mocban_core::domain::{BlockName, PairName};
+use mocban_store::{ArtifactError, LockError, PlaceError, StorageError, StoreError};
 
 /// An error that ends a run. A failed pair is not such an error; the run's summary counts failed pairs.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::store::{Project, StorageError};
+use mocban_store::{Project, StorageError};
 
 /// Longest time for looking at the folder of a root.
 const MAX_TIME: Duration = Duration::from_secs(30);

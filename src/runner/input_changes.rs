@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
-use crate::store::{Input, InputDigest, InputError, Project, hash_input, stat_input};
 use mocban_core::domain::{ContentHash, PairId};
+use mocban_store::{Input, InputDigest, InputError, Project, hash_input, stat_input};
 
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::input_reads::ReadItem;
 use crate::catalog::PairAttributes;
-use crate::store::{Input, Project};
 use mocban_core::domain::Stage;
 use mocban_core::raster;
+use mocban_store::{Input, Project};
 
 /// Bytes reserved for each pair's maps and masks, in addition to its mesh and print.
 pub(super) const PAIR_BYTES: u64 = 32 << 20;
@@ -156,9 +156,9 @@ fn extension(path: &Path) -> String {
 mod tests {
     use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, estimated_bytes, print_bytes};
     use crate::runner::tests::values;
-    use crate::store::{Input, Project};
     use mocban_core::domain::Stage;
     use mocban_core::raster;
+    use mocban_store::{Input, Project};
 
     #[test]
     fn reservations_stay_within_the_limit_except_for_one_pair_that_exceeds_it() {

@@ -17,8 +17,8 @@ use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, Lease, PairAttributes, PairWork};
-use crate::store::ArtifactError;
 use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
+use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::ActiveClock;
 

@@ -30,9 +30,9 @@ use crate::catalog::{
     Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
 };
 use crate::stages::Settings;
-use crate::store::Project;
 use mocban_core::domain::WorkerId;
 use mocban_core::page_vec;
+use mocban_store::Project;
 
 /// Returns the fingerprints of these settings, one for each stage.
 pub fn fingerprints(settings: &Settings) -> Fingerprints {

@@ -14,8 +14,8 @@ use super::run_metrics::RunMetrics;
 use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{Catalog, FingerprintIds, WorkerSettings};
-use crate::store::Project;
 use mocban_core::domain::{Stage, UnixMillis, WorkerMetrics};
+use mocban_store::Project;
 
 /// What all pairs of a run have in common.
 pub(super) struct RunContext {

@@ -3,8 +3,8 @@
 use super::error::RunError;
 use super::options::{RunOptions, RunPart};
 use crate::catalog::{Catalog, Fingerprints, SharedSettings, WorkerSettings};
-use crate::store::{Project, RunLock};
 use mocban_core::domain::UnixMillis;
+use mocban_store::{Project, RunLock};
 
 /// The right to run a project.
 #[derive(Debug)]

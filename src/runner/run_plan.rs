@@ -12,7 +12,7 @@ use super::run_selection::RunSelection;
 use super::stop::Stop;
 use crate::catalog::{BlockPlanEntry, Catalog, Plan};
 use crate::stages::Settings;
-use crate::store::Project;
+use mocban_store::Project;
 
 /// What a run would do.
 #[derive(Debug, Clone)]

@@ -12,12 +12,12 @@ use super::stage_output::{self, ExecutionError, StageOutput, png};
 use crate::stages::normalize::{NormalizeError, Normalized, PrintMasks};
 use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
-use crate::store::Project;
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
 use mocban_core::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
+use mocban_store::Project;
 
 /// Runs stages on a pair's thread. In tests, a fake executor has stages that fail or hang.
 pub(super) trait StageExecutor: Send + Sync + 'static {

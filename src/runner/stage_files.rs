@@ -13,8 +13,8 @@ use super::error::RunError;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use crate::catalog::StageCheckpoint;
-use crate::store::{ArtifactError, NewArtifact};
 use mocban_core::domain::{PairName, Stage};
+use mocban_store::{ArtifactError, NewArtifact};
 use mocban_system::failpoint::{self, Point};
 use mocban_system::platform::sleep_active;
 

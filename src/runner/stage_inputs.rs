@@ -6,13 +6,13 @@ use super::run_metrics::{RunMetrics, TimedRead};
 use super::stage_output::ExecutionError;
 use crate::stages::normalize::{Normalized, PrintMasks};
 use crate::stages::{Print, Scan};
-use crate::store::{ArtifactError, InputError, Project, open_input, read_input};
 use mocban_core::domain::artifact_role::{DEPTH, print_mask};
 use mocban_core::domain::{
     DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage, WaitReason,
 };
 use mocban_core::mesh;
 use mocban_core::raster::{self, DepthMap};
+use mocban_store::{ArtifactError, InputError, Project, open_input, read_input};
 
 /// Where the stages of a project read from, and how large files may be.
 #[derive(Debug)]

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::catalog::MetricResult;
-use crate::store::{ArtifactError, NewArtifact};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use mocban_core::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
 use mocban_core::raster::DepthMap;
+use mocban_store::{ArtifactError, NewArtifact};
 
 /// What a stage returns.
 #[derive(Debug, Clone, PartialEq)]

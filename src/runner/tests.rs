@@ -26,8 +26,8 @@ use super::{
 use crate::catalog::{
     BlockSettings, Catalog, ClaimRequest, Fingerprints, RerunPolicy, WorkerInfo, WorkerSettings,
 };
-use crate::store::Project;
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};
+use mocban_store::Project;
 
 /// A project whose pairs only the fake executor can run, and the events of all runs.
 struct RunFixture {

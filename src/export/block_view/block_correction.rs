@@ -13,12 +13,12 @@ use crate::block::{
 };
 use crate::catalog::{BlockDetail, Catalog};
 use crate::export::pictures::{Rgb, resized};
-use crate::store::Project;
 use mocban_core::domain::{
     Affine2, ArtifactSet, BlockName, BlockSide, BlockStage, ContentHash, ControlPoint,
     ControlPoints,
 };
 use mocban_core::raster::ImageLimits;
+use mocban_store::Project;
 
 /// Longer side of a picture, pixels. One pixel is then about 0.1 mm.
 const LONGEST_SIDE: f64 = 3000.0;

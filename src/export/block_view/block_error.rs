@@ -3,7 +3,6 @@
 use crate::block::BlockError;
 use crate::catalog::CatalogError;
 use crate::export::source_print::SourcePrintError;
-use crate::store;
 use mocban_core::domain::{BlockName, BlockStage, ThresholdMetric};
 use mocban_core::raster::PngError;
 
@@ -44,7 +43,7 @@ pub enum BlockViewError {
     },
     /// The heights of the face cannot be read.
     #[error(transparent)]
-    Store(#[from] store::ArtifactError),
+    Store(#[from] mocban_store::ArtifactError),
     /// The heights of the face are not a valid image.
     #[error("the stored heights of the face: {0}")]
     Image(#[from] PngError),

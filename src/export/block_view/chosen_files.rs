@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use super::block_error::BlockViewError;
 use super::registered_face::unusable;
 use crate::catalog::{BlockDetail, Catalog};
-use crate::store::{Project, hash_input};
 use mocban_core::domain::{BlockName, BlockStage, ContentHash, ControlPoints};
+use mocban_store::{Project, hash_input};
 
 /// Returns the file of a block that is another one than the file on which points were chosen, if there is one. A file that
 /// cannot be read here counts as the same, because the scan may be on another computer.

@@ -4,9 +4,9 @@ use super::block_error::BlockViewError;
 use crate::block::PageInk;
 use crate::export::pictures::{Rgb, eight_bits};
 use crate::export::source_print::SourcePrint;
-use crate::store::Project;
 use mocban_core::domain::ContentHash;
 use mocban_core::raster::ImageLimits;
+use mocban_store::Project;
 
 /// The image of a page.
 #[derive(Debug)]

@@ -12,9 +12,9 @@ use super::registered_face::RegisteredFace;
 use crate::catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
 use crate::export::pair_pictures::{InputFileLimits, PictureError};
 use crate::export::scan_view::ScanView;
-use crate::store::Project;
 use mocban_core::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
 use mocban_core::raster::ImageLimits;
+use mocban_store::Project;
 
 /// A block that is aligned with its page, and the results of its characters.
 #[derive(Debug)]

@@ -8,9 +8,9 @@ use crate::block::{
     StoredPageMap, Support, heights_role,
 };
 use crate::catalog::{BlockDetail, BlockStageDetail};
-use crate::store::Project;
 use mocban_core::domain::{ArtifactSet, BlockSide, BlockStage, ContentHash, LengthUnit};
 use mocban_core::raster;
+use mocban_store::Project;
 
 /// The registration of a block, and where its heights are.
 #[derive(Debug)]

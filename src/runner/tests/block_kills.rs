@@ -9,8 +9,8 @@ use super::fake_executor::FakeExecutor;
 use super::{RunFixture, options};
 use crate::catalog::Catalog;
 use crate::runner::Stop;
-use crate::store::Project;
 use mocban_core::domain::BlockStage;
+use mocban_store::Project;
 
 /// Names the project that a child process runs.
 const CHILD_PROJECT: &str = "MOCBAN_TEST_PROJECT";

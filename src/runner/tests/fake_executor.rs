@@ -12,11 +12,11 @@ use crate::catalog::InputVersion;
 use crate::runner::pair_context::PairContext;
 use crate::runner::stage_executor::StageExecutor;
 use crate::runner::stage_output::{ExecutionError, StageOutput};
-use crate::store::{NewArtifact, Project, hash_input};
 use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{
     ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric,
 };
+use mocban_store::{NewArtifact, Project, hash_input};
 
 /// Runs fake stages. The part of a pair's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]

@@ -23,7 +23,7 @@ const FRESH: Duration = Duration::from_mins(1);
 
 /// A folder of copies.
 #[derive(Debug)]
-pub(in crate::store) struct ObjectCache {
+pub(crate) struct ObjectCache {
     folder: PathBuf,
     max_bytes: u64,
     state: Mutex<CacheState>,
@@ -40,15 +40,15 @@ struct CacheState {
 
 /// A copy that is open for reading.
 #[derive(Debug)]
-pub(in crate::store) struct CachedObject {
+pub(crate) struct CachedObject {
     /// The open file.
-    pub(in crate::store) file: File,
+    pub(crate) file: File,
     /// Length in bytes.
-    pub(in crate::store) bytes: u64,
+    pub(crate) bytes: u64,
     /// Version of the object.
-    pub(in crate::store) version: String,
+    pub(crate) version: String,
     /// Hash of the content when it was received.
-    pub(in crate::store) hash: ContentHash,
+    pub(crate) hash: ContentHash,
 }
 
 /// The newest known version of an object.

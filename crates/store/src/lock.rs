@@ -182,7 +182,7 @@ fn read_pid(file: &mut File) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::{LockError, RunLock};
-    use crate::store::Project;
+    use crate::Project;
 
     #[test]
     fn a_second_run_is_refused_with_the_owners_pid_and_may_join() {

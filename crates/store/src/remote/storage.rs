@@ -28,7 +28,7 @@ pub struct StorageOptions {
 
 /// A named root of input paths.
 #[derive(Debug, Clone)]
-pub(in crate::store) enum Root {
+pub(crate) enum Root {
     /// A folder on this machine.
     Folder(PathBuf),
     /// A folder in an object store.
@@ -159,7 +159,7 @@ impl ProjectStorage {
 
     /// Returns a storage with artifacts and one root `scans` in a bucket in memory.
     #[cfg(test)]
-    pub(in crate::store) fn in_memory(cache: PathBuf) -> (Self, Bucket) {
+    pub(crate) fn in_memory(cache: PathBuf) -> (Self, Bucket) {
         let bucket = Bucket::in_memory();
         let storage = Self {
             artifacts: Some(bucket.clone()),
@@ -214,18 +214,18 @@ impl ProjectStorage {
     }
 
     /// Returns the bucket of the artifacts.
-    pub(in crate::store) const fn artifacts(&self) -> Option<&Bucket> {
+    pub(crate) const fn artifacts(&self) -> Option<&Bucket> {
         self.artifacts.as_ref()
     }
 
     /// Returns the root that a stored path such as `scans:1/mesh.obj` begins with, and the rest of the path.
-    pub(in crate::store) fn root<'a>(&self, stored: &'a str) -> Option<(&Root, &'a str)> {
+    pub(crate) fn root<'a>(&self, stored: &'a str) -> Option<(&Root, &'a str)> {
         let (name, rest) = stored.split_once(':')?;
         Some((self.roots.get(name)?, rest))
     }
 
     /// Returns whether some inputs may be in an object store: those below a root, or characters that were cut from blocks.
-    pub(in crate::store) fn has_remote_inputs(&self) -> bool {
+    pub(crate) fn has_remote_inputs(&self) -> bool {
         let mut roots = self.roots.values();
         self.artifacts.is_some() || roots.any(|root| matches!(root, Root::Bucket(_)))
     }
@@ -234,7 +234,7 @@ impl ProjectStorage {
     ///
     /// # Errors
     /// Returns an error if a request fails, the object is larger than `limit`, or the copy cannot be written.
-    pub(in crate::store) fn open_input(
+    pub(crate) fn open_input(
         &self,
         bucket: &Bucket,
         key: &str,
@@ -247,16 +247,12 @@ impl ProjectStorage {
     ///
     /// # Errors
     /// Returns an error if a request fails or there is no such object.
-    pub(in crate::store) fn input_version(
-        &self,
-        bucket: &Bucket,
-        key: &str,
-    ) -> Result<String, BucketError> {
+    pub(crate) fn input_version(&self, bucket: &Bucket, key: &str) -> Result<String, BucketError> {
         self.lists.version(bucket, key)
     }
 
     /// Returns the stored form of a path below a root that is a folder, such as `nas:1/mesh.obj`.
-    pub(in crate::store) fn path_below_root(&self, path: &Path) -> Option<String> {
+    pub(crate) fn path_below_root(&self, path: &Path) -> Option<String> {
         let below = |(name, root): (&String, &Root)| match root {
             Root::Folder(folder) => {
                 let rest = path.strip_prefix(folder).ok()?.to_str()?;
@@ -273,7 +269,7 @@ impl ProjectStorage {
     }
 
     /// Forgets a local copy whose content has changed.
-    pub(in crate::store) fn forget_input(&self, address: &str) {
+    pub(crate) fn forget_input(&self, address: &str) {
         self.cache.forget(address);
     }
 
@@ -281,18 +277,14 @@ impl ProjectStorage {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn pack(
-        &self,
-        bucket: &Bucket,
-        name: &str,
-    ) -> Result<Arc<Vec<u8>>, BucketError> {
+    pub(crate) fn pack(&self, bucket: &Bucket, name: &str) -> Result<Arc<Vec<u8>>, BucketError> {
         self.packs
             .get_or_insert(name, || read_pack(bucket, name).map(Arc::new))
     }
 
     /// Forgets the packs in memory, as another process would know none.
     #[cfg(test)]
-    pub(in crate::store) fn forget_packs(&self) {
+    pub(crate) fn forget_packs(&self) {
         self.packs.clear();
         self.lengths.clear();
     }
@@ -301,11 +293,7 @@ impl ProjectStorage {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn pack_bytes(
-        &self,
-        bucket: &Bucket,
-        name: &str,
-    ) -> Result<u64, BucketError> {
+    pub(crate) fn pack_bytes(&self, bucket: &Bucket, name: &str) -> Result<u64, BucketError> {
         self.lengths
             .get_or_insert(name, || Ok(bucket.stat(&key(name))?.bytes))
     }

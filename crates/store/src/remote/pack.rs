@@ -11,7 +11,7 @@ use super::bucket_error::BucketError;
 use mocban_core::domain::{ArtifactRef, ContentHash, PackLocation};
 
 /// Folder of the packs.
-pub(in crate::store) const PACKS: &str = "packs";
+pub(crate) const PACKS: &str = "packs";
 /// Length of the header of a file in a tar archive, in bytes.
 const HEADER: u64 = 512;
 /// Longest pack that is read, in bytes.
@@ -19,7 +19,7 @@ const MAX_BYTES: u64 = 1 << 30;
 
 /// A pack that is not stored yet.
 #[derive(Debug)]
-pub(in crate::store) struct Pack {
+pub(crate) struct Pack {
     name: String,
     bytes: Vec<u8>,
     locations: Vec<PackLocation>,
@@ -30,7 +30,7 @@ impl Pack {
     ///
     /// The name ends with a random number, so that it is never used again: a pack that no row names may then be removed
     /// without regard to workers that compute the same results.
-    pub(in crate::store) fn of<'a>(
+    pub(crate) fn of<'a>(
         files: impl Iterator<Item = (&'a ArtifactRef, &'a [u8])>,
     ) -> io::Result<Self> {
         let mut archive = tar::Builder::new(Vec::new());
@@ -59,7 +59,7 @@ impl Pack {
     }
 
     /// Returns where the artifacts are, in the order in which they were given.
-    pub(in crate::store) fn locations(&self) -> &[PackLocation] {
+    pub(crate) fn locations(&self) -> &[PackLocation] {
         &self.locations
     }
 
@@ -67,20 +67,20 @@ impl Pack {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn store(self, bucket: &Bucket) -> Result<(), BucketError> {
+    pub(crate) fn store(self, bucket: &Bucket) -> Result<(), BucketError> {
         bucket.write(&key(&self.name), self.bytes)
     }
 }
 
 /// Returns the key of a pack.
-pub(in crate::store) fn key(name: &str) -> String {
+pub(crate) fn key(name: &str) -> String {
     let folder = name.get(..2).unwrap_or("00");
     format!("{PACKS}/{folder}/{name}.tar")
 }
 
 /// Returns the random number in the name of a pack, or `None` if this is no name of a pack. A folder and an extension may
 /// surround the name.
-pub(in crate::store) fn number_of(name: &str) -> Option<u64> {
+pub(crate) fn number_of(name: &str) -> Option<u64> {
     let name = name.rsplit_once('/').map_or(name, |(_, name)| name);
     let name = name.strip_suffix(".tar").unwrap_or(name);
     let (hash, number) = name.split_once('-')?;
@@ -97,7 +97,7 @@ pub(super) fn read_pack(bucket: &Bucket, name: &str) -> Result<Vec<u8>, BucketEr
 }
 
 /// Returns the bytes of an artifact, or `None` if the pack is too short for it or holds other bytes.
-pub(in crate::store) fn read_from_pack<'a>(
+pub(crate) fn read_from_pack<'a>(
     pack: &'a [u8],
     offset: u64,
     artifact: &ArtifactRef,
@@ -111,8 +111,8 @@ pub(in crate::store) fn read_from_pack<'a>(
 #[cfg(test)]
 mod tests {
     use super::{Pack, key, number_of, read_from_pack, read_pack};
-    use crate::store::NewArtifact;
-    use crate::store::remote::bucket::Bucket;
+    use crate::NewArtifact;
+    use crate::remote::bucket::Bucket;
 
     #[test]
     fn artifacts_are_read_back_from_a_pack_which_tar_can_open() {

@@ -147,8 +147,8 @@ mod tests {
     use std::fs::File;
     use std::time::{Duration, Instant, SystemTime};
 
-    use crate::store::remote::ProjectStorage;
-    use crate::store::{NewArtifact, Project, ReferencedArtifacts, UnreferencedKind};
+    use crate::remote::ProjectStorage;
+    use crate::{NewArtifact, Project, ReferencedArtifacts, UnreferencedKind};
 
     const DAY: Duration = Duration::from_hours(24);
 

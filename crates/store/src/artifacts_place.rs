@@ -65,7 +65,7 @@ impl Project {
 
 #[cfg(test)]
 mod tests {
-    use crate::store::{ArtifactError, NewArtifact, Project};
+    use crate::{ArtifactError, NewArtifact, Project};
 
     #[cfg(unix)]
     #[test]

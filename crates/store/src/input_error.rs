@@ -67,7 +67,7 @@ impl From<BucketError> for InputError {
 
 impl InputError {
     /// Adds the path to an error of the system, and replaces errors with a known reason.
-    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
         match source.kind() {
             ErrorKind::NotFound | ErrorKind::NotADirectory => Self::NotThere(path.to_owned()),
             ErrorKind::PermissionDenied => Self::Denied(path.to_owned()),

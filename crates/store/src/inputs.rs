@@ -255,7 +255,7 @@ mod tests {
     use std::io::{Read, Write as _};
 
     use super::{hash_input, open_input, read_input, stat_input};
-    use crate::store::{Input, InputError};
+    use crate::{Input, InputError};
     use mocban_core::domain::{ContentHash, FailureClass};
 
     #[test]

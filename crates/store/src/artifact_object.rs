@@ -88,8 +88,8 @@ impl Project {
 mod tests {
     use std::io::Read as _;
 
-    use crate::store::remote::ProjectStorage;
-    use crate::store::{
+    use crate::remote::ProjectStorage;
+    use crate::{
         ArtifactError, InputError, NewArtifact, Project, hash_input, read_input, stat_input,
     };
 

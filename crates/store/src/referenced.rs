@@ -164,7 +164,7 @@ impl Entry {
 #[cfg(test)]
 mod tests {
     use super::{ReferencedArtifacts, UnreferencedKind};
-    use crate::store::{NewArtifact, Project};
+    use crate::{NewArtifact, Project};
 
     #[test]
     fn files_that_no_row_names_are_found_and_told_apart() {

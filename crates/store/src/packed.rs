@@ -105,8 +105,8 @@ pub(super) fn of_bucket(error: BucketError) -> ArtifactError {
 
 #[cfg(test)]
 mod tests {
-    use crate::store::remote::{ProjectStorage, pack_key};
-    use crate::store::{ArtifactError, NewArtifact, Project};
+    use crate::remote::{ProjectStorage, pack_key};
+    use crate::{ArtifactError, NewArtifact, Project};
 
     #[test]
     fn artifacts_of_a_pair_are_one_object_and_are_checked() {

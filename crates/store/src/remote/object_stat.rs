@@ -4,15 +4,15 @@ use object_store::ObjectMeta;
 
 /// Length, version and time of an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::store) struct ObjectStat {
+pub(crate) struct ObjectStat {
     /// Length in bytes.
-    pub(in crate::store) bytes: u64,
+    pub(crate) bytes: u64,
     /// Changes if the content changes: the length and the entity tag, or the time of the last change.
-    pub(in crate::store) version: String,
+    pub(crate) version: String,
     /// The entity tag, if the store has one.
     pub(super) tag: Option<String>,
     /// Time of the last change by the clock of the store, in milliseconds since 1970.
-    pub(in crate::store) modified: i64,
+    pub(crate) modified: i64,
 }
 
 impl From<&ObjectMeta> for ObjectStat {

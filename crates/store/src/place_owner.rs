@@ -29,7 +29,7 @@ pub enum PlaceError {
         /// The folder or address.
         place: PathBuf,
         /// The owner and where it is.
-        owner: CatalogIdentity,
+        owner: Box<CatalogIdentity>,
         /// Whether one of both is a copy of the other.
         is_copy: bool,
     },
@@ -250,7 +250,7 @@ impl Place<'_> {
         }
         Err(PlaceError::Taken {
             place: self.path(),
-            owner: owner.catalog.clone(),
+            owner: Box::new(owner.catalog.clone()),
             is_copy: standing == Standing::OfCopy,
         })
     }

@@ -177,8 +177,8 @@ impl Project {
 
 #[cfg(test)]
 mod tests {
-    use crate::store::remote::ProjectStorage;
-    use crate::store::{InputError, Project, hash_input, read_input, stat_input};
+    use crate::remote::ProjectStorage;
+    use crate::{InputError, Project, hash_input, read_input, stat_input};
     use mocban_core::domain::ContentHash;
 
     #[test]

@@ -20,7 +20,7 @@ use mocban_core::domain::without_password;
 
 /// A folder in a bucket.
 #[derive(Debug, Clone)]
-pub(in crate::store) struct Bucket {
+pub(crate) struct Bucket {
     client: Arc<LazyClient>,
     /// The folder within the bucket.
     prefix: Path,
@@ -74,17 +74,17 @@ impl Bucket {
 
     /// Stores an object, for tests.
     #[cfg(test)]
-    pub(in crate::store) fn put(&self, key: &str, bytes: &[u8]) {
+    pub(crate) fn put(&self, key: &str, bytes: &[u8]) {
         self.write(key, bytes.to_owned()).expect("stored in memory");
     }
 
     /// Returns the address of the folder.
-    pub(in crate::store) fn address(&self) -> &str {
+    pub(crate) fn address(&self) -> &str {
         &self.address
     }
 
     /// Returns the address of an object, for messages and as a name.
-    pub(in crate::store) fn address_of(&self, key: &str) -> String {
+    pub(crate) fn address_of(&self, key: &str) -> String {
         format!("{}/{key}", self.address)
     }
 
@@ -92,7 +92,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails or the object is larger.
-    pub(in crate::store) fn read(&self, key: &str, limit: u64) -> Result<Vec<u8>, BucketError> {
+    pub(crate) fn read(&self, key: &str, limit: u64) -> Result<Vec<u8>, BucketError> {
         let copied = self.copy_to(key, limit, None, Vec::new())?;
         let copied = copied.map(|(bytes, _)| bytes);
         copied.ok_or_else(|| BucketError::NotThere(self.address_of(key)))
@@ -149,7 +149,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails or there is no such object.
-    pub(in crate::store) fn stat(&self, key: &str) -> Result<ObjectStat, BucketError> {
+    pub(crate) fn stat(&self, key: &str) -> Result<ObjectStat, BucketError> {
         self.request(key, |store, path| async move {
             let found = store.head(&path).await?;
             Ok(ObjectStat::from(&found))
@@ -160,7 +160,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
+    pub(crate) fn write(&self, key: &str, bytes: Vec<u8>) -> Result<(), BucketError> {
         self.request(key, |store, path| async move {
             store.put(&path, PutPayload::from(bytes)).await.map(drop)
         })
@@ -171,7 +171,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn create(&self, key: &str, bytes: Vec<u8>) -> Result<bool, BucketError> {
+    pub(crate) fn create(&self, key: &str, bytes: Vec<u8>) -> Result<bool, BucketError> {
         self.request(key, |store, path| async move {
             let payload = PutPayload::from(bytes);
             let created = store
@@ -191,7 +191,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn is_empty(&self, folder: &str) -> Result<bool, BucketError> {
+    pub(crate) fn is_empty(&self, folder: &str) -> Result<bool, BucketError> {
         self.request(folder, |store, path| async move {
             let first = store.list(Some(&path)).try_next().await;
             first.map(|first| first.is_none())
@@ -202,7 +202,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn remove(&self, key: &str) -> Result<(), BucketError> {
+    pub(crate) fn remove(&self, key: &str) -> Result<(), BucketError> {
         self.request(key, |store, path| async move {
             match store.delete(&path).await {
                 Err(object_store::Error::NotFound { .. }) => Ok(()),
@@ -215,7 +215,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if a request fails.
-    pub(in crate::store) fn list(
+    pub(crate) fn list(
         &self,
         folder: &str,
         mut each: impl FnMut(String, ObjectStat),
@@ -271,7 +271,7 @@ impl Bucket {
     ///
     /// # Errors
     /// Returns an error if the request fails.
-    pub(in crate::store) fn check(&self) -> Result<(), BucketError> {
+    pub(crate) fn check(&self) -> Result<(), BucketError> {
         let store = self.client.for_first_request();
         let store = store.map_err(|reason| self.unusable(&reason))?;
         let prefix = self.prefix.clone();

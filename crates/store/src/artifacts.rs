@@ -265,7 +265,7 @@ fn sync(folder: &Path) -> Result<(), ArtifactError> {
 #[cfg(test)]
 mod tests {
     use super::{ArtifactError, NewArtifact};
-    use crate::store::Project;
+    use crate::Project;
 
     fn project() -> (tempfile::TempDir, Project) {
         let dir = tempfile::tempdir().expect("a temporary directory");
