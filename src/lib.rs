@@ -14,12 +14,12 @@
 //! Read these files in order to follow a pair through the program:
 //!
 //! 1. `crates/lists/src/manifest/csv.rs`: parses the rows of a manifest
-//! 2. `src/catalog/records/import.rs`: stores pairs and their jobs in one transaction
+//! 2. `crates/catalog/src/records/import.rs`: stores pairs and their jobs in one transaction
 //! 3. `src/runner/run.rs`: starts a run: takes the lock, registers this process as a worker, recovers jobs of dead
 //!    workers, stores which inputs changed, requeues stale pairs, ends back-offs that are due
 //! 4. `src/runner/scheduler.rs`: the main loop, which starts a task for each leased pair
 //! 5. `src/runner/prefetch.rs`: leases pairs for free slots, and a few more in advance
-//! 6. `src/catalog/queue/claim.rs`: leases as many jobs as were asked for in one statement, each with a new fencing
+//! 6. `crates/catalog/src/queue/claim.rs`: leases as many jobs as were asked for in one statement, each with a new fencing
 //!    token; claims, heartbeats and releases are called through `api.rs` beside it
 //! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
 //! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
@@ -30,12 +30,12 @@
 //!     stroke maps, scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `crates/store/src/artifacts.rs`: writes artifact files by content hash
-//! 13. `src/catalog/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
+//! 13. `crates/catalog/src/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
 //!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
 //!     turns by SQLite's lock (`busy_retry.rs`)
-//! 14. `src/catalog/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a finished
+//! 14. `crates/catalog/src/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a finished
 //!     stage and renew or end the lease
-//! 15. `src/catalog/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
+//! 15. `crates/catalog/src/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
 //!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
 //! 16. `src/report/build.rs`: iterates over all pairs
 //! 17. `src/report/accumulate.rs`: sums results per metric; Acc counts the passes of `consensus.rs`, and
@@ -132,14 +132,14 @@
 //! (`src/runner/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
 //! workers are then dead. A repair (`src/cli/check.rs`, `src/check/mod.rs`) must hold the same lock. It resets only the
 //! jobs of damaged pairs, which ends their leases. After a refused heartbeat, a process recovers the jobs of its own
-//! old id (`register_again`). The statements are in `src/catalog/queue/recovery.rs` and `src/catalog/audit/repair.rs`.
+//! old id (`register_again`). The statements are in `crates/catalog/src/queue/recovery.rs` and `crates/catalog/src/audit/repair.rs`.
 //! Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
-//! `src/catalog/queue/checkpoint.rs`, `server_checkpoint.rs` and `fail.rs` change a job only if the worker and the token
+//! `crates/catalog/src/queue/checkpoint.rs`, `server_checkpoint.rs` and `fail.rs` change a job only if the worker and the token
 //! equal those of the lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock.
 //! If a statement returns no row for a job, nothing of that job's request is stored, and the worker learns it from the
-//! reply of `src/catalog/queue/api.rs`:
+//! reply of `crates/catalog/src/queue/api.rs`:
 //!
 //! | refused write | reply | noticed in | what happens |
 //! |---|---|---|---|
@@ -197,7 +197,7 @@
 //!
 //! Also touched: the weights in `src/stages/register/confidence.rs`, `REVISION` in `src/stages/register/mod.rs`, the
 //! help text of `--metric` in `src/cli/contact_sheet.rs` and `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
-//! `migrations/`, `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/reference/report.md`, and tests and snapshots.
+//! `migrations/`, `SCHEMA_VERSION` in `crates/catalog/src/db/open.rs`, `README.md`, `docs/reference/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
 //!
 //! ## An export
@@ -262,7 +262,6 @@
 //! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
 pub mod block;
-pub mod catalog;
 pub mod check;
 pub mod cli;
 pub mod config;
@@ -270,14 +269,12 @@ pub mod demo;
 pub mod documentation;
 pub mod export;
 pub mod local_server;
-#[cfg(test)]
-#[path = "../tests/support/postgres_server.rs"]
-mod postgres_server;
 pub mod report;
 pub mod review;
 pub mod runner;
 pub mod stages;
 pub mod view;
+pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_lists::{labels, manifest};
 pub use mocban_store as store;

@@ -179,7 +179,7 @@ fn checkpoints(
 }
 
 fn input(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
-    Ok(hash_input(&project.input(name))?.into())
+    Ok(hash_input(&project.input(name))?)
 }
 
 /// Returns a result of each metric, all with a high confidence.

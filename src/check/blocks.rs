@@ -3,8 +3,8 @@
 
 use super::finding::{Finding, Kind};
 use super::pairs::kind_of;
-use crate::catalog::AuditedBlock;
 use crate::runner::result_hash;
+use mocban_catalog::AuditedBlock;
 use mocban_core::domain::{BlockId, BlockStage};
 use mocban_store::{ArtifactError, Project};
 

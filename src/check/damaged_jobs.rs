@@ -1,7 +1,7 @@
 //! Sends damaged pairs and blocks back to their first damaged stage.
 
 use super::summary::CheckSummary;
-use crate::catalog::{Catalog, CatalogError};
+use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::{BlockId, BlockStage, PairId, Stage};
 
 /// Number of pairs that are sent back in one transaction.

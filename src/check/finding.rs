@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::catalog::{ChecksummedTable, CounterDrift, FaultyFingerprint, FaultyRow};
+use mocban_catalog::{ChecksummedTable, CounterDrift, FaultyFingerprint, FaultyRow};
 use mocban_core::domain::{PairId, PairName, Stage};
 
 /// What the user can do about a damaged pair.

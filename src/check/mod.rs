@@ -17,12 +17,12 @@ use std::time::Duration;
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use crate::catalog::{
+use crate::runner::{RunError, claim_artifacts};
+use damaged_jobs::{DamagedJobs, repair_jobs};
+use mocban_catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use crate::runner::{RunError, claim_artifacts};
-use damaged_jobs::{DamagedJobs, repair_jobs};
 use mocban_core::domain::{BlockId, BlockStage, UnixMillis};
 use mocban_store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;

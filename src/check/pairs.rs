@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::finding::{Finding, Kind};
-use crate::catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
 use crate::runner::{metric_results, result_hash};
+use mocban_catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
     ThresholdMetric,
@@ -278,7 +278,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::{Kind, result_hash, state};
-    use crate::catalog::{AuditedPair, AuditedResult, KnownInputs, MetricResult};
+    use mocban_catalog::{AuditedPair, AuditedResult, KnownInputs, MetricResult};
     use mocban_core::domain::test_values::metric_outcome;
     use mocban_core::domain::{
         ArtifactSet, ContentHash, JobStatus, PairId, Stage, ThresholdMetric,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Kind};
 use super::pairs::PairCheck;
-use crate::catalog::SetApart;
+use mocban_catalog::SetApart;
 use mocban_store::{UnreferencedFile, UnreferencedKind};
 
 /// Number of findings listed per kind, and of input files listed.

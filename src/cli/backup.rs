@@ -14,7 +14,7 @@ use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
-use crate::catalog::Catalog;
+use mocban_catalog::Catalog;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
 };

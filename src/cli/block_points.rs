@@ -3,9 +3,9 @@
 use tokio::runtime::Handle;
 
 use super::context::Context;
-use crate::catalog::{Catalog, ControlPointsChange};
 use crate::export::block_view::{BlockCorrection, replaced_file};
 use crate::view::{CorrectionStore, PointsSaved};
+use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_store::Project;
 

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::screen::{Palette, Tone};
 use super::table::{columns, count};
-use crate::catalog::{BlockState, Catalog};
+use mocban_catalog::{BlockState, Catalog};
 use mocban_core::domain::{JobStatus, one_line};
 
 /// Number of failed blocks that are named, unless all are requested.
@@ -135,8 +135,8 @@ impl BlockStatus {
 #[cfg(test)]
 mod tests {
     use super::BlockStatus;
-    use crate::catalog::{BlockAttributes, BlockState, StoredBlockFailure};
     use crate::cli::screen::Palette;
+    use mocban_catalog::{BlockAttributes, BlockState, StoredBlockFailure};
     use mocban_core::domain::{BlockStage, Failure, FailureClass, JobStatus};
 
     fn state(name: &str, status: JobStatus) -> BlockState {

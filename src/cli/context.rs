@@ -14,9 +14,9 @@ use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
-use crate::catalog::{Catalog, SetApart};
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
 use crate::runner;
+use mocban_catalog::{Catalog, SetApart};
 use mocban_core::domain::{UnixMillis, has_password, is_hidden};
 use mocban_store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 

@@ -6,7 +6,7 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::output;
-use crate::catalog::{ROLES, initialize_database, roles_sql};
+use mocban_catalog::{ROLES, initialize_database, roles_sql};
 
 /// Commands on the database of a catalog.
 #[derive(Debug, Subcommand)]

@@ -12,9 +12,9 @@ use super::demo_folder::{DemoContent, check_directory, replace_data};
 use super::files;
 use super::import_blocks::BlockArgs;
 use super::table::count;
-use crate::catalog::{Catalog, ImportChunk, StoredCharacter};
 use crate::demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
 use crate::runner::{Stop, StopLevel};
+use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 
 /// Id of the block.

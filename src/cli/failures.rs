@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::block_status::BlockStatus;
 use super::table::columns;
-use crate::catalog::{Catalog, FailedPair, StoredFailure};
+use mocban_catalog::{Catalog, FailedPair, StoredFailure};
 use mocban_core::domain::FailureClass;
 
 /// Maximum number of failed pairs that are read, unless all are requested.
@@ -105,7 +105,7 @@ impl Failures {
 #[cfg(test)]
 mod tests {
     use super::Failures;
-    use crate::catalog::{FailedPair, StoredFailure};
+    use mocban_catalog::{FailedPair, StoredFailure};
     use mocban_core::domain::{Failure, FailureClass, JobStatus, Stage};
 
     fn failed(name: &str, class: FailureClass) -> FailedPair {

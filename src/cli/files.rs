@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 
 use super::exit::Refusal;
-use crate::catalog::Catalog;
 use crate::config::Config;
 use crate::export::InputFileLimits;
+use mocban_catalog::Catalog;
 use mocban_core::domain::sanitize;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,

@@ -19,7 +19,7 @@ use super::missing_files::MissingFiles;
 use super::new_project::import_with;
 use super::table::count;
 use super::truth_file::{self, TruthRow};
-use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
+use mocban_catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
 use mocban_store::Project;

@@ -12,7 +12,7 @@ use super::manifest_file::{locate_file, refuse};
 use super::missing_files::MissingFiles;
 use super::new_project::import_with;
 use super::table::count;
-use crate::catalog::{BlockAttributes, BlockImportSummary};
+use mocban_catalog::{BlockAttributes, BlockImportSummary};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 use mocban_lists::manifest::{BlockRow, is_block_list, parse_blocks};
 use mocban_store::Project;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::catalog::{Catalog, CatalogError, NewCatalog};
+use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
 /// Returns the missing directories of a path, the deepest first.

@@ -7,8 +7,8 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::pairs_and_blocks;
-use crate::catalog::{BlockRetry, Catalog, RetrySelection};
 use crate::runner::NamedWork;
+use mocban_catalog::{BlockRetry, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
 
 /// Arguments of `retry`.

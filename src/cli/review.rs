@@ -13,11 +13,11 @@ use super::output;
 use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
-use crate::catalog::{SetApart, StatusCounts};
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
 use crate::runner::{Stop, StopLevel};
+use mocban_catalog::{SetApart, StatusCounts};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 

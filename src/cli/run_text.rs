@@ -5,8 +5,8 @@ use super::failures::Failures;
 use super::review::review_step;
 use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
-use crate::catalog::{BlockPlanEntry, Plan};
 use crate::runner::{BlockSummary, RunSummary};
+use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
 
 /// Prints how a run ended and which pairs failed.
@@ -139,7 +139,7 @@ pub(super) fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Plan, plan_text};
-    use crate::catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
+    use mocban_catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
     use mocban_core::domain::Stage;
 
     #[test]

@@ -1,9 +1,9 @@
 //! Pairs and blocks named on the command line.
 
 use super::exit::Refusal;
-use crate::catalog::Catalog;
 use crate::config::nearest;
 use crate::runner::NamedWork;
+use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, PairName};
 
 /// Largest number of similar ids in a message.

@@ -15,9 +15,9 @@ use super::show_block::show_block;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::local;
 use super::verdict;
-use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use crate::report::ManualCorrection;
 use crate::runner::{self, NamedWork};
+use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };

@@ -10,7 +10,7 @@ use super::screen::{Palette, Tone};
 use super::show_text::state_name;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
-use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
+use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
 use mocban_store::Project;
 

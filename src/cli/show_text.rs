@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::screen::{Palette, Tone};
 use super::table::columns;
 use super::time_text::{duration, local};
-use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::report::ManualCorrection;
+use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,

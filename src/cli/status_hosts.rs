@@ -8,7 +8,7 @@ use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use super::time_text::rough_duration;
 use super::worker_totals::{WorkerTotals, is_present};
-use crate::catalog::{Catalog, WorkerRecord, WorkerState};
+use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_core::domain::UnixMillis;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
@@ -138,8 +138,8 @@ impl WorkerTable {
 #[cfg(test)]
 mod tests {
     use super::WorkerTable;
-    use crate::catalog::WorkerRecord;
     use crate::cli::screen::Palette;
+    use mocban_catalog::WorkerRecord;
     use mocban_core::domain::{ComputeTimes, Stage, WaitReason, WorkerId, WorkerMetrics};
 
     const NOW: i64 = 1_800_000_000_000;

@@ -14,7 +14,7 @@ use super::select;
 use super::table::{columns, count};
 use super::time_text::{duration, local};
 use super::verdict_file::{self, VerdictRow};
-use crate::catalog::{
+use mocban_catalog::{
     Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
     check_reviewer,
 };

@@ -9,8 +9,8 @@ use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use super::signals;
 use super::table::pairs_and_blocks;
-use crate::catalog::RerunPolicy;
 use crate::runner::{self, RunPart, Stop};
+use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
 
 /// Arguments of `plan`.

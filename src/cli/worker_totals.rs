@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use crate::catalog::{WorkerRecord, WorkerState};
+use mocban_catalog::{WorkerRecord, WorkerState};
 use mocban_core::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMetrics};
 
 /// Sums over one or more workers.

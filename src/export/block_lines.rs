@@ -13,7 +13,7 @@ use super::export_logs::json_lines;
 use super::exporter_error::ExportError;
 use super::record::RecordStatus;
 use super::record_fields::{BLOCK_FIELDS, markdown_table, schema_of};
-use crate::catalog::{BlockDetail, Catalog, CatalogError};
+use mocban_catalog::{BlockDetail, Catalog, CatalogError};
 use mocban_core::domain::{BlockName, BlockSide, BlockStage, FailureClass, LengthUnit};
 use mocban_store::Project;
 

@@ -6,11 +6,11 @@ use super::pictures::{
     ContactSheetCell, FrameKind, NOTE_SPACE, Rgb, SheetLegend, contact_sheet, tile_side,
 };
 use super::source_print::result_images;
-use crate::catalog::{Catalog, CatalogError, PairResults, SetApart};
 use crate::report::ground_truth::TruthErrors;
 use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::{Consensus, evaluate_pairs};
+use mocban_catalog::{Catalog, CatalogError, PairResults, SetApart};
 use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::ImageLimits;
 use mocban_store::Project;

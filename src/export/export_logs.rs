@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::export_folder::SharedFile;
 use super::exporter_error::ExportError;
-use crate::catalog::Catalog;
+use mocban_catalog::Catalog;
 
 /// The logs with their meaning.
 pub(super) const LOG_FILES: [[&str; 2]; 3] = [

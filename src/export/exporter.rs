@@ -23,7 +23,7 @@ use super::pair_writer::{FormatOutput, PairWriter, WrittenPair};
 use super::readme;
 use super::record::ManualAlignmentFields;
 use super::split::{SplitCounts, SplitPlan};
-use crate::catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
+use mocban_catalog::{Catalog, CatalogError, CutOrigin, PairResults, SetApart, StoredAlignment};
 use mocban_core::domain::{BlockName, PairName};
 use mocban_store::Project;
 

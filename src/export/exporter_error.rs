@@ -1,7 +1,7 @@
 //! Why an export fails.
 
 use super::export_folder::FolderError;
-use crate::catalog::CatalogError;
+use mocban_catalog::CatalogError;
 use mocban_store::ArtifactError;
 
 /// Why nothing was exported.

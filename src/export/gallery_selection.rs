@@ -4,13 +4,13 @@ use rayon::prelude::*;
 
 use super::contact_sheet::DrawError;
 use super::source_print::result_images;
-use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
 use crate::report::ground_truth::TruthErrors;
 use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
 use crate::report::number_format::format_number;
 use crate::report::pair_artifacts::group_identical;
 use crate::report::{Consensus, TruthEvaluation};
+use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use mocban_core::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use mocban_core::raster::{ImageLimits, jpeg_rgb8};
 use mocban_store::Project;

@@ -6,8 +6,8 @@ use serde_json::Value;
 use super::format::ExportFormat;
 use super::pair_pictures::InputFileLimits;
 use super::split::SplitSettings;
-use crate::catalog::MetricRecord;
 use crate::report::Consensus;
+use mocban_catalog::MetricRecord;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
 
 /// Default size of shards in MiB.

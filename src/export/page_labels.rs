@@ -8,7 +8,7 @@ use super::block_view::{BlockViewError, RegisteredFace};
 use super::export_folder::{FolderError, write_below};
 use super::exporter_error::ExportError;
 use super::source_print::SourcePrint;
-use crate::catalog::{BlockDetail, Catalog, StoredCharacter};
+use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::BlockCharacterState;
 use mocban_core::raster::ImageLimits;
 use mocban_lists::labels::{LabelBox, PageFile, write_coco, write_via};

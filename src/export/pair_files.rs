@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::format_writer::EncodedPair;
 use super::pair_pictures::{PairPictures, PictureError};
-use crate::catalog::MetricRecord;
 use crate::report::pair_artifacts::same_alignment;
+use mocban_catalog::MetricRecord;
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
 use mocban_core::domain::{
     DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric,

@@ -10,8 +10,8 @@ use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
 use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
-use crate::catalog::{CutOrigin, MetricRecord, PairResults};
 use crate::report::pair_artifacts::PairArtifacts;
+use mocban_catalog::{CutOrigin, MetricRecord, PairResults};
 use mocban_core::domain::{Affine2, Failure, FailureClass};
 use mocban_store::Project;
 

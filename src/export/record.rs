@@ -5,8 +5,8 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::stage_outcomes::StageOutcomes;
-use crate::catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
 use crate::report::Consensus;
+use mocban_catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
 use mocban_core::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::pair_pictures::{PairPictures, PictureError};
 use super::record::{MetricFields, PairFields, PairRecord};
 use super::record_fields::{RecordField, schema_of};
-use crate::catalog::MetricRecord;
+use mocban_catalog::MetricRecord;
 use mocban_core::domain::{PairName, ThresholdMetric};
 use mocban_core::raster::{png_grey16, png_mask, png_rgb8};
 

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 use super::pictures::{PrintView, Rgb, eight_bits};
-use crate::catalog::PairResults;
 use crate::report::pair_artifacts::PairArtifacts;
+use mocban_catalog::PairResults;
 use mocban_core::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use mocban_core::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
 use mocban_store::{InputError, InputFile, Project, read_input};
@@ -40,7 +40,7 @@ pub struct SourcePrint {
 impl SourcePrint {
     /// Returns the hash of the file.
     pub const fn hash(&self) -> ContentHash {
-        self.file.digest.hash
+        self.file.version.hash
     }
 
     /// Reads the print of a pair and checks that it has not changed since it was aligned.
@@ -70,7 +70,7 @@ impl SourcePrint {
         let input = project.input(path);
         let path = input.path().to_owned();
         let file = read_input(&input, limits.max_bytes, "limits.image.max_bytes")?;
-        if aligned.is_some_and(|hash| hash != file.digest.hash) {
+        if aligned.is_some_and(|hash| hash != file.version.hash) {
             return Err(SourcePrintError::Changed(path));
         }
         match raster::decode(&file.bytes, limits) {

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use super::record::SplitName;
-use crate::catalog::PairAttributes;
+use mocban_catalog::PairAttributes;
 use mocban_core::domain::{ContentHash, enum_names};
 
 /// What keeps pairs together.

@@ -24,7 +24,7 @@ use super::thresholds::{ThresholdDistribution, relative_height};
 use super::truth_evaluation::{TruthEvaluation, TruthProblems};
 use super::truth_summary::TruthSummary;
 use super::warnings::warnings;
-use crate::catalog::{MetricRecord, PairResults, SetApart};
+use mocban_catalog::{MetricRecord, PairResults, SetApart};
 use mocban_core::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
 
 /// The sums from which a report is made.

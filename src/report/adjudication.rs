@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::consensus::{Consensus, partition_verdicts};
 use super::stats::{IntervalMethod, Rate};
-use crate::catalog::MetricRecord;
+use mocban_catalog::MetricRecord;
 use mocban_core::domain::Verdict;
 
 /// Acc of a metric under three rules for disagreement. Each rule decides which results pass, fail or are left out.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::stats::{IntervalMethod, Rate};
-use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
+use mocban_catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use mocban_core::domain::Verdict;
 
 /// Planted faults that reviewers failed, as a share of those they judged. An unsure verdict is not a detection.

@@ -8,7 +8,7 @@ use super::box_matching::BoxMatches;
 use super::ground_truth::TruthErrors;
 use super::stats::ratio;
 use super::truth_evaluation::TruthEvaluation;
-use crate::catalog::{BlockDetail, Catalog, CatalogError, PairResults};
+use mocban_catalog::{BlockDetail, Catalog, CatalogError, PairResults};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, ThresholdMetric, TrueBox};
 
 /// A result is tight if it is right and its mean landmark error is at most this percentage of the character's height.

@@ -7,7 +7,7 @@ use super::manual_alignment;
 use super::model::Report;
 use super::report_error::ReportError;
 use super::truth_evaluation::{TruthEvaluation, evaluate_pairs};
-use crate::catalog::{Catalog, PairResults, SetApart};
+use mocban_catalog::{Catalog, PairResults, SetApart};
 use mocban_store::Project;
 
 /// Pairs in memory at a time.

@@ -1,6 +1,6 @@
 //! The joint verdict of all reviewers on one result.
 
-use crate::catalog::{MetricRecord, ReviewerVerdict};
+use mocban_catalog::{MetricRecord, ReviewerVerdict};
 use mocban_core::domain::{ReviewOrder, Verdict};
 
 /// The joint verdict of all reviewers on a result.

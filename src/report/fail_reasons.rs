@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::consensus::Consensus;
-use crate::catalog::{MetricRecord, ReviewerVerdict};
+use mocban_catalog::{MetricRecord, ReviewerVerdict};
 use mocban_core::domain::{Reason, Verdict};
 
 /// The number of failed results for which a reason was given.

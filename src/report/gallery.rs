@@ -1,6 +1,6 @@
 //! The images of the HTML report and the texts next to them, as plain data. `export` draws the images.
 
-use crate::catalog::VerdictEvent;
+use mocban_catalog::VerdictEvent;
 use mocban_core::domain::{PairName, ThresholdMetric, Verdict};
 
 /// All images of a report.

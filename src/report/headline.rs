@@ -194,11 +194,11 @@ fn without_basis(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::headline;
-    use crate::catalog::PairResults;
     use crate::report::{
         AttentionCheckRates, IntervalMethod, Rate, Report, ReportAccumulator, TruthEvaluation,
         test_fixtures,
     };
+    use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
     use mocban_core::domain::Verdict::{Fail, Pass};
     use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};

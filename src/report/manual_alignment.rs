@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::ground_truth::MAX_ANGLE_DEG;
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use super::stats::{Rate, median, quantile};
-use crate::catalog::{PairResults, StoredAlignment};
+use mocban_catalog::{PairResults, StoredAlignment};
 use mocban_core::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
 use mocban_store::Project;
 

@@ -17,7 +17,7 @@ use super::stage_times::StageTimes;
 use super::stats::IntervalMethod;
 use super::thresholds::ThresholdDistribution;
 use super::truth_summary::TruthSummary;
-use crate::catalog::SetApart;
+use mocban_catalog::SetApart;
 use mocban_core::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.

@@ -2,7 +2,7 @@
 
 use serde::de::DeserializeOwned;
 
-use crate::catalog::{MetricRecord, PairResults, StageRecord};
+use mocban_catalog::{MetricRecord, PairResults, StageRecord};
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use mocban_core::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,

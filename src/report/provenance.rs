@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::catalog::PairResults;
+use mocban_catalog::PairResults;
 use mocban_core::domain::{ContentHash, Stage, UnixMillis};
 
 /// The origin of the numbers. Equal inputs, settings, results and verdicts give an equal value, except `last_result`.

@@ -1,7 +1,7 @@
 //! Why no report can be made.
 
 use super::pair_artifacts::PairArtifactsError;
-use crate::catalog::CatalogError;
+use mocban_catalog::CatalogError;
 
 /// Why no report can be made.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use super::build::PAIRS_PER_PAGE;
 use super::consensus::{Consensus, partition_verdicts};
 use super::pair_artifacts::group_identical;
 use super::stats::{AgreementTable, Rate};
-use crate::catalog::{
+use mocban_catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults, SetApart,
 };
 use mocban_core::domain::{AttentionCheck, ContentHash, PairName, Verdict};
@@ -255,8 +255,8 @@ fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Ver
 #[cfg(test)]
 mod tests {
     use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
-    use crate::catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
     use crate::report::test_fixtures;
+    use mocban_catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
     use mocban_core::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
     };

@@ -9,7 +9,7 @@ use super::score_comparison::{Score, ScoreComparison, conclude};
 use super::stats::{
     BOOTSTRAP_SEED, ClusterSample, MIN_UNITS, ResampledMeans, ResamplingUnit, resample_count,
 };
-use crate::catalog::PairResults;
+use mocban_catalog::PairResults;
 use mocban_core::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
@@ -209,9 +209,9 @@ fn comparisons(resampled: &mut ResampledMeans, by: ResamplingUnit) -> Vec<ScoreC
 #[cfg(test)]
 mod tests {
     use super::{BootstrapResults, ScoreSample};
-    use crate::catalog::PairResults;
     use crate::report::stats::{MIN_UNITS, ResamplingUnit};
     use crate::report::test_fixtures;
+    use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric;
 
     /// Resamples pairs on which the ensemble has a higher IoU than all other metrics. Every seventh pair fails.

@@ -12,7 +12,7 @@ use super::reviewer_agreement::{ReviewerAgreement, ReviewerPair, ReviewerRecord,
 use super::score_bootstrap::MeanIntervals;
 use super::stats::Rate;
 use super::truth_evaluation::TruthEvaluation;
-use crate::catalog::{
+use mocban_catalog::{
     MetricRecord, PairAttributes, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
 use mocban_core::domain::test_values::metric_outcome;
@@ -189,7 +189,7 @@ pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
         },
     };
     ReviewerAgreement {
-        set_apart: crate::catalog::SetApart::default(),
+        set_apart: mocban_catalog::SetApart::default(),
         schema: 1,
         conflicts: disputed,
         reviewer_pairs: vec![ReviewerPair {

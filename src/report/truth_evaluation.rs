@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::ground_truth::{TruthError, TruthErrors, TruthRecord};
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError, group_identical};
-use crate::catalog::PairResults;
+use mocban_catalog::PairResults;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
 use mocban_core::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
 use mocban_store::{Project, read_input};

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use super::answer::{InvalidInput, check_note};
 use super::item::ReviewItem;
 use super::item_images::{IMAGE_SIDE, ItemImages};
-use crate::catalog::ManualAlignment;
-use crate::catalog::check_event;
 use crate::report::ManualCorrection;
+use mocban_catalog::ManualAlignment;
+use mocban_catalog::check_event;
 use mocban_core::domain::Affine2;
 
 /// Accepted scale of the relief relative to the image.

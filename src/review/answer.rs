@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::item::ReviewItem;
 use super::state::ServerState;
-use crate::catalog::{InvalidVerdict, NOTE_CHARS, NewVerdict, ReviewContext};
+use mocban_catalog::{InvalidVerdict, NOTE_CHARS, NewVerdict, ReviewContext};
 use mocban_core::domain::{Reason, Verdict};
 
 /// An answer as the page sends it.
@@ -88,7 +88,7 @@ pub(super) fn check_note(text: Option<&str>) -> Result<Option<String>, InvalidIn
 #[cfg(test)]
 mod tests {
     use super::check_note;
-    use crate::catalog::NOTE_CHARS;
+    use mocban_catalog::NOTE_CHARS;
 
     #[test]
     fn an_empty_note_is_none_and_a_long_one_is_refused() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::item::ReviewItem;
 use super::options::QueueOptions;
-use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
+use mocban_catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
 use mocban_core::domain::ContentHash;
 
 /// The latest answers and manual alignments of a reviewer.

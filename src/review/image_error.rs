@@ -1,9 +1,9 @@
 //! Why the images of an item cannot be rendered.
 
-use crate::catalog::CatalogError;
 use crate::export::{PictureError, SourcePrintError};
 use crate::local_server::WorkFailed;
 use crate::report::pair_artifacts::PairArtifactsError;
+use mocban_catalog::CatalogError;
 
 /// Why the images of an item cannot be rendered.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! An item of the queue: an image that a reviewer judges, and related data that stay on the server.
 
-use crate::catalog::Shown;
+use mocban_catalog::Shown;
 use mocban_core::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
 
 /// What the images of an item are rendered from.

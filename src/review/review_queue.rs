@@ -7,10 +7,10 @@ use super::history::ReviewerHistory;
 use super::item::{ItemView, ReviewItem};
 use super::options::QueueOptions;
 use super::order;
-use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::local_server::{WorkFailed, WorkThread};
 use crate::report::consensus::{is_disputed, partition_verdicts};
 use crate::report::pair_artifacts::{PairArtifacts, group_identical};
+use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
 use mocban_store::Project;
 
@@ -184,9 +184,9 @@ async fn faults(
 #[cfg(test)]
 mod tests {
     use super::{is_open_conflict, is_reliable, items_of_pair};
-    use crate::catalog::ReviewerVerdict;
     use crate::report::test_fixtures;
     use crate::review::{CheckRates, QueueOptions};
+    use mocban_catalog::ReviewerVerdict;
     use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
 
     fn options(order: ReviewOrder, faults: f64, duplicates: f64) -> QueueOptions {

@@ -23,8 +23,8 @@ use super::review_queue::QueueError;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
-use crate::catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
 use crate::report::pair_artifacts::PairArtifactsError;
+use mocban_catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
 
 /// Returns the router with all routes behind the guard.

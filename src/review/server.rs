@@ -10,8 +10,8 @@ use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::routes;
 use super::state::ServerState;
-use crate::catalog::{Catalog, CatalogError};
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use mocban_catalog::{Catalog, CatalogError};
 use mocban_store::Project;
 
 /// Why the server cannot start or run.

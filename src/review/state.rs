@@ -7,8 +7,8 @@ use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::review_queue::{QueueError, ReviewQueue};
-use crate::catalog::Catalog;
 use crate::local_server::{AccessControl, WorkThread};
+use mocban_catalog::Catalog;
 use mocban_store::Project;
 
 /// State of one reviewer's server.

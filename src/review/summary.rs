@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::review_queue::ReviewQueue;
 use super::state::ServerState;
-use crate::catalog::CatalogError;
 use crate::report::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
+use mocban_catalog::CatalogError;
 use mocban_core::domain::Verdict;
 
 /// The summary of a review.

@@ -2,7 +2,7 @@
 
 use super::compute_thread::run_blocking;
 use super::error::RunError;
-use crate::catalog::Catalog;
+use mocban_catalog::Catalog;
 use mocban_store::Project;
 
 /// Results whose files are looked for in a place without the name of an owner.

@@ -13,7 +13,7 @@ use super::folder_check::check_folders;
 use super::policy;
 use super::run_context::RunContext;
 use super::stage_output::result_hash;
-use crate::catalog::{
+use mocban_catalog::{
     BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
     NewCharacter,
 };

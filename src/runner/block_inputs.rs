@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
-use crate::catalog::{
+use mocban_catalog::{
     BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
 };
 use mocban_core::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
@@ -77,7 +77,7 @@ impl ReadItem for ComparedBlock {
 fn change(input: &Input, known: &InputVersion) -> Option<InputVersion> {
     match stat_input(input) {
         Ok(stat) if stat == known.stat => None,
-        Ok(_) => hash_input(input).ok().map(Into::into),
+        Ok(_) => hash_input(input).ok(),
         Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
             hash: ContentHash::of(b""),
             stat: "gone".to_owned(),
@@ -196,7 +196,7 @@ fn version(
         };
         return Err(error.into());
     }
-    Ok(hash_input(input)?.into())
+    Ok(hash_input(input)?)
 }
 
 /// Returns the first stage whose result does not belong to these versions, among the stages before `stage`.

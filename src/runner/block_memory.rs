@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::input_reads::ReadItem;
 use super::memory_budget::{mesh_bytes, print_pixels};
 use crate::block::MAX_MAP_PIXELS;
-use crate::catalog::BlockAttributes;
+use mocban_catalog::BlockAttributes;
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};
 use mocban_core::raster;
 use mocban_store::{Input, Project};

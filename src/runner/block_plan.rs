@@ -5,7 +5,7 @@ use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::input_reads::ReadLimits;
 use super::policy;
-use crate::catalog::{BlockSelection, Catalog, RerunPolicy};
+use mocban_catalog::{BlockSelection, Catalog, RerunPolicy};
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
 

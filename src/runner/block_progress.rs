@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::block_inputs::BlockSources;
 use super::block_stages::BlockStageOutput;
-use crate::catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
+use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.

@@ -15,7 +15,7 @@ use super::policy;
 use super::prefetch::Prefetch;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
+use mocban_catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
 use mocban_core::domain::WorkerId;
 use mocban_core::raster;
 

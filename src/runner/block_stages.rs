@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::Value;
 
-use crate::catalog::BlockSettings;
+use mocban_catalog::BlockSettings;
 use mocban_core::domain::{
     ArtifactRef, BlockName, BlockSide, BlockStage, BlockStageRecord, ControlPoints, Failure,
     FailureClass, LengthUnit,

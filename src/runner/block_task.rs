@@ -18,7 +18,7 @@ use super::error::RunError;
 use super::events::RunEvent;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{BlockInputVersions, BlockLease, BlockWork};
+use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
 use mocban_store::ArtifactError;

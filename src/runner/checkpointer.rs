@@ -13,7 +13,7 @@ use super::events::RunEvent;
 use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stage_files::{Unwritten, write_batch};
-use crate::catalog::{CheckpointOutcome, Lease};
+use mocban_catalog::{CheckpointOutcome, Lease};
 use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
 use mocban_system::failpoint::{self, Point};
 

@@ -16,7 +16,7 @@ use super::pair_context::{PairContext, StoredStage};
 use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{InputVersions, StageCheckpoint};
+use mocban_catalog::{InputVersions, StageCheckpoint};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
 use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use mocban_store::{ArtifactError, NewArtifact};

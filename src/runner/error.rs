@@ -1,6 +1,6 @@
 //! Why a run cannot go on.
 
-use crate::catalog::{CatalogError, FieldChange};
+use mocban_catalog::{CatalogError, FieldChange};
 use mocban_core::domain::{BlockName, PairName};
 use mocban_store::{ArtifactError, LockError, PlaceError, StorageError, StoreError};
 

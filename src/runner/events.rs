@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Serialize, Serializer};
 
 use super::stop::StopLevel;
-use crate::catalog::StatusCounts;
+use mocban_catalog::StatusCounts;
 use mocban_core::domain::{BlockName, BlockStage, Failure, PairName, Stage};
 
 /// Something that happened in a run.

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
-use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
+use mocban_catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use mocban_core::domain::{ContentHash, PairId};
-use mocban_store::{Input, InputDigest, InputError, Project, hash_input, stat_input};
+use mocban_store::{Input, InputError, Project, hash_input, stat_input};
 
 /// Pairs compared in one page.
 const PAGE: usize = 1_000;
@@ -177,14 +177,5 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
 
 /// Returns the current version of a file, or `None` if the file cannot be read.
 fn current(input: &Input) -> Option<InputVersion> {
-    hash_input(input).ok().map(Into::into)
-}
-
-impl From<InputDigest> for InputVersion {
-    fn from(read: InputDigest) -> Self {
-        Self {
-            hash: read.hash,
-            stat: read.stat,
-        }
-    }
+    hash_input(input).ok()
 }

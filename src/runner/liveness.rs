@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::catalog::LeaseHolder;
+use mocban_catalog::LeaseHolder;
 use mocban_core::domain::{UnixMillis, WorkerId};
 
 /// Time without a connection and without a new heartbeat after which a worker is dead, as a share of the lease: 7 of 50
@@ -111,7 +111,7 @@ impl Liveness {
 #[cfg(test)]
 mod tests {
     use super::Liveness;
-    use crate::catalog::LeaseHolder;
+    use mocban_catalog::LeaseHolder;
     use mocban_core::domain::WorkerId;
 
     const ME: WorkerId = WorkerId(1);

@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use super::input_reads::ReadItem;
-use crate::catalog::PairAttributes;
+use mocban_catalog::PairAttributes;
 use mocban_core::domain::Stage;
 use mocban_core::raster;
 use mocban_store::{Input, Project};

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use super::run_metrics::RunMetrics;
-use crate::catalog::RerunPolicy;
 use crate::{mesh, raster};
+use mocban_catalog::RerunPolicy;
 use mocban_core::domain::{BlockName, PairName, Stage};
 
 /// Options of a run.

@@ -4,7 +4,7 @@ use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, RunContext};
-use crate::catalog::{FailureAction, InputVersions, Lease, StageFailure};
+use mocban_catalog::{FailureAction, InputVersions, Lease, StageFailure};
 use mocban_core::domain::{Failure, PairName, Stage};
 
 /// A stage of a pair that failed.

@@ -16,7 +16,7 @@ use super::pair_context::{FileInUse, PairContext};
 use super::pair_failure::PairFailure;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{InputVersions, Lease, PairAttributes, PairWork};
+use mocban_catalog::{InputVersions, Lease, PairAttributes, PairWork};
 use mocban_core::domain::{Failure, FailureClass, Stage, WaitReason};
 use mocban_store::ArtifactError;
 use mocban_system::failpoint::{self, Point};

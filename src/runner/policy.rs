@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use crate::catalog::{BlockFailureAction, FailureAction};
+use mocban_catalog::{BlockFailureAction, FailureAction};
 use mocban_core::domain::{BlockId, FailureClass, PairId, UnixMillis};
 use mocban_system::failpoint;
 
@@ -162,8 +162,8 @@ mod tests {
     use std::time::Duration;
 
     use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Timing, backoff_ms, failure_action};
-    use crate::catalog::FailureAction;
     use crate::runner::input_reads::{MAX_HANGING, THREADS};
+    use mocban_catalog::FailureAction;
     use mocban_core::domain::{FailureClass, PairId};
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {

@@ -15,7 +15,7 @@ use super::memory_budget::{EstimatedPair, MemoryBudget, PAIR_BYTES};
 use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
+use mocban_catalog::{ClaimRequest, Lease, PairSelection, PairWork};
 use mocban_core::domain::{BlockName, PairName, WaitReason, WorkerId};
 use mocban_core::raster;
 

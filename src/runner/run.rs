@@ -26,10 +26,10 @@ use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
 use super::worker_session::this_process;
-use crate::catalog::{
+use crate::stages::Settings;
+use mocban_catalog::{
     Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
 };
-use crate::stages::Settings;
 use mocban_core::domain::WorkerId;
 use mocban_core::page_vec;
 use mocban_store::Project;

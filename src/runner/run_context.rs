@@ -13,7 +13,7 @@ use super::policy::{Clock, Timing};
 use super::run_metrics::RunMetrics;
 use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{Catalog, FingerprintIds, WorkerSettings};
+use mocban_catalog::{Catalog, FingerprintIds, WorkerSettings};
 use mocban_core::domain::{Stage, UnixMillis, WorkerMetrics};
 use mocban_store::Project;
 

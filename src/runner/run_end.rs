@@ -13,7 +13,7 @@ use super::run_context::RunContext;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
+use mocban_catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
 use mocban_core::domain::Stage;
 
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.

@@ -2,7 +2,7 @@
 
 use super::error::RunError;
 use super::options::{RunOptions, RunPart};
-use crate::catalog::{Catalog, Fingerprints, SharedSettings, WorkerSettings};
+use mocban_catalog::{Catalog, Fingerprints, SharedSettings, WorkerSettings};
 use mocban_core::domain::UnixMillis;
 use mocban_store::{Project, RunLock};
 

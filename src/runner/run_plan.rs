@@ -10,8 +10,8 @@ use super::options::RunOptions;
 use super::run::fingerprints;
 use super::run_selection::RunSelection;
 use super::stop::Stop;
-use crate::catalog::{BlockPlanEntry, Catalog, Plan};
 use crate::stages::Settings;
+use mocban_catalog::{BlockPlanEntry, Catalog, Plan};
 use mocban_store::Project;
 
 /// What a run would do.

@@ -2,7 +2,7 @@
 
 use super::error::RunError;
 use super::options::NamedWork;
-use crate::catalog::{BlockSelection, Catalog, PairSelection};
+use mocban_catalog::{BlockSelection, Catalog, PairSelection};
 
 /// Some pairs and blocks.
 #[derive(Debug, Clone)]

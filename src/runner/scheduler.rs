@@ -20,7 +20,7 @@ use super::run_context::{PairEnd, PairReport, RunContext};
 use super::run_selection::RunSelection;
 use super::stop::StopLevel;
 use super::worker_session::{HeartbeatOutcome, WorkerSession};
-use crate::catalog::{Outstanding, Waiting};
+use mocban_catalog::{Outstanding, Waiting};
 use mocban_core::domain::{WaitReason, WorkerId};
 
 /// Interval between searches for pairs that other workers released or whose back-off is over.

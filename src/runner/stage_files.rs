@@ -12,7 +12,7 @@ use super::compute_thread::{ComputedStage, run_blocking};
 use super::error::RunError;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::StageCheckpoint;
+use mocban_catalog::StageCheckpoint;
 use mocban_core::domain::{PairName, Stage};
 use mocban_store::{ArtifactError, NewArtifact};
 use mocban_system::failpoint::{self, Point};

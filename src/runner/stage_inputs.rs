@@ -153,7 +153,7 @@ impl StageInputs {
             Err(mesh::MeshReadError::Mesh(error)) => Err(error),
             Ok(mesh) => Ok(mesh),
         };
-        pair.inputs.mesh = Some(file.finish().map_err(unreadable)?.into());
+        pair.inputs.mesh = Some(file.finish().map_err(unreadable)?);
         pair.file_in_use.set(None);
         let mesh = mesh.map_err(|error| {
             let message = format!("{stored}: {error}");
@@ -171,7 +171,7 @@ impl StageInputs {
         let read = || read_input(&input, limit, "limits.image.max_bytes");
         let read = self.metrics.waiting(WaitReason::Inputs, read);
         let file = read.map_err(unreadable)?;
-        pair.inputs.print = Some(file.digest.into());
+        pair.inputs.print = Some(file.version);
         pair.file_in_use.set(None);
         let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
             let message = format!("{stored}: {error}");

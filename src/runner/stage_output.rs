@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use crate::catalog::MetricResult;
+use mocban_catalog::MetricResult;
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use mocban_core::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,

@@ -23,7 +23,7 @@ use super::run::{Executors, run_with};
 use super::{
     BlockStages as _, NamedWork, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel,
 };
-use crate::catalog::{
+use mocban_catalog::{
     BlockSettings, Catalog, ClaimRequest, Fingerprints, RerunPolicy, WorkerInfo, WorkerSettings,
 };
 use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};

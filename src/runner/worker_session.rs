@@ -8,7 +8,7 @@ use super::input_reads::ReadLimits;
 use super::liveness::Liveness;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
-use crate::catalog::{CatalogError, DeadWorker, WorkerInfo};
+use mocban_catalog::{CatalogError, DeadWorker, WorkerInfo};
 use mocban_core::domain::{UnixMillis, WorkerId};
 use mocban_system::platform;
 

@@ -12,7 +12,10 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban"]),
     ("tracing-subscriber", &["mocban"]),
+    ("object_store", &["store"]),
     ("pulp", &["core"]),
+    ("quick-xml", &["lists"]),
+    ("sqlx", &["catalog"]),
     ("tiff", &["core"]),
 ];
 

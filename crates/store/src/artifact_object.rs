@@ -117,9 +117,9 @@ mod tests {
         let input = project.input(&path);
         assert!(input.exists() && input.size() == 9);
         let read = read_input(&input, 100, "x").expect("read");
-        assert_eq!(read.digest, hash_input(&input).expect("known"));
-        assert_eq!(read.digest.hash, artifact.hash);
-        assert_eq!(stat_input(&input).expect("known"), read.digest.stat);
+        assert_eq!(read.version, hash_input(&input).expect("known"));
+        assert_eq!(read.version.hash, artifact.hash);
+        assert_eq!(stat_input(&input).expect("known"), read.version.stat);
         for quick in [false, true] {
             project.check_artifact(&artifact, quick).expect("there");
         }

@@ -193,11 +193,11 @@ mod tests {
         assert_eq!(input.size(), 7);
         let read = read_input(&input, 100, "x").expect("read");
         assert_eq!(&read.bytes[..], b"v 0 0 0");
-        assert_eq!(read.digest.hash, ContentHash::of(b"v 0 0 0"));
-        assert_eq!(hash_input(&input).expect("hashed"), read.digest);
-        assert_eq!(stat_input(&input).expect("there"), read.digest.stat);
+        assert_eq!(read.version.hash, ContentHash::of(b"v 0 0 0"));
+        assert_eq!(hash_input(&input).expect("hashed"), read.version);
+        assert_eq!(stat_input(&input).expect("there"), read.version.stat);
         bucket.put("a/1.obj", b"v 1 1 1 1");
-        assert_ne!(stat_input(&input).expect("there"), read.digest.stat);
+        assert_ne!(stat_input(&input).expect("there"), read.version.stat);
         let missing = read_input(&project.input("scans:a/2.obj"), 100, "x");
         assert!(matches!(missing, Err(InputError::NotThere(_))));
         let large = read_input(&input, 3, "limits.mesh.max_bytes").expect_err("too large");

@@ -7,7 +7,7 @@ use super::input_error::InputError;
 use super::input_place::{Input, InputLocation};
 use super::open_file::{open_regular, regular_metadata};
 use super::remote::BucketError;
-use mocban_core::domain::ContentHash;
+use mocban_core::domain::{ContentHash, InputVersion};
 use mocban_core::page_vec::PageVec;
 use mocban_system::platform::generation;
 
@@ -43,17 +43,8 @@ impl Input {
 pub struct InputFile {
     /// The content.
     pub bytes: PageVec<u8>,
-    /// Its hash and stat.
-    pub digest: InputDigest,
-}
-
-/// What identifies the content of an input file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct InputDigest {
-    /// Hash of the content.
-    pub hash: ContentHash,
-    /// Size, modification time and inode of the file when it was opened, as text.
-    pub stat: String,
+    /// Its version.
+    pub version: InputVersion,
 }
 
 /// An input file that is being read. Each chunk is hashed right after it is read, while it is in the CPU cache.
@@ -98,7 +89,7 @@ impl InputReader {
     ///
     /// # Errors
     /// Returns an error if the file cannot be read, is larger than the limit, or changed after it was opened.
-    pub fn finish(mut self) -> Result<InputDigest, InputError> {
+    pub fn finish(mut self) -> Result<InputVersion, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
         // The limit also holds for a file that grows while it is read.
         let (limit, setting) = self.limit;
@@ -114,7 +105,7 @@ impl InputReader {
         if self.has_changed(&hash)? {
             return Err(InputError::Changed(self.input.path().to_owned()));
         }
-        Ok(InputDigest {
+        Ok(InputVersion {
             hash,
             stat: self.stat,
         })
@@ -216,7 +207,7 @@ pub fn read_input(
     let bytes = PageVec::read(&mut file, about).map_err(|error| file.error(error))?;
     Ok(InputFile {
         bytes,
-        digest: file.finish()?,
+        version: file.finish()?,
     })
 }
 
@@ -225,16 +216,16 @@ pub fn read_input(
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, or cannot be read.
-pub fn hash_input(input: &Input) -> Result<InputDigest, InputError> {
+pub fn hash_input(input: &Input) -> Result<InputVersion, InputError> {
     if let InputLocation::Object(object) = &input.place {
         let copy = object.open(u64::MAX)?;
-        return Ok(InputDigest {
+        return Ok(InputVersion {
             hash: copy.hash,
             stat: copy.version,
         });
     }
     if let InputLocation::Artifact(_, hash) = &input.place {
-        return Ok(InputDigest {
+        return Ok(InputVersion {
             hash: *hash,
             stat: hash.to_hex(),
         });
@@ -244,7 +235,7 @@ pub fn hash_input(input: &Input) -> Result<InputDigest, InputError> {
     hasher
         .update_reader(file)
         .map_err(|error| InputError::io(input.path(), error))?;
-    Ok(InputDigest {
+    Ok(InputVersion {
         hash: ContentHash::from_bytes(*hasher.finalize().as_bytes()),
         stat: input.stat(&meta),
     })
@@ -324,7 +315,7 @@ mod tests {
         let path = Input::file(path);
         let read = read_input(&path, 10, "x").expect("a file");
         let hashed = hash_input(&path).expect("a file");
-        assert_eq!(read.digest, hashed);
+        assert_eq!(read.version, hashed);
         assert_eq!(hashed.hash, ContentHash::of(b"print"));
         assert_eq!(stat_input(&path).expect("a file"), hashed.stat);
     }

@@ -28,9 +28,7 @@ pub use artifacts::NewArtifact;
 pub use atomic_write::{place_new_file, rename_into_place, write_atomic, write_synced};
 pub use input_error::InputError;
 pub use input_place::Input;
-pub use inputs::{
-    InputDigest, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
-};
+pub use inputs::{InputFile, InputReader, hash_input, open_input, read_input, stat_input};
 pub use lock::{LockError, RunLock};
 pub use open_file::{open_regular, read_file_or_pipe};
 pub use place_owner::PlaceError;

@@ -11,8 +11,8 @@ use super::registered_face::{outcome, read_face, unusable};
 use crate::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
 };
-use crate::catalog::{BlockDetail, Catalog};
 use crate::export::pictures::{Rgb, resized};
+use mocban_catalog::{BlockDetail, Catalog};
 use mocban_core::domain::{
     Affine2, ArtifactSet, BlockName, BlockSide, BlockStage, ContentHash, ControlPoint,
     ControlPoints,

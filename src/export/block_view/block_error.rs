@@ -1,8 +1,8 @@
 //! Why a block cannot be shown.
 
 use crate::block::BlockError;
-use crate::catalog::CatalogError;
 use crate::export::source_print::SourcePrintError;
+use mocban_catalog::CatalogError;
 use mocban_core::domain::{BlockName, BlockStage, ThresholdMetric};
 use mocban_core::raster::PngError;
 

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::catalog::{MetricRecord, PairResults, StoredCharacter};
 use crate::export::pictures::{BLUE, ORANGE, VERMILLION};
 use crate::report::Consensus;
+use mocban_catalog::{MetricRecord, PairResults, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, JobStatus, ThresholdMetric, enum_names};
 
 /// Colour of characters whose pairs have no result yet.
@@ -172,8 +172,8 @@ fn status(
 #[cfg(test)]
 pub(super) mod tests {
     use super::{CharacterStatus, CharacterView, PositionConfidence};
-    use crate::catalog::{PairResults, StoredCharacter};
     use crate::report::test_fixtures;
+    use mocban_catalog::{PairResults, StoredCharacter};
     use mocban_core::domain::{BlockCharacterState, FailureClass, ThresholdMetric, Verdict};
 
     /// A character at a box of the page.

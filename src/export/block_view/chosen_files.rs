@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::block_error::BlockViewError;
 use super::registered_face::unusable;
-use crate::catalog::{BlockDetail, Catalog};
+use mocban_catalog::{BlockDetail, Catalog};
 use mocban_core::domain::{BlockName, BlockStage, ContentHash, ControlPoints};
 use mocban_store::{Project, hash_input};
 

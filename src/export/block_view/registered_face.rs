@@ -7,7 +7,7 @@ use crate::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, FaceOutcome, FoundFace, PageMap, StoredHeights,
     StoredPageMap, Support, heights_role,
 };
-use crate::catalog::{BlockDetail, BlockStageDetail};
+use mocban_catalog::{BlockDetail, BlockStageDetail};
 use mocban_core::domain::{ArtifactSet, BlockSide, BlockStage, ContentHash, LengthUnit};
 use mocban_core::raster;
 use mocban_store::Project;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::catalog::MetricRecord;
 use crate::export::export_folder::{FolderError, SharedFile};
 use crate::export::export_logs::json_lines;
 use crate::export::format_writer::{EncodedPair, FormatFolder, FormatGuide, PairView};
@@ -13,6 +12,7 @@ use crate::export::pair_pictures::PairPictures;
 use crate::export::record::{MetricFields, PairFields};
 use crate::export::record_fields::{METRIC_FIELDS, PAIR_FIELDS, markdown_table, schema_of};
 use crate::export::sample::chosen;
+use mocban_catalog::MetricRecord;
 use mocban_core::domain::{DepthScale, ThresholdMetric};
 
 /// The file of lines.

@@ -6,11 +6,11 @@
 use serde_json::{Value, json};
 
 use super::view_inputs::ViewInputs;
-use crate::catalog::PairResults;
 use crate::export::mesh::texture_coordinates;
 use crate::export::pair_pictures::{InputFileLimits, PairPictures, PictureError};
 use crate::export::stage_outcomes::StageOutcomes;
 use crate::report::pair_artifacts::PairArtifacts;
+use mocban_catalog::PairResults;
 use mocban_core::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome, ThresholdMetric};
 use mocban_store::Project;
 

@@ -9,8 +9,8 @@ use crate::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,
 };
-use crate::catalog::Catalog;
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockStage, FailureClass};
 use mocban_lists::labels::{self, PageFile, reading_order};
 

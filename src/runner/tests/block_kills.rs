@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use super::fake_executor::FakeExecutor;
 use super::{RunFixture, options};
-use crate::catalog::Catalog;
 use crate::runner::Stop;
+use mocban_catalog::Catalog;
 use mocban_core::domain::BlockStage;
 use mocban_store::Project;
 

@@ -2,8 +2,8 @@
 
 use super::values::pair_row;
 use super::{RunFixture, name, options};
-use crate::catalog::{BlockAttributes, BlockState, RerunPolicy};
 use crate::runner::{NamedWork, RunError, RunEvent, RunOptions, StopLevel};
+use mocban_catalog::{BlockAttributes, BlockState, RerunPolicy};
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, JobStatus, Stage};
 
 pub(super) fn block(text: &str) -> BlockName {

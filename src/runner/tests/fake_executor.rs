@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::gate::Gate;
 use super::values;
-use crate::catalog::InputVersion;
 use crate::runner::pair_context::PairContext;
 use crate::runner::stage_executor::StageExecutor;
 use crate::runner::stage_output::{ExecutionError, StageOutput};
+use mocban_catalog::InputVersion;
 use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{
     ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric,

@@ -6,9 +6,9 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
-use crate::catalog::{Catalog, DeadWorker, Lease};
 use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
+use mocban_catalog::{Catalog, DeadWorker, Lease};
 use mocban_core::domain::{JobStatus, PairId, PairName, Stage, WorkerId};
 
 impl RunFixture {
@@ -249,20 +249,6 @@ async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
     }
 }
 
-/// Returns the first lease of a pair by the first worker.
-const fn first_lease(pair: PairId) -> Lease {
-    Lease {
-        pair,
-        worker: WorkerId(1),
-        token: 1,
-        cursor: Stage::Fit,
-        fingerprint: None,
-        attempt: 1,
-        exclusive: false,
-        cleared: false,
-    }
-}
-
 /// The tasks of the lost leases still compute, so their slots are not free.
 #[tokio::test]
 async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
@@ -281,7 +267,7 @@ async fn a_pair_leased_again_takes_another_slot_than_its_earlier_task() {
         tasks(2).await;
         // The process does not notice that its pairs are ready again, as after the machine was suspended.
         for pair in [PairId(1), PairId(2)] {
-            let lease = first_lease(pair);
+            let lease = Lease::of_pair(pair);
             fixture.catalog.release(lease).await.expect("released");
         }
         tasks(3).await;

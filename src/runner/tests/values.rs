@@ -2,7 +2,7 @@
 
 use serde_json::Map;
 
-use crate::catalog::{BlockAttributes, ImportRow, PairAttributes};
+use mocban_catalog::{BlockAttributes, ImportRow, PairAttributes};
 use mocban_core::domain::{BlockName, MetricOutcome, PairName, ThresholdMetric, test_values};
 
 /// Returns a pair without optional attributes.

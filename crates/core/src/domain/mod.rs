@@ -17,6 +17,7 @@ mod file_kind;
 mod hash;
 mod height_from_mesh;
 mod ids;
+mod input_version;
 mod job;
 mod metric;
 mod outcome;
@@ -52,6 +53,7 @@ pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use height_from_mesh::HeightFromMesh;
 pub use ids::{PairId, WorkerId};
+pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{

@@ -1,0 +1,200 @@
+//! Repairs damage that a check found, while no run is active. Never changes verdicts.
+
+use serde_json::json;
+use sqlx::AssertSqlSafe;
+
+use crate::audit::integrity::integrity;
+use crate::db::conn::Conn;
+use crate::db::dialect::Sql;
+use crate::db::query::{query, query_as};
+use crate::db::rows::json_array;
+use crate::db::schema::{self, SchemaDifference, wanted_objects};
+use crate::queue::counters::{CounterKey, Deltas};
+use crate::queue::fragments::{fingerprint_before, inconsistent};
+use crate::queue::job_counts::count_jobs;
+use crate::queue::requeue::CLEAR_FAILURES;
+use crate::{Catalog, Result};
+use mocban_core::domain::{PairId, Stage};
+
+const POSITIONS: &str = "
+SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
+FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
+
+const NEW_JOBS: &str = "
+INSERT INTO job (pair, stage, status)
+SELECT CAST(value ->> 0 AS bigint), 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = CAST(value ->> 0 AS bigint))";
+
+/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
+/// lease fail.
+pub(crate) const RESTORE: &str = concat!(
+    "
+UPDATE job SET stage = min(stage, CAST(item.value ->> 1 AS bigint)), status = 0, run_at = NULL, prio = 0,
+    attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
+    fingerprint = ",
+    fingerprint_before!("min(job.stage, CAST(item.value ->> 1 AS bigint))"),
+    "
+FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint)
+RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
+);
+
+/// Removes the results of the stages that are to run again, because their values may be invalid.
+const REMOVE_RESULTS: &str = "
+DELETE FROM stage_result WHERE (pair, stage) IN (
+    SELECT CAST(item.value ->> 0 AS bigint), later.stage FROM json_each(?1) AS item,
+        (SELECT 0 AS stage UNION ALL SELECT 1 UNION ALL SELECT 2 UNION ALL SELECT 3) AS later
+    WHERE later.stage >= CAST(item.value ->> 1 AS bigint))";
+
+/// Keeps heartbeats, which move counters to other rows without the catalog's lock, out until the end of the transaction.
+const LOCK_COUNTERS: &str = "LOCK TABLE counter_part IN SHARE ROW EXCLUSIVE MODE";
+
+/// Recreates every counter with the value 0.
+const RESET_COUNTERS: [Sql; 3] = [
+    Sql::pair("DELETE FROM counter", "DELETE FROM counter_part"),
+    Sql::pair(
+        "INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]')",
+        "INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+        SELECT 0, 0, status, 0, 0 FROM generate_series(0, 4) AS status",
+    ),
+    Sql::pair(
+        "INSERT INTO counter (stage, status, fingerprint, n)
+        SELECT f.stage + 1, s.value, f.id, 0 FROM fingerprint AS f, json_each('[0,1,2,3,4]') AS s",
+        "INSERT INTO counter_part (slot, stage, status, fingerprint, n)
+        SELECT 0, f.stage + 1, status, f.id, 0 FROM fingerprint AS f, generate_series(0, 4) AS status",
+    ),
+];
+
+const FIX_FINGERPRINTS: &str = concat!(
+    "UPDATE job SET fingerprint = ",
+    fingerprint_before!("job.stage"),
+    " WHERE fingerprint IS DISTINCT FROM ",
+    fingerprint_before!("job.stage")
+);
+
+const MARK_DIRTY: &str = concat!(
+    "UPDATE job SET dirty = 1 WHERE dirty = 0 AND EXISTS (",
+    inconsistent!(),
+    ")"
+);
+
+impl Catalog {
+    /// Sends each pair back to the given stage, removes its results from there on, and adds missing jobs. The counters
+    /// must be correct: see [`Catalog::rebuild_counters`].
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails. In that case nothing is changed.
+    pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
+        self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
+            .await
+    }
+
+    /// Corrects the fingerprint of each job, marks jobs with inconsistent results dirty, and recounts all counters.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn rebuild_counters(&self) -> Result<()> {
+        self.in_transaction(|conn| {
+            Box::pin(async move {
+                // Before the jobs are changed, so that heartbeats wait.
+                lock_counters(conn).await?;
+                for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
+                    query(sql).execute(&mut *conn).await?;
+                }
+                recount(conn).await
+            })
+        })
+        .await
+    }
+
+    /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
+        self.in_transaction(|conn| {
+            Box::pin(async move {
+                let Conn::Sqlite(conn) = conn else {
+                    return Ok(Vec::new());
+                };
+                sqlx::query("REINDEX").execute(&mut **conn).await?;
+                integrity(conn, false).await
+            })
+        })
+        .await
+    }
+
+    /// Recreates missing indexes and triggers. Does not change tables.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn restore_schema(&self) -> Result<()> {
+        let wanted = wanted_objects().await?;
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let Conn::Sqlite(conn) = conn else {
+                    return Ok(());
+                };
+                for found in schema::differences(conn, wanted).await? {
+                    let SchemaDifference::Missing(name) = found else {
+                        continue;
+                    };
+                    if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
+                        // SQL of our own migrations.
+                        let sql = AssertSqlSafe(sql.as_str());
+                        sqlx::query(sql).execute(&mut **conn).await?;
+                    }
+                }
+                Ok(())
+            })
+        })
+        .await
+    }
+}
+
+async fn lock_counters(conn: &mut Conn) -> Result<()> {
+    match conn {
+        Conn::Postgres(_) => query(LOCK_COUNTERS).execute(conn).await,
+        Conn::Sqlite(_) => Ok(()),
+    }
+}
+
+/// Recounts all counters in an open transaction.
+pub(crate) async fn recount(conn: &mut Conn) -> Result<()> {
+    lock_counters(conn).await?;
+    for sql in RESET_COUNTERS {
+        query(sql).execute(&mut *conn).await?;
+    }
+    let mut deltas = Deltas::default();
+    for (key, jobs) in count_jobs(conn).await? {
+        deltas.add(key, jobs.cast_signed());
+    }
+    deltas.apply(conn).await
+}
+
+async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {
+    let items = json_array(
+        pairs
+            .iter()
+            .map(|(pair, stage)| json!([pair.0, stage.index()])),
+    );
+    let mut deltas = Deltas::default();
+    let before = query_as(POSITIONS).bind(&items);
+    let before: Vec<CounterKey> = before.fetch_all(&mut *conn).await?;
+    for key in before {
+        deltas.add(key, -1);
+    }
+    query(NEW_JOBS).bind(&items).execute(&mut *conn).await?;
+    let after = query_as(RESTORE).bind(&items);
+    let after: Vec<CounterKey> = after.fetch_all(&mut *conn).await?;
+    for key in after {
+        deltas.add(key, 1);
+    }
+    query(REMOVE_RESULTS)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
+    query(CLEAR_FAILURES)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
+    deltas.apply(conn).await
+}

@@ -1,0 +1,181 @@
+//! Stores the last stage of a block: its result, its characters, and the pairs that were cut, in one transaction.
+
+use std::collections::BTreeSet;
+
+use crate::blocks::checkpoint::{self, Stored};
+use crate::blocks::model::{BlockCheckpoint, BlockLease, CutPair, NewCharacter};
+use crate::blocks::{characters, retired};
+use crate::db::conn::Conn;
+use crate::db::query::{query_as, query_scalar};
+use crate::db::rows::names_json;
+use crate::db::script::Script;
+use crate::queue::checkpoint::add_inputs;
+use crate::queue::counters::Deltas;
+use crate::queue::lease::InputVersions;
+use crate::records::import::{ImportRow, ImportSummary, import_chunk};
+use crate::{Catalog, Result};
+use mocban_core::domain::{BlockName, PairId, PairName};
+
+/// What the cut of a block changed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct CutSummary {
+    /// Pairs that are new.
+    pub added: u64,
+    /// Pairs that changed and run again.
+    pub changed: u64,
+    /// Pairs that stay as they are.
+    pub unchanged: u64,
+    /// Pairs that were retired because their boxes are gone.
+    pub retired: u64,
+}
+
+/// What became of the checkpoint of a cut.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum CutReply {
+    /// It was stored.
+    Stored(CutSummary),
+    /// The lease was lost; nothing was stored.
+    LeaseLost,
+    /// A pair with this name exists that was not cut from this block; nothing was stored.
+    NameTaken(PairName),
+}
+
+const NAME: &str = "SELECT name FROM block WHERE id = ?1";
+
+/// Selects the first pair with one of these names that does not belong to the block.
+const TAKEN: &str = "
+SELECT p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?2)) AND NOT EXISTS (
+    SELECT 1 FROM block_character AS c WHERE c.block = ?1 AND c.pair = p.id) ORDER BY p.name LIMIT 1";
+
+const PAIRS: &str = "
+SELECT p.id, p.name FROM pair AS p WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id";
+
+/// The columns of a pair whose change does not affect its results.
+const WITHOUT_EFFECT: [&str; 3] = ["character", "block", "metadata"];
+
+impl Catalog {
+    /// Stores the stage `cut`: its result, the characters, and a pair for each character that was cut. All files must
+    /// be on disk already. A pair whose files and attributes are the same stays as it is, a changed one runs again from
+    /// the first stage, and one whose box is gone is retired. Verdicts stay in all cases.
+    ///
+    /// # Errors
+    /// Returns an error if the name of a pair is invalid, or if a database operation fails.
+    pub async fn finish_cut(
+        &self,
+        lease: BlockLease,
+        stage: BlockCheckpoint,
+        characters: Vec<NewCharacter>,
+    ) -> Result<CutReply> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move { finish(conn, &lease, &stage, &characters).await })
+        })
+        .await
+    }
+}
+
+async fn finish(
+    conn: &mut Conn,
+    lease: &BlockLease,
+    stage: &BlockCheckpoint,
+    found: &[NewCharacter],
+) -> Result<CutReply> {
+    let name = query_scalar(NAME).bind(lease.block.0);
+    let name: BlockName = name.fetch_one(&mut *conn).await?;
+    let rows = pair_rows(&name, found)?;
+    let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
+    let taken = query_scalar(TAKEN).bind(lease.block.0);
+    let taken: Option<PairName> = taken
+        .bind(names_json(&names))
+        .fetch_optional(&mut *conn)
+        .await?;
+    if let Some(taken) = taken {
+        return Ok(CutReply::NameTaken(taken));
+    }
+    match checkpoint::store(conn, lease, stage).await? {
+        Stored::LeaseLost => return Ok(CutReply::LeaseLost),
+        Stored::Before => return Ok(CutReply::Stored(CutSummary::default())),
+        Stored::Now => {}
+    }
+    let mut deltas = Deltas::default();
+    let summary = store_pairs(conn, &rows, stage.at, &mut deltas).await?;
+    let gone = characters::store(conn, lease.block, &name, found).await?;
+    let retired = retired::retire(conn, &gone, stage.at, &mut deltas).await?;
+    deltas.apply(conn).await?;
+    Ok(CutReply::Stored(CutSummary { retired, ..summary }))
+}
+
+/// A pair to import with the character that was cut.
+struct CutRow<'c> {
+    row: ImportRow,
+    cut: &'c CutPair,
+}
+
+/// Returns the pairs to import, each with its files.
+fn pair_rows<'c>(block: &BlockName, found: &'c [NewCharacter]) -> Result<Vec<CutRow<'c>>> {
+    let cut = found.iter();
+    let cut = cut.filter_map(|one| Some((one, one.cut.as_ref().ok()?)));
+    cut.map(|(one, cut)| {
+        let row = ImportRow {
+            name: characters::pair_name(block, &one.label)?,
+            mesh_path: cut.mesh_path.clone(),
+            print_path: cut.print_path.clone(),
+            unit: cut.unit,
+            scanned_face_down: cut.scanned_face_down,
+            character: one.character.clone(),
+            block: Some(block.as_str().to_owned()),
+            meta: serde_json::Map::new(),
+            prior: cut.prior.clone(),
+        };
+        Ok(CutRow { row, cut })
+    })
+    .collect()
+}
+
+/// Adds and updates pairs. Sends those whose files or attributes changed back to the first stage.
+async fn store_pairs(
+    conn: &mut Conn,
+    rows: &[CutRow<'_>],
+    now: i64,
+    deltas: &mut Deltas,
+) -> Result<CutSummary> {
+    let imported: Vec<ImportRow> = rows.iter().map(|cut| cut.row.clone()).collect();
+    let mut summary = ImportSummary::default();
+    import_chunk(conn, &imported, now, &mut summary, deltas).await?;
+    let names: Vec<PairName> = imported.into_iter().map(|row| row.name).collect();
+    let stored = query_as(PAIRS).bind(names_json(&names));
+    let stored: Vec<(PairId, PairName)> = stored.fetch_all(&mut *conn).await?;
+    let versions: Vec<(PairId, InputVersions)> = stored
+        .iter()
+        .filter_map(|(id, name)| {
+            let found = rows.iter().find(|cut| cut.row.name == *name)?;
+            let versions = InputVersions {
+                mesh: Some(found.cut.mesh.clone()),
+                print: Some(found.cut.print.clone()),
+            };
+            Some((*id, versions))
+        })
+        .collect();
+    let mut script = Script::default();
+    add_inputs(&mut script, versions.iter().map(|(id, seen)| (*id, seen)))?;
+    script.run(conn).await?;
+    let changed: BTreeSet<&PairName> = summary
+        .changed
+        .iter()
+        .filter(|change| {
+            let fields = change.fields.iter();
+            fields.clone().any(|field| !WITHOUT_EFFECT.contains(field))
+        })
+        .map(|change| &change.name)
+        .collect();
+    let again = stored.iter().filter(|(_, name)| changed.contains(name));
+    let again: Vec<PairId> = again.map(|(id, _)| *id).collect();
+    retired::reset(conn, &again, deltas).await?;
+    let all = names.len() as u64;
+    let changed = again.len() as u64;
+    Ok(CutSummary {
+        added: summary.added,
+        changed,
+        unchanged: all - summary.added - changed,
+        retired: 0,
+    })
+}

@@ -1,0 +1,147 @@
+//! Import of blocks: names, paths and attributes.
+
+use crate::blocks::model::BlockAttributes;
+use crate::db::conn::Conn;
+use crate::db::query::{query, query_scalar};
+use crate::db::row::FromRow as _;
+use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::left_out::is_counted;
+use crate::{Catalog, Result};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
+
+/// Counts of an import of blocks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct BlockImportSummary {
+    /// Number of new blocks.
+    pub added: u64,
+    /// Existing blocks with other values, and the columns that differ.
+    pub changed: Vec<(BlockName, Vec<&'static str>)>,
+    /// Number of existing blocks with the same values.
+    pub unchanged: u64,
+}
+
+const SELECT: &str =
+    "SELECT name, mesh_path, page_path, labels_path, unit, side FROM block WHERE name = ?1";
+
+/// Adds a block or updates it. If a path changed, clears the `stat` of that file, so that the next run reads the file. True
+/// boxes belong to the page of one path; they are not compared with its content.
+const UPSERT: &str = "
+INSERT INTO block (name, mesh_path, page_path, labels_path, unit, side, attributes, imported)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
+ON CONFLICT (name) DO UPDATE SET
+    mesh_stat = CASE WHEN block.mesh_path = excluded.mesh_path THEN block.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
+    page_stat = CASE WHEN block.page_path = excluded.page_path THEN block.page_stat ELSE '' END, page_path = excluded.page_path,
+    labels_stat = CASE WHEN block.labels_path = excluded.labels_path THEN block.labels_stat ELSE '' END,
+    true_boxes = CASE WHEN block.page_path = excluded.page_path THEN block.true_boxes END,
+    labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
+RETURNING id";
+
+pub(crate) const NEW_JOB: &str =
+    "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
+
+const NAMES: &str = concat!(
+    "SELECT name FROM block WHERE ",
+    is_counted!("id", "?1"),
+    " ORDER BY name"
+);
+
+impl Catalog {
+    /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
+    /// stages of a changed block are stale.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails. In that case nothing is imported.
+    pub async fn import_blocks(
+        &self,
+        rows: Vec<BlockAttributes>,
+        now: UnixMillis,
+    ) -> Result<BlockImportSummary> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let mut summary = BlockImportSummary::default();
+                for row in &rows {
+                    import_block(conn, row, now, &mut summary).await?;
+                }
+                Ok(summary)
+            })
+        })
+        .await
+    }
+
+    /// Changes a block by a statement with its name as `?1` and a value as `?2`, which returns its id, and stores the
+    /// checksum of the row. Returns `false` if the block does not exist.
+    pub(crate) async fn update_block(
+        &self,
+        statement: &'static str,
+        block: &BlockName,
+        value: Option<String>,
+    ) -> Result<bool> {
+        let name = block.to_string();
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let update = query_scalar(statement).bind(&name).bind(&value);
+                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+                let Some(id) = id else { return Ok(false) };
+                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+                Ok(true)
+            })
+        })
+        .await
+    }
+
+    /// Returns the names of all blocks, sorted.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn block_names(&self) -> Result<Vec<BlockName>> {
+        let mut conn = self.read_conn().await?;
+        let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));
+        names.fetch_all(&mut conn).await
+    }
+}
+
+async fn import_block(
+    conn: &mut Conn,
+    row: &BlockAttributes,
+    now: UnixMillis,
+    summary: &mut BlockImportSummary,
+) -> Result<()> {
+    let stored = query(SELECT).bind(row.name.as_str());
+    let stored = stored.fetch_optional(&mut *conn).await?;
+    // A row with an invalid value is replaced.
+    let stored = stored.map(|row| BlockAttributes::from_row(&row).ok());
+    match stored {
+        None => summary.added += 1,
+        Some(Some(old)) if old == *row => summary.unchanged += 1,
+        Some(old) => {
+            let changed = old.map_or_else(|| vec!["a damaged value"], |old| differing(&old, row));
+            summary.changed.push((row.name.clone(), changed));
+        }
+    }
+    let id: i64 = query_scalar(UPSERT)
+        .bind(row.name.as_str())
+        .bind(&row.mesh_path)
+        .bind(&row.page_path)
+        .bind(&row.labels_path)
+        .bind(row.unit.map(LengthUnit::name))
+        .bind(row.side.map(BlockSide::name))
+        .bind(row.of_results().to_string())
+        .bind(now)
+        .fetch_one(&mut *conn)
+        .await?;
+    checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+    query(NEW_JOB).bind(id).execute(conn).await
+}
+
+fn differing(old: &BlockAttributes, new: &BlockAttributes) -> Vec<&'static str> {
+    [
+        ("mesh", old.mesh_path != new.mesh_path),
+        ("page", old.page_path != new.page_path),
+        ("labels", old.labels_path != new.labels_path),
+        ("unit", old.unit != new.unit),
+        ("side", old.side != new.side),
+    ]
+    .into_iter()
+    .filter_map(|(name, differs)| differs.then_some(name))
+    .collect()
+}

@@ -1,0 +1,164 @@
+//! Retries operations while another process has the catalog locked. Waits longer than SQLite's busy timeout.
+
+use std::path::Path;
+use std::time::Duration;
+
+use tokio::time::{Sleep, sleep};
+
+use crate::db::error::Result;
+use crate::db::error_kind::CatalogErrorKind;
+use crate::db::lock_owner::lock_owner;
+use mocban_system::platform::ActiveClock;
+
+/// Longest wait.
+const LONGEST_WAIT: Duration = Duration::from_mins(1);
+/// Wait after which the lock's owner is logged.
+const QUIET_WAIT: Duration = Duration::from_secs(5);
+/// Time between two attempts: SQLite refuses some locks at once.
+const RETRY_EVERY: Duration = Duration::from_millis(5);
+
+/// Longest time of one attempt: SQLite's busy timeout and a margin. If more time passes, the process was suspended.
+const LONGEST_ATTEMPT: Duration = Duration::from_secs(15);
+
+/// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
+pub(crate) struct BusyRetry<'p> {
+    catalog: &'p Path,
+    clock: ActiveClock,
+    is_logged: bool,
+}
+
+impl<'p> BusyRetry<'p> {
+    /// Starts to wait for this catalog.
+    pub(crate) fn begin(catalog: &'p Path) -> Self {
+        Self {
+            catalog,
+            clock: ActiveClock::start(LONGEST_ATTEMPT),
+            is_logged: false,
+        }
+    }
+
+    /// Returns the pause before the next attempt. Returns `None` if the outcome is not a lock error, or if
+    /// `LONGEST_WAIT` has passed.
+    pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
+        let error = outcome.as_ref().err()?;
+        let waited = self.clock.now();
+        if error.kind() != Some(CatalogErrorKind::Busy) || waited >= LONGEST_WAIT {
+            return None;
+        }
+        tracing::debug!(%error, "the catalog is busy, waiting");
+        if waited >= QUIET_WAIT && !self.is_logged {
+            self.is_logged = true;
+            let owner = lock_owner(self.catalog);
+            let owner =
+                owner.map_or_else(|| "another process".to_owned(), |owner| owner.to_string());
+            tracing::warn!("{} is locked by {owner}; waiting", self.catalog.display());
+        }
+        Some(sleep(RETRY_EVERY))
+    }
+}
+
+/// Evaluates a fallible expression again while it fails with a lock error, for at most `LONGEST_WAIT`. The value is the
+/// last result.
+macro_rules! retry_while_busy {
+    ($catalog:expr, $attempt:expr) => {{
+        let mut retry = $crate::db::busy_retry::BusyRetry::begin($catalog);
+        loop {
+            let outcome = $attempt;
+            match retry.wait(&outcome) {
+                Some(moment) => moment.await,
+                None => break outcome,
+            }
+        }
+    }};
+}
+pub(crate) use retry_while_busy;
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    use sqlx::sqlite::SqliteConnectOptions;
+    use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
+    use tracing::span::{Attributes, Id, Record};
+    use tracing::{Event, Level, Metadata, Subscriber, subscriber};
+
+    use super::{ActiveClock, BusyRetry, LONGEST_ATTEMPT, LONGEST_WAIT, QUIET_WAIT};
+    use crate::{CatalogError, Result};
+
+    async fn connect(path: &Path) -> SqliteConnection {
+        let options = SqliteConnectOptions::new().filename(path);
+        let options = options.create_if_missing(true).busy_timeout(Duration::ZERO);
+        options.connect().await.expect("a connection")
+    }
+
+    /// Returns the error of a write to a locked database.
+    async fn busy() -> Result<()> {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("catalog.sqlite");
+        let (mut first, mut second) = (connect(&path).await, connect(&path).await);
+        let begin = sqlx::query("BEGIN IMMEDIATE").execute(&mut first).await;
+        begin.expect("the lock");
+        let refused = sqlx::query("BEGIN IMMEDIATE").execute(&mut second).await;
+        first.close().await.expect("closed");
+        Err(refused.expect_err("locked").into())
+    }
+
+    /// Returns a retry that has waited this long already.
+    fn after(waited: Duration) -> BusyRetry<'static> {
+        let mut retry = BusyRetry::begin(Path::new("catalog.sqlite"));
+        retry.clock = ActiveClock::continued(LONGEST_ATTEMPT, waited);
+        retry
+    }
+
+    /// A subscriber that counts warnings.
+    #[derive(Default)]
+    struct Warnings(Arc<AtomicUsize>);
+
+    impl Subscriber for Warnings {
+        fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+            *metadata.level() == Level::WARN
+        }
+
+        fn event(&self, _: &Event<'_>) {
+            self.0.fetch_add(1, Ordering::SeqCst);
+        }
+
+        fn new_span(&self, _: &Attributes<'_>) -> Id {
+            Id::from_u64(1)
+        }
+
+        fn record(&self, _: &Id, _: &Record<'_>) {}
+
+        fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+        fn enter(&self, _: &Id) {}
+
+        fn exit(&self, _: &Id) {}
+    }
+
+    #[tokio::test]
+    async fn lock_owner_is_logged_once_and_the_wait_ends() {
+        let busy = busy().await;
+        let warnings = Warnings::default();
+        let logged = Arc::clone(&warnings.0);
+        let _log = subscriber::set_default(warnings);
+        assert!(after(Duration::ZERO).wait(&busy).is_some());
+        assert_eq!(logged.load(Ordering::SeqCst), 0);
+        let mut retry = after(QUIET_WAIT);
+        for _ in 0..3 {
+            assert!(retry.wait(&busy).is_some());
+            assert_eq!(logged.load(Ordering::SeqCst), 1);
+        }
+        assert!(after(LONGEST_WAIT).wait(&busy).is_none());
+    }
+
+    #[tokio::test]
+    async fn success_and_other_errors_are_not_retried() {
+        assert!(after(Duration::ZERO).wait(&Ok(())).is_none());
+        let closed: Result<()> = Err(CatalogError::Closed);
+        assert!(after(Duration::ZERO).wait(&closed).is_none());
+    }
+}

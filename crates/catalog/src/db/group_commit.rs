@@ -1,0 +1,277 @@
+//! Group commit: stores a batch of requests in one transaction. On a server, only the rarer requests share one.
+
+use std::sync::Arc;
+
+use crate::db::conn::Conn;
+use crate::db::error::{CatalogError, Result};
+use crate::db::known_leases::stored_before;
+use crate::db::request::{Reply, Request};
+use crate::db::script::{Script, ScriptRows, Statement};
+use crate::db::write_connection::BEGIN;
+use crate::queue::checkpoint::{self, LeasedCheckpoints};
+use crate::queue::claim::{self, ClaimRequest, Heartbeat};
+use crate::queue::counters::Deltas;
+use crate::queue::fail::{self, FailedRow};
+use crate::queue::lease::{FencedRow, Lease, StageFailure};
+
+/// Requests of one kind, and where the reply to each goes.
+pub(crate) struct Pending<I, R>(Vec<(I, Reply<R>)>);
+
+impl<I, R> Pending<I, R> {
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn items(&self) -> impl Iterator<Item = &I> {
+        self.0.iter().map(|(item, _)| item)
+    }
+
+    fn answer(self, replies: Vec<R>) {
+        for ((_, reply), answer) in self.0.into_iter().zip(replies) {
+            // The sender may no longer wait.
+            let _ = reply.send(Ok(answer));
+        }
+    }
+
+    fn refuse(self, error: &Arc<CatalogError>) {
+        for (_, reply) in self.0 {
+            let _ = reply.send(Err(CatalogError::Shared(Arc::clone(error))));
+        }
+    }
+}
+
+impl<I, R> Default for Pending<I, R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+/// The requests of one commit by kind.
+#[derive(Default)]
+pub(crate) struct Batch {
+    pub(crate) heartbeats: Pending<Heartbeat, bool>,
+    pub(crate) checkpoints: Pending<Box<LeasedCheckpoints>, bool>,
+    pub(crate) failures: Pending<Box<(Lease, StageFailure)>, bool>,
+    pub(crate) releases: Pending<Lease, bool>,
+    pub(crate) claims: Pending<ClaimRequest, Vec<Lease>>,
+}
+
+/// Replies to the requests of a batch, in their order.
+#[derive(Debug, Default)]
+pub(crate) struct BatchReply {
+    heartbeats: Vec<bool>,
+    pub(crate) checkpoints: Vec<bool>,
+    failures: Vec<bool>,
+    releases: Vec<bool>,
+    pub(crate) claims: Vec<Vec<Lease>>,
+}
+
+/// Statements of the first round trip, which change workers and jobs. A request under a lease changes its job only if
+/// the lease is still valid.
+struct JobStatements {
+    heartbeats: Vec<Statement<(i64,)>>,
+    advanced: Option<Statement<FencedRow>>,
+    failed: Option<Statement<FailedRow>>,
+    released: Option<Statement<FencedRow>>,
+    claims: Vec<Statement<Lease>>,
+}
+
+impl Batch {
+    pub(crate) fn push(&mut self, request: Request) {
+        match request {
+            Request::Heartbeat(heartbeat, reply) => self.heartbeats.0.push((heartbeat, reply)),
+            Request::Checkpoint(done, reply) => self.checkpoints.0.push((done, reply)),
+            Request::Fail(failed, reply) => self.failures.0.push((failed, reply)),
+            Request::Release(lease, reply) => self.releases.0.push((lease, reply)),
+            Request::Claim(claim, reply) => self.claims.0.push((claim, reply)),
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.heartbeats.0.len()
+            + self.checkpoints.0.len()
+            + self.failures.0.len()
+            + self.releases.0.len()
+            + self.claims.0.len()
+    }
+
+    /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, then claims. After an error,
+    /// the transaction may still be open, so the caller must roll it back. `may_be_stored` says that an earlier commit of
+    /// the same failures and releases may have been stored although its reply was lost, on a server.
+    pub(crate) async fn apply(&self, conn: &mut Conn, may_be_stored: bool) -> Result<BatchReply> {
+        let mut script = Script::default();
+        script.execute(BEGIN);
+        let statements = self.add_jobs(&mut script)?;
+        let rows = script.run(conn).await?;
+        let mut stored = Vec::new();
+        if may_be_stored {
+            stored = self.stored_before(conn, &statements, &rows).await?;
+        }
+        let mut script = Script::default();
+        let reply = self.add_records(&mut script, &statements, &rows, &stored)?;
+        script.execute("COMMIT");
+        script.run(conn).await?;
+        Ok(reply)
+    }
+
+    /// Finds the failures and releases without effect in this transaction that an earlier commit has stored.
+    async fn stored_before(
+        &self,
+        conn: &mut Conn,
+        statements: &JobStatements,
+        rows: &ScriptRows,
+    ) -> Result<Vec<FencedRow>> {
+        let failed = rows.read_if_any(statements.failed.as_ref())?;
+        let released = rows.read_if_any(statements.released.as_ref())?;
+        let failures = self.failures.items().map(|item| &item.0);
+        let failures = failures.filter(|lease| fail::row_of(lease, &failed).is_none());
+        let releases = self.releases.items();
+        let releases = releases.filter(|lease| !lease.is_in(&released));
+        stored_before(conn, [].into_iter(), failures.chain(releases)).await
+    }
+
+    /// Adds the statements that change workers and jobs.
+    fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
+        let heartbeats = self.heartbeats.items();
+        let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, heartbeat));
+        Ok(JobStatements {
+            heartbeats: heartbeats.collect(),
+            advanced: checkpoint::add_advance(
+                script,
+                self.checkpoints.items().map(|item| &**item),
+            )?,
+            failed: fail::add_failures(script, self.failures.items().map(|item| &**item))?,
+            released: claim::add_release(script, self.releases.items())?,
+            claims: self
+                .claims
+                .items()
+                .map(|request| claim::add_claim(script, request))
+                .collect(),
+        })
+    }
+
+    /// Adds the statements of the second round trip, which store results, failures and counters. Returns the replies.
+    /// `found` are the jobs of failures and releases that an earlier commit has stored.
+    fn add_records(
+        &self,
+        script: &mut Script,
+        statements: &JobStatements,
+        rows: &ScriptRows,
+        found: &[FencedRow],
+    ) -> Result<BatchReply> {
+        let mut deltas = Deltas::default();
+        let advanced = rows.read_if_any(statements.advanced.as_ref())?;
+        let failed = rows.read_if_any(statements.failed.as_ref())?;
+        let released = rows.read_if_any(statements.released.as_ref())?;
+        let heartbeats = statements.heartbeats.iter();
+        let heartbeats = heartbeats.map(|statement| Ok(!rows.read(statement)?.is_empty()));
+        let mut claims = Vec::with_capacity(statements.claims.len());
+        for statement in &statements.claims {
+            let leases = claim::in_order(rows.read(statement)?);
+            claim::count_claimed(&leases, &mut deltas);
+            claims.push(leases);
+        }
+        let stored = self.checkpoints.items().map(|item| &**item);
+        let stored: Vec<_> = stored.filter(|(lease, _)| lease.is_in(&advanced)).collect();
+        checkpoint::add_results(script, &stored, &mut deltas)?;
+        let failures = self.failures.items();
+        let failures = failures.filter_map(|item| Some((&**item, fail::row_of(&item.0, &failed)?)));
+        fail::add_failure_records(script, &failures.collect::<Vec<_>>(), &mut deltas)?;
+        let releases = self.releases.items();
+        claim::count_released(releases.filter(|lease| lease.is_in(&released)), &mut deltas);
+        deltas.add_to(script)?;
+        let (checkpoints, failures) = (self.checkpoints.items(), self.failures.items());
+        let releases = self.releases.items();
+        Ok(BatchReply {
+            heartbeats: heartbeats.collect::<Result<_>>()?,
+            checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
+            failures: failures
+                .map(|item| fail::row_of(&item.0, &failed).is_some() || item.0.is_in(found))
+                .collect(),
+            releases: releases
+                .map(|lease| lease.is_in(&released) || lease.is_in(found))
+                .collect(),
+            claims,
+        })
+    }
+
+    /// Sends the replies.
+    pub(crate) fn answer(self, replies: BatchReply) {
+        self.heartbeats.answer(replies.heartbeats);
+        self.checkpoints.answer(replies.checkpoints);
+        self.failures.answer(replies.failures);
+        self.releases.answer(replies.releases);
+        self.claims.answer(replies.claims);
+    }
+
+    /// Replies to all requests that nothing was stored.
+    pub(crate) fn refuse(self, error: &Arc<CatalogError>) {
+        self.heartbeats.refuse(error);
+        self.checkpoints.refuse(error);
+        self.failures.refuse(error);
+        self.releases.refuse(error);
+        self.claims.refuse(error);
+    }
+
+    /// Returns whether there are requests that share a transaction on a server.
+    pub(crate) const fn has_shared_transaction(&self) -> bool {
+        !self.heartbeats.is_empty() || !self.failures.is_empty() || !self.releases.is_empty()
+    }
+
+    /// Splits the batch into the parts that a server commits one after another: heartbeats with failures and releases,
+    /// then checkpoints, then each claim.
+    pub(crate) fn split_for_server(self) -> Vec<Self> {
+        let checkpoints = Self {
+            checkpoints: self.checkpoints,
+            ..Self::default()
+        };
+        let claims = self.claims.0.into_iter().map(|claim| Self {
+            claims: Pending(vec![claim]),
+            ..Self::default()
+        });
+        let shared = Self {
+            heartbeats: self.heartbeats,
+            failures: self.failures,
+            releases: self.releases,
+            ..Self::default()
+        };
+        let parts = [shared, checkpoints].into_iter().chain(claims);
+        parts.filter(|part| part.len() > 0).collect()
+    }
+
+    /// Splits the batch into batches of one request each, in the order of execution.
+    pub(crate) fn split(self) -> Vec<Self> {
+        let heartbeats = self
+            .heartbeats
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Heartbeat(a, b));
+        let checkpoints = self
+            .checkpoints
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Checkpoint(a, b));
+        let failures = self
+            .failures
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Fail(a, b));
+        let releases = self
+            .releases
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Release(a, b));
+        let claims = self.claims.0.into_iter().map(|(a, b)| Request::Claim(a, b));
+        let requests = heartbeats
+            .chain(checkpoints)
+            .chain(failures)
+            .chain(releases)
+            .chain(claims);
+        let single = |request| {
+            let mut batch = Self::default();
+            batch.push(request);
+            batch
+        };
+        requests.map(single).collect()
+    }
+}

@@ -1,0 +1,93 @@
+//! Decodes columns into domain types. An invalid value is an error.
+
+use serde_json::Value;
+use sqlx::error::BoxDynError;
+
+use crate::db::value::{Argument, FromValue, Value as ColumnValue, read_blob, read_text};
+use crate::queue::lease::FingerprintId;
+use mocban_core::domain::{
+    Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
+    ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName, PrintFromMesh, Reason,
+    ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+};
+
+/// Implements [`FromValue`] for domain types. Each line has a type, the type of its column, and a conversion function.
+macro_rules! decode {
+    ($($type:ty: $column:ident = $convert:expr;)+) => {$(
+        impl FromValue for $type {
+            fn from_value(value: ColumnValue<'_>) -> Result<Self, BoxDynError> {
+                decode!(@$column value, $convert)
+            }
+        }
+    )+};
+    (@integer $value:ident, $convert:expr) => { Ok($convert(i64::from_value($value)?)?) };
+    (@text $value:ident, $convert:expr) => { read_text(&$value, |text| $convert(text)) };
+    (@blob $value:ident, $convert:expr) => { read_blob(&$value, $convert) };
+}
+
+decode! {
+    PairId: integer = |id| Ok::<_, String>(Self(id));
+    WorkerId: integer = |id| Ok::<_, String>(Self(id));
+    BlockId: integer = |id| Ok::<_, String>(Self(id));
+    FingerprintId: integer = |id| Ok::<_, String>(Self(id));
+    JobStatus: integer = status;
+    Stage: integer = stage;
+    BlockStage: integer = block_stage;
+    ContentHash: blob = hash;
+    PairName: text = str::parse;
+    BlockName: text = str::parse;
+    BlockSide: text = str::parse;
+    BlockCharacterState: text = str::parse;
+    FailureClass: text = str::parse;
+    LengthUnit: text = str::parse;
+    Reason: text = str::parse;
+    ReviewOrder: text = str::parse;
+    ThresholdMetric: text = str::parse;
+    Verdict: text = str::parse;
+    Affine2: text = serde_json::from_str;
+    AttentionCheck: text = serde_json::from_str;
+    PrintFromMesh: text = serde_json::from_str;
+}
+
+impl From<FingerprintId> for Argument {
+    fn from(FingerprintId(id): FingerprintId) -> Self {
+        Self::from(id)
+    }
+}
+
+impl From<Option<FingerprintId>> for Argument {
+    fn from(id: Option<FingerprintId>) -> Self {
+        Self::from(id.map(|FingerprintId(id)| id))
+    }
+}
+
+fn status(code: i64) -> Result<JobStatus, String> {
+    JobStatus::from_code(code).ok_or_else(|| format!("job status {code} is unknown"))
+}
+
+fn stage(index: i64) -> Result<Stage, String> {
+    let stage = usize::try_from(index).ok().and_then(Stage::from_index);
+    stage.ok_or_else(|| format!("stage {index} is unknown"))
+}
+
+fn block_stage(index: i64) -> Result<BlockStage, String> {
+    let stage = usize::try_from(index).ok().and_then(BlockStage::from_index);
+    stage.ok_or_else(|| format!("stage {index} of a block is unknown"))
+}
+
+fn hash(bytes: &[u8]) -> Result<ContentHash, String> {
+    match bytes.try_into() {
+        Ok(bytes) => Ok(ContentHash::from_bytes(bytes)),
+        Err(_) => Err(format!("a hash of {} bytes", bytes.len())),
+    }
+}
+
+/// Builds a JSON array of names for `json_each`.
+pub(crate) fn names_json(names: &[PairName]) -> String {
+    json_array(names.iter().map(PairName::as_str))
+}
+
+/// Builds a JSON array for `json_each`.
+pub(crate) fn json_array<T: Into<Value>>(items: impl IntoIterator<Item = T>) -> String {
+    items.into_iter().collect::<Value>().to_string()
+}

@@ -1,0 +1,222 @@
+//! The open catalog: its read connections and its channel to the writer task.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sqlx::{PgPool, SqlitePool};
+use tokio::sync::{mpsc, oneshot};
+
+use crate::db::commit_delay::CommitDelay;
+use crate::db::conn::{Conn, Held};
+use crate::db::error::{CatalogError, Result};
+use crate::db::open;
+use crate::db::postgres_address::PostgresAddress;
+use crate::db::request::{Message, Reply};
+use crate::db::retry_wait::RetryWait;
+use crate::db::write_connection::{Work, WriteConnection};
+use crate::db::writer;
+use crate::records::left_out::LeftOut;
+
+/// Capacity of the writer's channel.
+const INBOX: usize = 1024;
+
+/// Read connections.
+#[derive(Debug, Clone)]
+enum ReaderPool {
+    Sqlite(SqlitePool),
+    Postgres(PgPool),
+}
+
+/// An open catalog. Clones share the connections.
+#[derive(Debug, Clone)]
+pub struct Catalog {
+    readers: ReaderPool,
+    /// `None` for a read-only catalog.
+    inbox: Option<mpsc::Sender<Message>>,
+    pub(crate) delay: Arc<CommitDelay>,
+    /// Waits while a server is unavailable.
+    pub(crate) retry_wait: Arc<RetryWait>,
+    /// Rows that reads leave out, because they are damaged.
+    pub(crate) left_out: Arc<LeftOut>,
+    /// Path of the file, or the URL of a PostgreSQL catalog without the password.
+    pub(crate) path: Arc<Path>,
+}
+
+impl Catalog {
+    /// Opens an existing catalog for reading and writing.
+    ///
+    /// # Errors
+    /// Returns an error if the file is missing, is not a catalog, is on a network file system, or the database fails.
+    pub async fn open(path: &Path) -> Result<Self> {
+        Self::with_writer(path, false, CommitDelay::new()).await
+    }
+
+    /// Opens an existing catalog read-only. This works even while a run is active.
+    ///
+    /// # Errors
+    /// Returns an error if the file does not exist or is not a catalog, or if a database operation fails.
+    pub async fn open_read_only(path: &Path) -> Result<Self> {
+        Ok(Self {
+            readers: ReaderPool::Sqlite(open::reader_pool(path).await?),
+            inbox: None,
+            delay: CommitDelay::new(),
+            retry_wait: Arc::default(),
+            left_out: Arc::default(),
+            path: path.into(),
+        })
+    }
+
+    /// Opens an existing file. If `allow_empty` is set, the file may have no bytes.
+    pub(crate) async fn with_writer(
+        path: &Path,
+        allow_empty: bool,
+        delay: Arc<CommitDelay>,
+    ) -> Result<Self> {
+        let conn = open::write_conn(path, allow_empty).await?;
+        let readers = ReaderPool::Sqlite(open::reader_pool(path).await?);
+        let writer = WriteConnection::new(Conn::Sqlite(Held::Owned(conn)), path.into());
+        Ok(Self::start(readers, writer, delay, Arc::default()))
+    }
+
+    /// Opens the catalog at a URL of PostgreSQL. If `may_create` is set, creates it if it is missing.
+    ///
+    /// # Errors
+    /// Returns an error if the URL is invalid, the server does not answer or refuses the connection, or the database
+    /// fails.
+    pub async fn connect(url: &str, may_create: bool) -> Result<Self> {
+        Self::connect_with(url, may_create, CommitDelay::new()).await
+    }
+
+    pub(crate) async fn connect_with(
+        url: &str,
+        may_create: bool,
+        delay: Arc<CommitDelay>,
+    ) -> Result<Self> {
+        let address = PostgresAddress::parse(url)?;
+        let conn = address.connect(may_create).await?;
+        let readers = ReaderPool::Postgres(address.reader_pool(false).await?);
+        let retry_wait: Arc<RetryWait> = Arc::default();
+        let writer = WriteConnection::to_server(conn, address, Arc::clone(&retry_wait));
+        Ok(Self::start(readers, writer, delay, retry_wait))
+    }
+
+    /// Opens the catalog at a URL of PostgreSQL read-only.
+    ///
+    /// # Errors
+    /// As for [`Self::connect`].
+    pub async fn connect_read_only(url: &str) -> Result<Self> {
+        let address = PostgresAddress::parse(url)?;
+        Ok(Self {
+            readers: ReaderPool::Postgres(address.reader_pool(true).await?),
+            inbox: None,
+            delay: CommitDelay::new(),
+            retry_wait: Arc::default(),
+            left_out: Arc::default(),
+            path: Path::new(&address.text()).into(),
+        })
+    }
+
+    /// Starts the writer task.
+    fn start(
+        readers: ReaderPool,
+        writer: WriteConnection,
+        delay: Arc<CommitDelay>,
+        retry_wait: Arc<RetryWait>,
+    ) -> Self {
+        let (sender, inbox) = mpsc::channel(INBOX);
+        let path = Arc::clone(&writer.path);
+        tokio::spawn(writer::run(writer, inbox, Arc::clone(&delay)));
+        Self {
+            readers,
+            inbox: Some(sender),
+            delay,
+            retry_wait,
+            left_out: Arc::default(),
+            path,
+        }
+    }
+
+    /// Returns the same catalog, whose reads leave out some rows.
+    pub(crate) fn leaving_out(&self, left_out: LeftOut) -> Self {
+        Self {
+            left_out: Arc::new(left_out),
+            ..self.clone()
+        }
+    }
+
+    /// Returns whether the catalog is on a database server, which several machines can share.
+    pub const fn is_shared(&self) -> bool {
+        matches!(self.readers, ReaderPool::Postgres(_))
+    }
+
+    /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
+    pub async fn close(self) {
+        // ReaderPool first: an open reader prevents a complete checkpoint.
+        match self.readers {
+            ReaderPool::Sqlite(pool) => pool.close().await,
+            ReaderPool::Postgres(pool) => {
+                let closed = self.retry_wait.limit(async {
+                    pool.close().await;
+                    Ok(())
+                });
+                if let Err(error) = closed.await {
+                    tracing::debug!(%error, "the connections did not close");
+                }
+            }
+        }
+        if let Some(inbox) = self.inbox {
+            let (sender, receiver) = oneshot::channel();
+            if inbox.send(Message::Close(sender)).await.is_ok() {
+                // An error means that the writer has already ended.
+                let _ = receiver.await;
+            }
+        }
+    }
+
+    /// Sends the writer a message.
+    pub(crate) async fn send(&self, message: Message) -> Result<()> {
+        let inbox = self.inbox.as_ref().ok_or(CatalogError::ReadOnly)?;
+        let sent = inbox.send(message).await;
+        sent.or(Err(CatalogError::Closed))
+    }
+
+    /// Sends the writer a message and waits for the reply.
+    pub(crate) async fn reply_to<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
+        let (sender, receiver) = oneshot::channel();
+        self.send(message(sender)).await?;
+        receiver.await.unwrap_or(Err(CatalogError::Closed))
+    }
+
+    pub(crate) async fn read_conn(&self) -> Result<Conn> {
+        Ok(match &self.readers {
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Pooled(pool.acquire().await?)),
+            ReaderPool::Postgres(pool) => Conn::Postgres(Held::Pooled(pool.acquire().await?)),
+        })
+    }
+
+    /// Begins a read transaction, which sees the catalog as of one moment.
+    pub(crate) async fn snapshot(&self) -> Result<Conn> {
+        Ok(match &self.readers {
+            ReaderPool::Sqlite(pool) => Conn::Sqlite(Held::Snapshot(pool.begin().await?)),
+            ReaderPool::Postgres(pool) => {
+                let begin = "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY";
+                Conn::Postgres(Held::Snapshot(pool.begin_with(begin).await?))
+            }
+        })
+    }
+
+    /// Runs `work` in a separate write transaction on the writer task.
+    pub(crate) async fn in_transaction<T: Send + 'static>(
+        &self,
+        work: impl for<'c> FnOnce(&'c mut Conn) -> Work<'c, Result<T>> + Send + 'static,
+    ) -> Result<T> {
+        self.reply_to(|reply| {
+            Message::Transaction(Box::new(move |writer| {
+                Box::pin(async move {
+                    let _ = reply.send(writer.run_transaction(work).await);
+                })
+            }))
+        })
+        .await
+    }
+}

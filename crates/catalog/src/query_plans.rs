@@ -1,0 +1,211 @@
+//! Query plans of frequent statements: by primary key or partial index, without table scans or sorts.
+
+use sqlx::{AssertSqlSafe, Row as _};
+
+use super::tests::{Place, World};
+use crate::audit::audited_pairs;
+use crate::audit::repair;
+use crate::db::conn::Conn;
+use crate::db::dialect::Sql;
+use crate::queue::checkpoint;
+use crate::queue::claim;
+use crate::queue::fail;
+use crate::queue::job_counts;
+use crate::queue::recovery;
+use crate::queue::requeue;
+use crate::queue::staleness;
+use crate::queue::workers;
+use crate::records::pair_results;
+use crate::records::pair_work;
+use crate::records::stage_results;
+use crate::records::status;
+use crate::records::verdicts;
+
+/// Returns the lines of the query plan.
+async fn plan(sql: impl Into<Sql>) -> Vec<String> {
+    let sql = sql.into().sqlite;
+    let world = World::at(Place::in_new_file(), 0).await;
+    let Conn::Sqlite(mut conn) = world.place.conn().await else {
+        panic!("the place is a file");
+    };
+    let rows = sqlx::query(AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")))
+        .fetch_all(&mut *conn)
+        .await
+        .expect("a plan");
+    rows.iter()
+        .map(|row| row.try_get("detail").expect("a line"))
+        .collect()
+}
+
+#[tokio::test]
+async fn a_claim_scans_the_ready_index_in_order() {
+    let plan = plan(claim::CLAIM).await;
+    assert!(
+        plan.iter().any(|line| line.contains("INDEX job_ready")),
+        "{plan:?}"
+    );
+    assert!(
+        !plan.iter().any(|line| line.contains("TEMP B-TREE")),
+        "{plan:?}"
+    );
+    assert_only(
+        &plan,
+        &[
+            "job USING INDEX job_ready",
+            "job USING COVERING INDEX job_ready",
+            // All leased jobs, to see whether one of them is exclusive.
+            "job USING INDEX job_leased",
+        ],
+    );
+}
+
+#[tokio::test]
+async fn fenced_writes_find_their_jobs_by_key() {
+    for sql in [
+        checkpoint::ADVANCE.into(),
+        fail::FAIL.into(),
+        claim::RELEASE,
+        requeue::REQUEUE.into(),
+        repair::RESTORE.into(),
+    ] {
+        let plan = plan(sql).await;
+        assert!(
+            plan.iter()
+                .any(|line| line.starts_with("SEARCH job USING INTEGER PRIMARY KEY")),
+            "{plan:?}"
+        );
+        assert_only(&plan, &["item VIRTUAL TABLE"]);
+    }
+}
+
+#[tokio::test]
+async fn recovery_and_holders_use_the_index_of_leases() {
+    for sql in [
+        recovery::RECOVER,
+        recovery::LEFT_BY,
+        recovery::OVERDUE,
+        recovery::HOLDERS,
+        recovery::AFFECTED_PAIRS,
+    ] {
+        let plan = plan(sql).await;
+        assert!(
+            plan.iter().any(|line| line.contains("INDEX job_leased")),
+            "{plan:?}"
+        );
+        let small = [
+            "VIRTUAL TABLE",
+            "INDEX job_leased",
+            "INDEX block_job_leased",
+        ];
+        assert_only(&plan, &small);
+    }
+}
+
+#[tokio::test]
+async fn due_pairs_use_the_index_of_backoffs() {
+    let plan = plan(workers::DUE).await;
+    assert!(
+        plan.iter().any(|line| line.contains("INDEX job_backoff")),
+        "{plan:?}"
+    );
+    assert_only(&plan, &["INDEX job_backoff"]);
+}
+
+#[tokio::test]
+async fn pairs_of_low_confidence_use_their_index() {
+    let plan = plan(status::LOW_CONFIDENCE).await;
+    assert_only(&plan, &["job USING COVERING INDEX job_low_confidence"]);
+    assert!(plan[0].contains("INDEX job_low_confidence"), "{plan:?}");
+}
+
+#[tokio::test]
+async fn stale_pairs_are_counted_by_counters_and_marks() {
+    for sql in [
+        staleness::COUNT_STALE,
+        staleness::MARKED,
+        staleness::CLEAR_DIRTY,
+    ] {
+        let plan = plan(sql).await;
+        let small = [
+            "SCAN counter",
+            "VIRTUAL TABLE",
+            "INDEX job_dirty",
+            "INDEX job_quarantined",
+            "CONSTANT ROW",
+        ];
+        assert_only(&plan, &small);
+    }
+}
+
+#[tokio::test]
+async fn jobs_are_counted_by_ranges_of_their_key() {
+    let ranges = plan(job_counts::COUNT_RANGE).await;
+    let searched = "SEARCH job USING INTEGER PRIMARY KEY (rowid>? AND rowid<?)";
+    assert!(ranges.iter().any(|line| line == searched), "{ranges:?}");
+    assert_only(&ranges, &[]);
+    assert_only(&plan(job_counts::NEXT_PAIR).await, &[]);
+}
+
+#[tokio::test]
+async fn inspected_jobs_are_found_by_key() {
+    let among = plan(staleness::INSPECT).await;
+    assert_only(&among, &["VIRTUAL TABLE", "SCAN found"]);
+}
+
+#[tokio::test]
+async fn members_of_a_group_are_paged_by_key() {
+    assert_only(&plan(requeue::MEMBERS).await, &[]);
+}
+
+#[tokio::test]
+async fn rows_written_by_a_checkpoint_are_found_by_key() {
+    for sql in checkpoint::ROWS {
+        assert_only(&plan(sql).await, &["VIRTUAL TABLE"]);
+    }
+}
+
+#[tokio::test]
+async fn queries_of_inputs_and_counts_are_paged_or_small() {
+    assert_only(&plan(pair_work::INPUTS).await, &[]);
+    assert_only(
+        &plan(workers::LEFT_ALL).await,
+        &["INDEX job_", "CONSTANT ROW", "SCAN first"],
+    );
+    assert_only(
+        &plan(pair_results::FAILED).await,
+        &["INDEX job_quarantined"],
+    );
+    assert_only(
+        &plan(pair_results::FAILED_BY_CLASS).await,
+        &["INDEX job_quarantined"],
+    );
+}
+
+#[tokio::test]
+async fn pages_of_results_are_searched_by_key() {
+    // The list of damaged rows to leave out.
+    assert_only(
+        &plan(pair_results::PAGE).await,
+        &["json_each VIRTUAL TABLE"],
+    );
+    assert_only(&plan(audited_pairs::PAGE).await, &[]);
+    for sql in [
+        stage_results::STAGE_RESULTS,
+        audited_pairs::RESULTS,
+        stage_results::METRIC_HASHES,
+        verdicts::COUNTED,
+    ] {
+        let plan = plan(sql).await;
+        assert_only(&plan, &["VIRTUAL TABLE"]);
+    }
+}
+
+/// Asserts that the plan contains only allowed scans.
+fn assert_only(plan: &[String], allowed: &[&str]) {
+    for line in plan.iter().filter(|line| line.starts_with("SCAN")) {
+        assert!(
+            allowed.iter().any(|part| line.contains(part)),
+            "{line:?} in {plan:?}"
+        );
+    }
+}

@@ -1,0 +1,270 @@
+//! Requeues pairs after changes of settings or inputs, or on request.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+use crate::db::conn::Conn;
+use crate::db::query::{query, query_as, query_scalar};
+use crate::db::rows::json_array;
+use crate::db::write_connection::Work;
+use crate::queue::counters::{CounterKey, Deltas, KeyedJob};
+use crate::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
+use crate::queue::fragments::fingerprint_before;
+use crate::queue::plan::StaleReason;
+use crate::queue::selection::{PairSelection, select, unknown_names};
+use crate::queue::staleness::{
+    PAGE, RerunPolicy, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
+};
+use crate::{Catalog, CatalogError, Result};
+use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};
+
+/// Which failed pairs to requeue.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RetrySelection {
+    /// These pairs, if they failed or back off.
+    Names(Vec<PairName>),
+    /// All pairs that failed or back off with this class.
+    Class(FailureClass),
+    /// All pairs that failed or back off.
+    All,
+}
+
+/// Resets jobs to a stage, with no attempts or crashes. Skips leased jobs.
+pub(crate) const REQUEUE: &str = concat!(
+    "
+UPDATE job SET stage = CAST(item.value ->> 1 AS bigint), status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
+    exclusive = 0, fingerprint = ",
+    fingerprint_before!("(CAST(item.value ->> 1 AS bigint))"),
+    "
+FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.status <> 1
+RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
+);
+
+/// Locks jobs in PostgreSQL, always in the order of pairs.
+const LOCK_JOBS: &str = "
+SELECT pair, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
+WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE";
+
+/// Selects one page of the clean jobs with one stage, status and fingerprint, sorted by pair.
+pub(crate) const MEMBERS: &str = "
+SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
+ORDER BY pair LIMIT ?5";
+
+pub(crate) const CLEAR_FAILURES: &str =
+    "DELETE FROM failure WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1))";
+
+/// Selects the jobs that failed or back off, of one failure class or of all.
+const FAILED_JOBS: &str = "
+SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint FROM job AS j JOIN failure AS f ON f.pair = j.pair
+WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
+
+const FAILED_AMONG: &str = "
+SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
+FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint) WHERE j.status IN (2, 4)";
+
+impl Catalog {
+    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers
+    /// only its pairs. Returns the number of requeued pairs.
+    ///
+    /// # Errors
+    /// Returns an error if the counters do not add up to the number of jobs, or if a database operation fails.
+    pub async fn requeue_stale(
+        &self,
+        fingerprints: &Fingerprints,
+        among: Option<&PairSelection>,
+        policy: RerunPolicy,
+    ) -> Result<u64> {
+        let mut conn = self.snapshot().await?;
+        let current = current_json(&mut conn, fingerprints).await?;
+        let mut moves = Vec::new();
+        if among.is_none() {
+            // Jobs without the dirty mark are requeued in groups. Dirty and quarantined jobs are inspected below.
+            let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
+            let groups = groups(&mut conn, &chains).await?;
+            assert_complete(&mut conn, &groups).await?;
+            let unmarked = groups.iter().map(|(group, _)| group);
+            let unmarked = unmarked.filter(|group| group.key.status != JobStatus::Quarantined);
+            moves.extend(unmarked.filter_map(|group| Some((group.key, target(group, policy)?))));
+        }
+        drop(conn);
+        let mut requeued = 0;
+        for (key, to) in moves {
+            requeued += self
+                .requeue_pages(move |conn, after| Box::pin(requeue_group(conn, key, to, after)))
+                .await?;
+        }
+        let among = among.cloned();
+        requeued += self
+            .requeue_pages(move |conn, after| {
+                let (current, among) = (current.clone(), among.clone());
+                Box::pin(requeue_inspected(conn, current, among, policy, after))
+            })
+            .await?;
+        Ok(requeued)
+    }
+
+    /// Requeues jobs page by page, and returns their number. Each page is a separate transaction, so that other writes
+    /// can run in between. `page` requeues the pairs after a given pair, and returns the number of jobs and the last
+    /// pair of the page.
+    async fn requeue_pages<F>(&self, page: F) -> Result<u64>
+    where
+        F: for<'c> Fn(&'c mut Conn, i64) -> Work<'c, Result<(u64, Option<i64>)>>
+            + Clone
+            + Send
+            + 'static,
+    {
+        let (mut requeued, mut after) = (0, Some(0));
+        while let Some(from) = after {
+            let page = page.clone();
+            let moved;
+            (moved, after) = self.in_transaction(move |conn| page(conn, from)).await?;
+            requeued += moved;
+        }
+        Ok(requeued)
+    }
+
+    /// Requeues the selected pairs that failed or back off, and returns their number.
+    ///
+    /// # Errors
+    /// Returns an error if a named pair does not exist, or if a database operation fails. In that case nothing changes.
+    pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
+        let selection = selection.clone();
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let failed = failed_jobs(conn, &selection).await?;
+                let same_stage = failed
+                    .iter()
+                    .filter_map(|job| Some((*job, job.key.stage()?)));
+                requeue(conn, &same_stage.collect::<Vec<_>>()).await
+            })
+        })
+        .await
+    }
+}
+
+/// Returns an error unless the groups contain all jobs. A wrong counter could hide stale jobs.
+async fn assert_complete(conn: &mut Conn, groups: &[(StaleJob, u64)]) -> Result<()> {
+    let jobs: i64 = query_scalar("SELECT count(*) FROM job")
+        .fetch_one(conn)
+        .await?;
+    let (jobs, counted) = (jobs.unsigned_abs(), groups.iter().map(|(_, n)| n).sum());
+    if counted == jobs {
+        Ok(())
+    } else {
+        Err(CatalogError::WrongCounters { counted, jobs })
+    }
+}
+
+/// Returns the stage that a job is requeued at, or `None` if it needs no requeue.
+fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
+    let (to, reason) = decide(job, policy)?;
+    let waits = matches!(
+        reason,
+        StaleReason::New | StaleReason::Unfinished | StaleReason::BackingOff
+    );
+    (!waits).then_some(to)
+}
+
+/// Requeues one page of a group: jobs whose pairs follow `after`. Returns their number, and the last pair of the page.
+async fn requeue_group(
+    conn: &mut Conn,
+    key: CounterKey,
+    to: Stage,
+    after: i64,
+) -> Result<(u64, Option<i64>)> {
+    let pairs: Vec<i64> = query_scalar(MEMBERS)
+        .bind(after)
+        .bind(key.cursor)
+        .bind(key.status.code())
+        .bind((key.fingerprint != 0).then_some(key.fingerprint))
+        .bind(PAGE as i64)
+        .fetch_all(&mut *conn)
+        .await?;
+    let jobs = pairs.iter().map(|pair| (KeyedJob { pair: *pair, key }, to));
+    let moved = requeue(conn, &jobs.collect::<Vec<_>>()).await?;
+    Ok((moved, pairs.last().copied()))
+}
+
+/// Inspects one page of jobs whose pairs follow `after`, and requeues the stale ones. Returns their number, and the
+/// last pair of the page. If `among` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
+/// consistent again.
+async fn requeue_inspected(
+    conn: &mut Conn,
+    current: String,
+    among: Option<PairSelection>,
+    policy: RerunPolicy,
+    after: i64,
+) -> Result<(u64, Option<i64>)> {
+    let (jobs, last) = match &among {
+        None => inspect_marked(conn, &current, after).await?,
+        Some(among) => {
+            let jobs = inspect(conn, &current, after, among).await?;
+            let last = jobs.last().map(|(pair, _)| *pair);
+            (jobs, last)
+        }
+    };
+    let stale = jobs.into_iter().filter_map(|(pair, job)| {
+        let to = target(&job, policy)?;
+        Some((KeyedJob { pair, key: job.key }, to))
+    });
+    let moved = requeue(conn, &stale.collect::<Vec<_>>()).await?;
+    if let (None, Some(last)) = (among, last) {
+        clear_dirty(conn, after, last).await?;
+    }
+    Ok((moved, last))
+}
+
+async fn failed_jobs(conn: &mut Conn, selection: &RetrySelection) -> Result<Vec<KeyedJob>> {
+    let query = match selection {
+        RetrySelection::All => query_as(FAILED_JOBS).bind(None::<&str>),
+        RetrySelection::Class(class) => query_as(FAILED_JOBS).bind(class.name()),
+        RetrySelection::Names(names) => {
+            if let Some(unknown) = unknown_names(conn, names).await?.into_iter().next() {
+                return Err(CatalogError::UnknownPair(unknown));
+            }
+            query_as(FAILED_AMONG).bind(select(conn, names).await?.json)
+        }
+    };
+    query.fetch_all(conn).await
+}
+
+/// Returns the jobs whose key is still the given one, and locks them until the end of the transaction. In SQLite, no job
+/// changes during a transaction.
+async fn unchanged(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<Vec<(KeyedJob, Stage)>> {
+    if matches!(conn, Conn::Sqlite(_)) {
+        return Ok(jobs.to_vec());
+    }
+    let pairs = json_array(jobs.iter().map(|(job, _)| job.pair));
+    let locked: Vec<KeyedJob> = query_as(LOCK_JOBS).bind(pairs).fetch_all(conn).await?;
+    let locked: BTreeMap<i64, CounterKey> = locked.iter().map(|job| (job.pair, job.key)).collect();
+    let mut unchanged = jobs.to_vec();
+    unchanged.retain(|(job, _)| locked.get(&job.pair) == Some(&job.key));
+    Ok(unchanged)
+}
+
+/// Resets each job to the given stage, except leased jobs. Returns the number of changed jobs.
+async fn requeue(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
+    if jobs.is_empty() {
+        return Ok(0);
+    }
+    let unchanged = unchanged(conn, jobs).await?;
+    let items = json_array(
+        unchanged
+            .iter()
+            .map(|(job, to)| json!([job.pair, to.index()])),
+    );
+    let moved = query_as(REQUEUE).bind(&items);
+    let moved: Vec<KeyedJob> = moved.fetch_all(&mut *conn).await?;
+    let clear = query(CLEAR_FAILURES).bind(&items);
+    clear.execute(&mut *conn).await?;
+    let from: BTreeMap<i64, CounterKey> = jobs.iter().map(|(job, _)| (job.pair, job.key)).collect();
+    let mut deltas = Deltas::default();
+    for job in &moved {
+        if let Some(from) = from.get(&job.pair) {
+            deltas.move_job(*from, job.key);
+        }
+    }
+    deltas.apply(conn).await?;
+    Ok(moved.len() as u64)
+}

@@ -1,0 +1,207 @@
+//! Worker registration, due back-offs and open work.
+
+use crate::blocks::model::BlockSettings;
+use crate::db::conn::Conn;
+use crate::db::query::{query, query_as, query_scalar};
+use crate::db::row::from_row;
+use crate::queue::counters::{CounterKey, Cursor, Deltas, cursor};
+use crate::queue::fingerprint::FingerprintIds;
+use crate::queue::selection::PairSelection;
+use crate::{Catalog, Result};
+use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
+
+/// The process a worker runs in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkerInfo {
+    /// Host name.
+    pub host: String,
+    /// Process id.
+    pub pid: u32,
+    /// Boot id of the machine, if known.
+    pub boot_id: Option<String>,
+}
+
+/// The settings that a worker uses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkerSettings {
+    /// Fingerprints of the settings of pairs.
+    pub fingerprints: FingerprintIds,
+    /// Settings of the stages of blocks.
+    pub blocks: BlockSettings,
+}
+
+/// Numbers of pairs that have a stage to run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Outstanding {
+    /// Pairs that are ready.
+    pub ready: u64,
+    /// Pairs leased by any worker.
+    pub leased: u64,
+    /// Pairs that back off.
+    pub backoff: u64,
+    /// Time at which the first back-off ends.
+    pub next_due: Option<UnixMillis>,
+}
+
+from_row! { Outstanding { ready, leased, backoff, next_due } }
+
+/// Numbers of stages that are still to run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WorkLeft {
+    /// Pairs with stages to run, without quarantined pairs.
+    pub pairs: u64,
+    /// Number of pairs that have yet to run each stage.
+    pub by_stage: [u64; 4],
+    /// Quarantined pairs.
+    pub quarantined: u64,
+}
+
+/// Ends the back-offs that are due at `?1`. Also ends back-offs beyond `?2`, which only a clock jump can cause.
+pub(crate) const DUE: &str = "
+UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
+RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
+
+pub(crate) const LEFT_ALL: &str = "
+SELECT
+    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000) AS first) AS ready,
+    (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1) AS leased,
+    (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1) AS backoff,
+    (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1) AS next_due";
+
+const LEFT_AMONG: &str = "
+SELECT count(*) FILTER (WHERE j.status = 0) AS ready, count(*) FILTER (WHERE j.status = 1) AS leased,
+    count(*) FILTER (WHERE j.status = 2) AS backoff, min(j.run_at) AS next_due
+FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint) WHERE j.stage <= ?1";
+
+const COUNT_ALL: &str =
+    "SELECT stage, status, CAST(sum(n) AS bigint) FROM counter GROUP BY stage, status";
+
+const COUNT_AMONG: &str = "
+SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)
+GROUP BY j.stage, j.status";
+
+impl Catalog {
+    /// Registers a worker process with its settings. Returns an id that no worker had before.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn register_worker(
+        &self,
+        info: WorkerInfo,
+        settings: WorkerSettings,
+        now: UnixMillis,
+    ) -> Result<WorkerId> {
+        self.in_transaction(move |conn| Box::pin(insert_worker(conn, info, settings, now)))
+            .await
+    }
+
+    /// Records that a worker ended properly, and with which metrics. Without metrics, the worker is not listed any more.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn end_worker(
+        &self,
+        worker: WorkerId,
+        now: UnixMillis,
+        metrics: Option<&WorkerMetrics>,
+    ) -> Result<()> {
+        let metrics = metrics.map(serde_json::to_string).transpose()?;
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                query("UPDATE worker SET ended = ?2, metrics = ?3 WHERE id = ?1")
+                    .bind(worker.0)
+                    .bind(now)
+                    .bind(metrics)
+                    .execute(conn)
+                    .await?;
+                Ok(())
+            })
+        })
+        .await
+    }
+
+    /// Ends the back-offs that are due, and returns the number of pairs made ready. Also ends back-offs with more than
+    /// `longest` milliseconds left, which only a clock jump can cause.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let query = query_as(DUE).bind(now).bind(now + longest);
+                let due: Vec<CounterKey> = query.fetch_all(&mut *conn).await?;
+                let mut deltas = Deltas::default();
+                for key in &due {
+                    deltas.move_job(key.with_status(JobStatus::Backoff), *key);
+                }
+                deltas.apply(conn).await?;
+                Ok(due.len() as u64)
+            })
+        })
+        .await
+    }
+
+    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `among`, counts
+    /// all pairs, but at most 1000 ready ones.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn outstanding(
+        &self,
+        until: Stage,
+        among: Option<&PairSelection>,
+    ) -> Result<Outstanding> {
+        let mut conn = self.read_conn().await?;
+        let query = match among {
+            None => query_as(LEFT_ALL).bind(cursor(until)),
+            Some(among) => query_as(LEFT_AMONG).bind(cursor(until)).bind(&among.json),
+        };
+        query.fetch_one(&mut conn).await
+    }
+
+    /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+        let mut conn = self.read_conn().await?;
+        let query = match among {
+            None => query_as(COUNT_ALL),
+            Some(among) => query_as(COUNT_AMONG).bind(&among.json),
+        };
+        let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut conn).await?;
+        let mut left = WorkLeft::default();
+        for (at, status, n) in counted {
+            if status == JobStatus::Quarantined {
+                left.quarantined += n;
+            } else if at <= cursor(until) {
+                left.pairs += n;
+                for open in &mut left.by_stage[at as usize..=until.index()] {
+                    *open += n;
+                }
+            }
+        }
+        Ok(left)
+    }
+}
+
+async fn insert_worker(
+    conn: &mut Conn,
+    info: WorkerInfo,
+    settings: WorkerSettings,
+    now: UnixMillis,
+) -> Result<WorkerId> {
+    let id: i64 = query_scalar(
+        "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints, block_settings)
+        VALUES (?1, ?2, ?3, ?4, ?4, ?5, ?6) RETURNING id",
+    )
+    .bind(info.host)
+    .bind(info.pid)
+    .bind(info.boot_id)
+    .bind(now)
+    .bind(settings.fingerprints.json())
+    .bind(settings.blocks.json())
+    .fetch_one(conn)
+    .await?;
+    Ok(WorkerId(id))
+}

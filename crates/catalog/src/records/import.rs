@@ -1,0 +1,269 @@
+//! Import of pairs: names, paths and attributes.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+use tokio::sync::mpsc;
+
+use crate::blocks::retired;
+use crate::db::conn::Conn;
+use crate::db::dialect::Sql;
+use crate::db::query::{query, query_scalar};
+use crate::db::row::FromRow as _;
+use crate::db::rows::json_array;
+use crate::queue::counters::{CounterKey, Deltas};
+use crate::queue::selection::{PairSelection, select, unknown_names};
+use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::ground_truth;
+use crate::records::model::PairAttributes;
+use crate::{Catalog, CatalogError, Result};
+use mocban_core::domain::{PairName, UnixMillis};
+
+/// A row to import.
+pub type ImportRow = PairAttributes;
+
+/// Number of rows in one statement.
+const CHUNK: usize = 2_000;
+
+/// A message of a streamed import.
+#[derive(Debug)]
+pub enum ImportChunk {
+    /// The next rows.
+    Rows(Vec<ImportRow>),
+    /// The end of the rows.
+    End,
+}
+
+/// Counts of an import.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ImportSummary {
+    /// Number of new pairs.
+    pub added: u64,
+    /// Existing pairs with other values, and the columns that differ.
+    pub changed: Vec<PairChange>,
+    /// Number of existing pairs with the same values.
+    pub unchanged: u64,
+}
+
+/// A pair whose values an import changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PairChange {
+    /// The pair.
+    pub name: PairName,
+    /// Names of the columns that differ.
+    pub fields: Vec<&'static str>,
+}
+
+/// Selects the attributes of pairs by their names. The planner of PostgreSQL, which does not know how many names there
+/// are, would join the names with the whole table.
+pub(crate) const SELECT: Sql = Sql::pair(
+    "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
+FROM pair WHERE name IN (SELECT atom FROM json_each(?1))",
+    "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior
+FROM pair WHERE name = ANY (ARRAY(SELECT atom FROM json_each(?1)))",
+);
+
+/// Builds the text that adds new pairs and updates existing ones, from its items. If a path changed, clears the `stat` of
+/// that file, so that the next run reads the file again. Returns the columns that a checksum needs.
+macro_rules! upsert {
+    ($items:literal) => {
+        concat!(
+            "
+INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior, attributes, imported)
+",
+            $items,
+            "
+ON CONFLICT (name) DO UPDATE SET
+    mesh_stat = CASE WHEN pair.mesh_path = excluded.mesh_path THEN pair.mesh_stat ELSE '' END, mesh_path = excluded.mesh_path,
+    print_stat = CASE WHEN pair.print_path = excluded.print_path THEN pair.print_stat ELSE '' END, print_path = excluded.print_path,
+    unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
+    block = excluded.block, meta = excluded.meta, prior = excluded.prior, attributes = excluded.attributes
+RETURNING id, NULL, NULL, NULL, name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, prior,
+    attributes, imported"
+        )
+    };
+}
+
+/// Adds and updates pairs. PostgreSQL would parse an item once for each `->>`.
+const UPSERT: Sql = Sql::pair(
+    upsert!(
+        "SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
+    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'prior', value ->> 'attributes', ?2
+FROM json_each(?1) WHERE true"
+    ),
+    upsert!(
+        "SELECT name, mesh, print, unit, face_down, character, block, meta, prior, attributes, ?2
+FROM json_to_recordset(CAST(?1 AS json)) AS item (name text, mesh text, print text, unit text, face_down bigint,
+    character text, block text, meta text, prior text, attributes text)"
+    ),
+);
+
+/// Updates the statistics of PostgreSQL's planner.
+const ANALYZE: &str = "ANALYZE pair, job";
+
+/// Adds jobs for those of some pairs that have none.
+const NEW_JOBS: &str = "
+INSERT INTO job (pair, stage, status)
+SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1) WHERE true
+ON CONFLICT (pair) DO NOTHING";
+
+impl Catalog {
+    /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
+    /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
+    ///
+    /// # Errors
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a true alignment names an unknown pair, or
+    /// if a database operation fails. In that case nothing is imported.
+    pub async fn import_all(
+        &self,
+        mut chunks: mpsc::Receiver<ImportChunk>,
+        truths: Vec<(PairName, Value)>,
+        now: UnixMillis,
+    ) -> Result<(ImportSummary, u64)> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let mut summary = ImportSummary::default();
+                let mut deltas = Deltas::default();
+                loop {
+                    match chunks.recv().await {
+                        Some(ImportChunk::Rows(rows)) => {
+                            for chunk in rows.chunks(CHUNK) {
+                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
+                            }
+                        }
+                        Some(ImportChunk::End) => break,
+                        None => return Err(CatalogError::CutShort),
+                    }
+                }
+                deltas.apply(conn).await?;
+                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+                let stored = ground_truth::set(conn, &truths).await?;
+                if let Conn::Postgres(_) = conn {
+                    query(ANALYZE).execute(conn).await?;
+                }
+                Ok((summary, stored))
+            })
+        })
+        .await
+    }
+
+    /// Returns the names of all pairs, sorted.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn pair_names(&self) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        let names = query_scalar("SELECT name FROM pair ORDER BY name");
+        names.fetch_all(&mut conn).await
+    }
+
+    /// Returns the unknown names among `names`, in the given order.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        unknown_names(&mut conn, names).await
+    }
+
+    /// Returns the pairs with the given names. Unknown names are left out.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
+        let mut conn = self.read_conn().await?;
+        select(&mut conn, names).await
+    }
+}
+
+/// Adds and updates pairs. Retired pairs get their jobs back.
+pub(crate) async fn import_chunk(
+    conn: &mut Conn,
+    chunk: &[ImportRow],
+    now: UnixMillis,
+    summary: &mut ImportSummary,
+    deltas: &mut Deltas,
+) -> Result<()> {
+    let names = json_array(chunk.iter().map(|row| row.name.as_str()));
+    retired::restore(conn, &names, deltas).await?;
+    let known = query(SELECT).bind(&names);
+    let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
+    for row in &known.fetch_all(&mut *conn).await? {
+        // A row with an invalid value is replaced.
+        stored.insert(row.get("name")?, PairAttributes::from_row(row).ok());
+    }
+    for row in chunk {
+        let fields = match stored.insert(row.name.clone(), Some(row.clone())) {
+            None => {
+                summary.added += 1;
+                deltas.add(CounterKey::NEW, 1);
+                continue;
+            }
+            Some(Some(old)) if old == *row => {
+                summary.unchanged += 1;
+                continue;
+            }
+            Some(Some(old)) => differing(&old, row),
+            Some(None) => vec!["a damaged value"],
+        };
+        summary.changed.push(PairChange {
+            name: row.name.clone(),
+            fields,
+        });
+    }
+    // Of rows with the same name, only the last: PostgreSQL changes a row only once in a statement.
+    let last: BTreeMap<_, _> = chunk
+        .iter()
+        .enumerate()
+        .map(|(at, row)| (&row.name, at))
+        .collect();
+    let rows = chunk
+        .iter()
+        .enumerate()
+        .filter(|(at, row)| last[&row.name] == *at);
+    let items = json_array(rows.map(|(_, row)| item(row)));
+    let upsert = query(UPSERT).bind(items).bind(now);
+    let rows = upsert.fetch_all(&mut *conn).await?;
+    checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
+    let ids: Result<Vec<i64>> = rows.iter().map(|row| row.get(0)).collect();
+    let ids = json_array(ids?);
+    query(NEW_JOBS).bind(ids).execute(conn).await
+}
+
+fn item(row: &ImportRow) -> Value {
+    json!({
+        "name": row.name, "mesh": row.mesh_path, "print": row.print_path, "unit": row.unit,
+        "face_down": row.scanned_face_down.map(i64::from), "character": row.character, "block": row.block,
+        "meta": json!(row.meta).to_string(), "prior": row.prior, "attributes": result_attributes(row),
+    })
+}
+
+/// Returns the manifest attributes that results depend on, as JSON. If this text changes, the results are stale.
+fn result_attributes(row: &ImportRow) -> String {
+    let mut attributes = json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit });
+    if let Some(prior) = &row.prior {
+        attributes["prior"] = Value::from(prior.as_str());
+    }
+    attributes.to_string()
+}
+
+fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
+    [
+        ("mesh", old.mesh_path != new.mesh_path),
+        ("print", old.print_path != new.print_path),
+        ("character", old.character != new.character),
+        ("block", old.block != new.block),
+        ("unit", old.unit != new.unit),
+        (
+            "scanned_face_down",
+            old.scanned_face_down != new.scanned_face_down,
+        ),
+        ("metadata", old.meta != new.meta),
+        ("prior", old.prior != new.prior),
+    ]
+    .into_iter()
+    .filter_map(|(name, differs)| differs.then_some(name))
+    .collect()
+}

@@ -1,0 +1,222 @@
+//! Results of queries, as plain values.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use crate::db::row::from_row;
+use crate::records::verdicts::{ReviewerVerdict, VerdictEvent};
+use mocban_core::domain::{
+    ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
+    ThresholdMetric, UnixMillis, Verdict,
+};
+
+/// Counts of the whole project, as in `status --json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct StatusCounts {
+    /// Version of this JSON schema.
+    pub schema: u32,
+    /// Number of pairs.
+    pub pairs: u64,
+    /// Number of pairs by job status, all statuses included.
+    pub jobs: BTreeMap<JobStatus, u64>,
+    /// Number of pairs by stage, all stages included.
+    pub stages: BTreeMap<Stage, StageCounts>,
+    /// Number of pairs with stale results. A result is stale if its settings or inputs have changed since.
+    pub stale: u64,
+    /// Number of completed pairs whose confidence by [`ThresholdMetric::DEFAULT`] is below
+    /// [`MetricOutcome::LOW_CONFIDENCE`].
+    pub low_confidence: u64,
+    /// Number of verdicts on current results. Only the newest verdict of each reviewer counts.
+    pub verdicts: BTreeMap<Verdict, u64>,
+}
+
+/// Counts of one stage.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct StageCounts {
+    /// Pairs that completed the stage.
+    pub done: u64,
+    /// Pairs that have neither completed the stage nor failed at it.
+    pub pending: u64,
+    /// Pairs that failed at it.
+    pub failed: u64,
+}
+
+/// A stored failure with its stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct StoredFailure {
+    /// The stage that failed.
+    pub stage: Stage,
+    /// Class and message.
+    #[serde(flatten)]
+    pub failure: Failure,
+    /// When.
+    pub at: UnixMillis,
+}
+
+/// A quarantined pair in a list of failures.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FailedPair {
+    /// The pair.
+    pub name: PairName,
+    /// Status of its job.
+    pub status: JobStatus,
+    /// The failure.
+    #[serde(flatten)]
+    pub failure: StoredFailure,
+}
+
+/// The current result of one stage of one pair.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StageRecord {
+    /// The stage.
+    pub stage: Stage,
+    /// Outcome of the stage as JSON; parse it with [`StageRecord::parse`].
+    pub outcome: Value,
+    /// Its artifacts by role.
+    pub files: ArtifactSet,
+    /// Hash of the outcome and the artifacts. Equal bytes give equal hashes.
+    pub result_hash: ContentHash,
+    /// Hash of the settings of this stage and of all earlier stages.
+    pub fingerprint_hash: ContentHash,
+    /// Revision and settings of this stage.
+    pub fingerprint_fields: Value,
+    /// Hash of the mesh that the result was computed from.
+    pub mesh_hash: ContentHash,
+    /// Hash of the print that the result was computed from. `None` if the stage does not read the print.
+    pub print_hash: Option<ContentHash>,
+    /// Computing time in milliseconds.
+    pub ms: u64,
+    /// When the result was stored.
+    pub at: UnixMillis,
+}
+
+from_row! { StageRecord { stage, outcome as Json, files as Json, result_hash, fingerprint_hash, fingerprint_fields as Json, mesh_hash, print_hash, ms, at } }
+
+impl StageRecord {
+    /// Parses the outcome as a type of `domain`, such as `FitOutcome` for the stage `Fit`.
+    ///
+    /// # Errors
+    /// Returns an error if the stored JSON does not match the type, for example after an upgrade.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, serde_json::Error> {
+        T::deserialize(&self.outcome)
+    }
+}
+
+/// One metric's current result of one pair.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MetricRecord {
+    /// The numbers.
+    #[serde(flatten)]
+    pub outcome: MetricOutcome,
+    /// Hash of the numbers, except the confidence, and of the images that reviewers see. A verdict refers to a result
+    /// by this hash.
+    pub result_hash: ContentHash,
+    /// Verdicts on this result, by reviewer.
+    pub verdicts: Vec<ReviewerVerdict>,
+    /// Number of verdicts on other results of this pair and metric, which do not count. Of a reviewer's verdicts on one
+    /// result, only the newest is included.
+    pub older_verdicts: u64,
+}
+
+/// Attributes of a pair as imported.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairAttributes {
+    /// The user's id.
+    pub name: PairName,
+    /// Path of the mesh as stored: relative to the project, or absolute.
+    pub mesh_path: String,
+    /// Path of the print, likewise.
+    pub print_path: String,
+    /// Unit of the mesh.
+    pub unit: Option<LengthUnit>,
+    /// Whether the block lay face down when scanned.
+    pub scanned_face_down: Option<bool>,
+    /// The character, if given.
+    pub character: Option<String>,
+    /// The block, if given.
+    pub block: Option<String>,
+    /// All other columns of the manifest.
+    pub meta: Map<String, Value>,
+    /// The alignment that is expected of a pair cut from a block, as JSON text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<String>,
+}
+
+from_row! { PairAttributes { name, mesh_path, print_path, unit, scanned_face_down, character, block, meta as Json, prior } }
+
+/// One pair with its current results, for report and export.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairResults {
+    /// Attributes as imported.
+    #[serde(flatten)]
+    pub attributes: PairAttributes,
+    /// Status of its job.
+    pub status: JobStatus,
+    /// Next stage. `None` if the pair is done.
+    pub next_stage: Option<Stage>,
+    /// The failure, if the pair is quarantined or backing off.
+    pub failure: Option<StoredFailure>,
+    /// Results of the completed stages, in order.
+    pub stages: Vec<StageRecord>,
+    /// Results of the computed metrics, in the order of [`ThresholdMetric::ALL`]. Empty if the pair is not done.
+    pub metrics: Vec<MetricRecord>,
+    /// The true alignment as given, if any.
+    pub truth: Option<Value>,
+}
+
+impl PairResults {
+    /// Returns the current result of a stage.
+    pub fn stage(&self, stage: Stage) -> Option<&StageRecord> {
+        self.stages.iter().find(|record| record.stage == stage)
+    }
+
+    /// Returns the current result of a metric.
+    pub fn metric(&self, metric: ThresholdMetric) -> Option<&MetricRecord> {
+        self.metrics
+            .iter()
+            .find(|record| record.outcome.metric == metric)
+    }
+
+    /// Returns the computing time of its current results in seconds.
+    pub fn seconds(&self) -> f64 {
+        self.stages.iter().map(|record| record.ms).sum::<u64>() as f64 / 1000.0
+    }
+}
+
+/// One attempt at one stage.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AttemptRecord {
+    /// The stage.
+    pub stage: Stage,
+    /// The failure. `None` if the attempt succeeded.
+    pub failure: Option<Failure>,
+    /// Computing time in milliseconds, if known.
+    pub ms: Option<u64>,
+    /// When it ended.
+    pub at: UnixMillis,
+}
+
+/// Everything about one pair, for `show`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PairDetail {
+    /// Attributes, status, failure and current results, with each reviewer's newest verdicts.
+    #[serde(flatten)]
+    pub results: PairResults,
+    /// Content of the mesh as last read.
+    pub mesh_hash: Option<ContentHash>,
+    /// Content of the print as last read.
+    pub print_hash: Option<ContentHash>,
+    /// Number of attempts at the current stage.
+    pub attempt: u32,
+    /// Number of worker deaths and overdue leases blamed on the pair since its last stored stage or requeue.
+    pub crashes: u32,
+    /// When the back-off ends.
+    pub run_at: Option<UnixMillis>,
+    /// Attempts, oldest first.
+    pub attempts: Vec<AttemptRecord>,
+    /// Every verdict event of the pair, oldest first.
+    pub verdict_log: Vec<VerdictEvent>,
+}

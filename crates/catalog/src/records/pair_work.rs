@@ -1,0 +1,145 @@
+//! Data of a leased pair that a worker needs, and the versions of input files.
+
+use std::collections::BTreeMap;
+
+use crate::db::query::query;
+use crate::db::row::{FromRow, Row, from_row};
+use crate::db::rows::json_array;
+use crate::db::script::Script;
+use crate::queue::checkpoint;
+use crate::queue::lease::{InputVersions, Lease};
+use crate::queue::selection::PairSelection;
+use crate::records::model::{PairAttributes, StageRecord};
+use crate::records::stage_results;
+use crate::{Catalog, CatalogError, Result};
+use mocban_core::domain::InputVersion;
+use mocban_core::domain::{PairId, Stage};
+
+/// A leased pair with its attributes and results.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairWork {
+    /// Attributes as imported.
+    pub attributes: PairAttributes,
+    /// Manifest attributes that results depend on. They are stored with each result.
+    pub attributes_json: String,
+    /// Results of all completed stages, in order.
+    pub results: Vec<StageRecord>,
+}
+
+from_row! { PairWork { attributes in row, attributes_json: "attributes", results = Vec::new() } }
+
+/// Input files of a pair as last read, to detect changes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownInputs {
+    /// The pair.
+    pub pair: PairId,
+    /// Path of the mesh as stored.
+    pub mesh_path: String,
+    /// The mesh as last read.
+    pub mesh: Option<InputVersion>,
+    /// Path of the print as stored.
+    pub print_path: String,
+    /// The print as last read.
+    pub print: Option<InputVersion>,
+}
+
+pub(crate) const LEASED: &str = "
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.prior,
+    p.attributes
+FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = CAST(wanted.atom AS bigint)";
+
+/// Selects pairs with their input files as last read, in pages by id.
+pub(crate) const INPUTS: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat FROM pair
+WHERE id > ?1 ORDER BY id LIMIT ?2";
+
+const INPUTS_AMONG: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
+FROM pair WHERE id > ?1 AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?3)) ORDER BY id LIMIT ?2";
+
+impl Catalog {
+    /// Returns the leased pairs with their results, in the same order as the leases.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails, or if a stored value is invalid.
+    pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
+        let mut conn = self.read_conn().await?;
+        let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
+        let leased = query(LEASED).bind(wanted).fetch_all(&mut conn).await?;
+        let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
+        let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
+        let mut results = BTreeMap::new();
+        if !begun.is_empty() {
+            results = stage_results::of_pairs(&mut conn, &begun).await?;
+        }
+        let mut works = BTreeMap::new();
+        for row in &leased {
+            works.insert(row.get::<PairId>("id")?, PairWork::from_row(row)?);
+        }
+        let each = leases.iter().map(|Lease { pair, cursor, .. }| {
+            let gone = || CatalogError::Corrupt(format!("a job has no pair {}", pair.0));
+            let mut work = works.remove(pair).ok_or_else(gone)?;
+            work.results = results.remove(&pair.0).unwrap_or_default();
+            work.results.retain(|record| record.stage < *cursor);
+            Ok(work)
+        });
+        each.collect()
+    }
+
+    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `among` is given,
+    /// returns only its pairs. Returns an empty list at the end.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn known_inputs(
+        &self,
+        after: Option<PairId>,
+        limit: usize,
+        among: Option<&PairSelection>,
+    ) -> Result<Vec<KnownInputs>> {
+        let mut conn = self.read_conn().await?;
+        let after = after.map_or(0, |pair| pair.0);
+        let query = match among {
+            None => query(INPUTS).bind(after).bind(limit as i64),
+            Some(among) => query(INPUTS_AMONG)
+                .bind(after)
+                .bind(limit as i64)
+                .bind(&among.json),
+        };
+        let found = query.fetch_all(&mut conn).await?;
+        found.iter().map(known_inputs).collect()
+    }
+
+    /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let mut script = Script::default();
+                let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
+                checkpoint::add_inputs(&mut script, inputs)?;
+                script.run(conn).await?;
+                Ok(())
+            })
+        })
+        .await
+    }
+}
+
+/// Reads the input files from a row with the columns of [`INPUTS`].
+pub(crate) fn known_inputs(row: &Row) -> Result<KnownInputs> {
+    let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
+        let (hash, stat): (Option<_>, Option<_>) = (row.get(hash)?, row.get(stat)?);
+        let both = hash.zip(stat);
+        Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
+    };
+    Ok(KnownInputs {
+        pair: row.get("id")?,
+        mesh_path: row.get("mesh_path")?,
+        mesh: version("mesh_hash", "mesh_stat")?,
+        print_path: row.get("print_path")?,
+        print: version("print_hash", "print_stat")?,
+    })
+}

@@ -1,0 +1,113 @@
+//! The counts of the whole project.
+
+use std::collections::BTreeMap;
+
+use crate::db::conn::Conn;
+use crate::db::query::{query_as, query_scalar};
+use crate::queue::counters::{JobCounts, by_status, counters};
+use crate::queue::fingerprint::{Fingerprints, current_json};
+use crate::queue::staleness::count_stale;
+use crate::records::model::{StageCounts, StatusCounts};
+use crate::{Catalog, Result};
+use mocban_core::domain::{JobStatus, Stage, Verdict};
+
+/// Counts verdicts on current results. Only the newest verdict of each reviewer on a result counts. Leaves out the verdicts
+/// that the owner has set apart; damaged ones that nobody knows of yet are found by a check or a report.
+const VERDICTS: &str = "
+SELECT v.verdict, count(*) FROM verdict AS v
+    JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
+WHERE v.id = (
+    SELECT max(n.id) FROM verdict AS n
+    WHERE n.pair = v.pair AND n.metric = v.metric AND n.reviewer = v.reviewer AND n.result_hash = v.result_hash
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act)
+        AND n.id NOT IN (SELECT s.row FROM set_apart AS s WHERE s.record = 2))
+    AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = v.pair)
+GROUP BY v.verdict";
+
+/// Completed pairs whose result of the default metric has a low confidence.
+pub(crate) const LOW_CONFIDENCE: &str =
+    "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
+
+impl Catalog {
+    /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
+    /// `fingerprints`, or if their inputs have changed.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
+        let mut conn = self.snapshot().await?;
+        let counted = by_status(counters(&mut conn).await?);
+        let current = current_json(&mut conn, fingerprints).await?;
+        Ok(StatusCounts {
+            schema: 1,
+            pairs: counted.values().sum(),
+            jobs: jobs_by_status(&counted),
+            stages: by_stage(&counted),
+            stale: count_stale(&mut conn, &current).await?,
+            low_confidence: query_scalar(LOW_CONFIDENCE).fetch_one(&mut conn).await?,
+            verdicts: verdicts(&mut conn).await?,
+        })
+    }
+}
+
+/// Adds up the numbers of jobs by status. Statuses without jobs are included.
+fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
+    let mut jobs: BTreeMap<_, _> = JobStatus::ALL.map(|status| (status, 0)).into();
+    for ((_, status), n) in counts {
+        *jobs.entry(*status).or_default() += n;
+    }
+    jobs
+}
+
+/// Counts the done, pending and failed pairs of each stage. A pair that failed is pending at the later stages.
+fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
+    let mut stages: BTreeMap<_, _> = Stage::ALL
+        .map(|stage| (stage, StageCounts::default()))
+        .into();
+    for ((cursor, status), n) in counted {
+        for (stage, count) in &mut stages {
+            let index = stage.index() as i64;
+            if *cursor > index {
+                count.done += n;
+            } else if *cursor == index && *status == JobStatus::Quarantined {
+                count.failed += n;
+            } else {
+                count.pending += n;
+            }
+        }
+    }
+    stages
+}
+
+async fn verdicts(conn: &mut Conn) -> Result<BTreeMap<Verdict, u64>> {
+    let mut counts: BTreeMap<_, _> = Verdict::ALL.map(|verdict| (verdict, 0)).into();
+    let found: Vec<(Verdict, u64)> = query_as(VERDICTS).fetch_all(conn).await?;
+    counts.extend(found);
+    Ok(counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::by_stage;
+    use crate::StageCounts;
+    use mocban_core::domain::{JobStatus, Stage};
+
+    #[test]
+    fn every_pair_is_counted_once_at_every_stage() {
+        let counted = [
+            ((0, JobStatus::Ready), 5),
+            ((2, JobStatus::Quarantined), 3),
+            ((4, JobStatus::Done), 7),
+        ];
+        let stages = by_stage(&counted.into_iter().collect());
+        for count in stages.values() {
+            assert_eq!(count.done + count.pending + count.failed, 15);
+        }
+        let expected = StageCounts {
+            done: 7,
+            pending: 5,
+            failed: 3,
+        };
+        assert_eq!(stages[&Stage::Normalize], expected);
+    }
+}

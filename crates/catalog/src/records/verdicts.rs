@@ -1,0 +1,398 @@
+//! Verdicts, in an append-only log. Of a reviewer's verdicts on one result, only the newest counts.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::db::conn::Conn;
+use crate::db::query::{As, Query, query, query_as, query_scalar};
+use crate::db::row::from_row;
+use crate::db::rows::json_array;
+use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::left_out::{LeftOut, is_counted};
+use crate::records::review_context::ReviewContext;
+use crate::{Catalog, CatalogError, Result};
+use mocban_core::domain::{
+    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
+};
+
+/// A verdict to store.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct NewVerdict {
+    /// The pair.
+    pub pair: PairName,
+    /// The judged metric. `None` for all metrics.
+    pub metric: Option<ThresholdMetric>,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Name of the reviewer.
+    pub reviewer: String,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// Note of the reviewer.
+    pub note: Option<String>,
+    /// Context in which it was given, if known.
+    #[serde(flatten)]
+    pub look: ReviewContext,
+    /// When the verdict was given, if not at the time of storing.
+    pub at: Option<UnixMillis>,
+}
+
+/// One line of the verdict log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictEvent {
+    /// Number in the log.
+    pub id: i64,
+    /// Number of the reviewer's action. One action can judge several metrics of a pair.
+    pub act: i64,
+    /// The pair.
+    pub pair: PairName,
+    /// The metric.
+    pub metric: ThresholdMetric,
+    /// The result that was judged.
+    pub result_hash: ContentHash,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Name of the reviewer.
+    pub reviewer: String,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// Note of the reviewer.
+    pub note: Option<String>,
+    /// Context in which it was given, if known.
+    #[serde(flatten)]
+    pub look: ReviewContext,
+    /// When.
+    pub at: UnixMillis,
+    /// When it was undone, if it was.
+    pub undone_at: Option<UnixMillis>,
+    /// Whether the judged result is still the current one.
+    pub current: bool,
+}
+
+from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, look in row, at, undone_at, current } }
+
+/// A reviewer's newest verdict on a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ReviewerVerdict {
+    /// Name of the reviewer.
+    pub reviewer: String,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// Order of the review queue. [`ReviewOrder::Adjudicate`] marks a decision between conflicting verdicts.
+    pub review_order: Option<ReviewOrder>,
+}
+
+from_row! { ReviewerVerdict { reviewer, verdict, reason, review_order } }
+
+/// A verdict that was not undone, with the result that it judges.
+#[derive(Debug)]
+pub(crate) struct ResultVerdict {
+    pair: i64,
+    metric: ThresholdMetric,
+    pub(crate) result_hash: ContentHash,
+    pub(crate) verdict: ReviewerVerdict,
+}
+
+from_row! { ResultVerdict { pair, metric, result_hash, verdict in row } }
+
+/// Selects the current results of a pair. If the pair is not done, selects one row whose metric is NULL.
+const JUDGED: &str = "
+SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
+    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+WHERE p.name = ?1 ORDER BY m.metric";
+
+/// Begins an action, unless a verdict with the same event and metric exists.
+const NEW_ACT: &str = "
+INSERT INTO review_act (reviewer) SELECT ?1
+WHERE ?2 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?2 AND metric = ?3)
+RETURNING id";
+
+const INSERT: &str = "
+INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, note, at,
+    event, seen, shown_ms, angle_read_deg, review_order)
+SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
+WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
+RETURNING id";
+
+/// Returns whether a verdict with an id up to `?9` has the same values, and was not undone or set apart.
+const IS_STORED: &str = "
+SELECT EXISTS (SELECT 1 FROM verdict AS v
+    WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
+    AND v.verdict = ?5 AND v.reason IS NOT DISTINCT FROM ?6 AND v.note IS NOT DISTINCT FROM ?7
+    AND v.at = ?8 AND v.id <= ?9
+    AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+    AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id))";
+
+/// Returns whether the reviewer's newest verdict on a result that was not undone or set apart has the same values.
+const IS_NEWEST: &str = "
+SELECT EXISTS (SELECT 1 FROM (SELECT v.verdict, v.reason, v.note FROM verdict AS v
+        WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+        AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id)
+        ORDER BY v.id DESC LIMIT 1) AS last
+    WHERE last.verdict = ?5 AND last.reason IS NOT DISTINCT FROM ?6 AND last.note IS NOT DISTINCT FROM ?7)";
+
+/// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
+/// that many rows. Leaves out the verdicts of `?5` and the undos of `?6`.
+const LOG: &str = concat!(
+    "
+SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
+    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, false) AS current
+FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act AND ",
+    is_counted!("u.act", "?6"),
+    "
+    LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
+WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) AND v.id > coalesce(?3, 0) AND ",
+    is_counted!("v.id", "?5"),
+    "
+ORDER BY v.id LIMIT coalesce(?4, 9223372036854775807)"
+);
+
+const UNDO: &str = "
+INSERT INTO verdict_undo (act, reviewer, at) SELECT id, reviewer, ?2 FROM review_act WHERE id = ?1";
+
+/// Selects the verdicts of the pairs of `?1`, without the verdicts of `?2` and the undos of `?3`.
+pub(crate) const COUNTED: &str = concat!(
+    "
+SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
+FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = CAST(wanted.atom AS bigint)
+WHERE ",
+    is_counted!("v.id", "?2"),
+    " AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act AND ",
+    is_counted!("u.act", "?3"),
+    ")
+ORDER BY v.pair, v.metric, v.reviewer, v.id"
+);
+
+impl Catalog {
+    /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
+    /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
+    /// this call. Skips a verdict without `at` and context if it equals the reviewer's newest one. Returns the number of
+    /// verdicts of which a row was appended.
+    ///
+    /// # Errors
+    /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
+    /// nothing is stored.
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
+                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
+                let mut stored = 0;
+                for verdict in &verdicts {
+                    stored += u64::from(append(conn, verdict, newest, now).await?);
+                }
+                Ok(stored)
+            })
+        })
+        .await
+    }
+
+    /// Undoes the newest action that is not undone yet, and returns its verdicts. If `reviewer` is given, only actions
+    /// of this reviewer count. The log keeps the action and records the undo.
+    ///
+    /// # Errors
+    /// Returns an error if there is no action to undo, or if a database operation fails.
+    pub async fn verdict_undo(
+        &self,
+        reviewer: Option<&str>,
+        now: UnixMillis,
+    ) -> Result<Vec<VerdictEvent>> {
+        let reviewer = reviewer.map(str::to_owned);
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let act: Option<i64> = query_scalar(
+                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
+                        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
+                )
+                .bind(&reviewer)
+                .fetch_one(&mut *conn)
+                .await?;
+                let Some(act) = act else {
+                    return Err(CatalogError::NothingToUndo(reviewer));
+                };
+                query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
+                checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
+                let nothing = LeftOut::default();
+                select_log((Some(act), None), (None, None), &nothing)
+                    .fetch_all(conn)
+                    .await
+            })
+        })
+        .await
+    }
+
+    /// Returns the verdict log of one pair, or of all pairs, oldest first.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
+        let mut conn = self.read_conn().await?;
+        log(&mut conn, pair, &self.left_out).await
+    }
+
+    /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
+    ///
+    /// # Errors
+    /// Returns an error if a database operation fails.
+    pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
+        let mut conn = self.read_conn().await?;
+        let (after, limit) = (Some(after), Some(limit as i64));
+        select_log((None, None), (after, limit), &self.left_out)
+            .fetch_all(&mut conn)
+            .await
+    }
+}
+
+/// Appends a verdict. Returns `false` if all its rows are already stored. Compares a verdict with a time only with rows up
+/// to the id `newest`, so that two equal ones of one call are both stored.
+async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis) -> Result<bool> {
+    let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = query_as(JUDGED)
+        .bind(new.pair.as_str())
+        .fetch_all(&mut *conn)
+        .await?;
+    if judged.is_empty() {
+        return Err(CatalogError::UnknownPair(new.pair.clone()));
+    }
+    let mut act: Option<i64> = None;
+    let mut found = false;
+    for (pair, metric, hash) in judged {
+        let Some((metric, hash)) = metric.zip(hash) else {
+            return Err(CatalogError::NoResult(new.pair.clone()));
+        };
+        if new.metric.is_none_or(|wanted| wanted == metric) {
+            found = true;
+            let judged = (pair, metric, hash);
+            if is_stored(conn, new, judged, newest).await? {
+                continue;
+            }
+            act = insert(conn, new, judged, act, now).await?.or(act);
+        }
+    }
+    match new.metric {
+        Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
+        Some(_) | None => Ok(act.is_some()),
+    }
+}
+
+/// Returns whether a verdict is stored already: one with the same values and time among the rows up to `newest`, or, if it
+/// has no time, the reviewer's newest one on the result. Without a time, a verdict with a context, such as an angle, is
+/// always new.
+async fn is_stored(
+    conn: &mut Conn,
+    new: &NewVerdict,
+    (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
+    newest: i64,
+) -> Result<bool> {
+    let sql = match new.at {
+        Some(_) => IS_STORED,
+        None if new.look != ReviewContext::default() => return Ok(false),
+        None => IS_NEWEST,
+    };
+    let stored = query_scalar(sql)
+        .bind(pair)
+        .bind(metric.name())
+        .bind(&new.reviewer)
+        .bind(&result_hash.as_bytes()[..])
+        .bind(new.verdict.name())
+        .bind(new.reason.map(Reason::name))
+        .bind(&new.note);
+    let stored = match new.at {
+        Some(at) => stored.bind(at).bind(newest),
+        None => stored,
+    };
+    stored.fetch_one(conn).await
+}
+
+/// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row
+/// with the same event and metric exists. If `act` is `None`, the row begins a new action.
+pub(crate) async fn insert(
+    conn: &mut Conn,
+    new: &NewVerdict,
+    (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
+    act: Option<i64>,
+    now: UnixMillis,
+) -> Result<Option<i64>> {
+    let look = &new.look;
+    let act = if let Some(act) = act {
+        act
+    } else {
+        let begun = query_scalar(NEW_ACT).bind(&new.reviewer);
+        let begun = begun.bind(&look.event).bind(metric.name());
+        let Some(act) = begun.fetch_optional(&mut *conn).await? else {
+            return Ok(None);
+        };
+        act
+    };
+    let inserted: Option<i64> = query_scalar(INSERT)
+        .bind(act)
+        .bind(pair)
+        .bind(metric.name())
+        .bind(&result_hash.as_bytes()[..])
+        .bind(new.verdict.name())
+        .bind(&new.reviewer)
+        .bind(new.reason.map(Reason::name))
+        .bind(&new.note)
+        .bind(new.at.unwrap_or(now))
+        .bind(&look.event)
+        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(look.shown_ms.map(u64::cast_signed))
+        .bind(look.angle_read_deg)
+        .bind(look.review_order.map(ReviewOrder::name))
+        .fetch_optional(&mut *conn)
+        .await?;
+    let Some(row) = inserted else {
+        return Ok(None);
+    };
+    checksums::store(conn, ChecksummedTable::Verdict, &[row]).await?;
+    Ok(Some(act))
+}
+
+/// Reads the log of one pair or all.
+pub(crate) async fn log(
+    conn: &mut Conn,
+    pair: Option<&PairName>,
+    left_out: &LeftOut,
+) -> Result<Vec<VerdictEvent>> {
+    select_log((None, pair), (None, None), left_out)
+        .fetch_all(conn)
+        .await
+}
+
+/// Returns the query of [`LOG`]: of an action or a pair, for a limited number of rows after a row.
+fn select_log(
+    (act, pair): (Option<i64>, Option<&PairName>),
+    (after, limit): (Option<i64>, Option<i64>),
+    left_out: &LeftOut,
+) -> Query<As<VerdictEvent>> {
+    let query = query_as(LOG).bind(act).bind(pair.map(PairName::as_str));
+    let query = query.bind(after).bind(limit);
+    let query = query.bind(left_out.of(ChecksummedTable::Verdict));
+    query.bind(left_out.of(ChecksummedTable::VerdictUndo))
+}
+
+/// Returns each reviewer's newest verdict on each result of the given pairs, sorted by reviewer. Ignores undone
+/// verdicts.
+pub(crate) async fn of_pairs(
+    conn: &mut Conn,
+    pairs: &[i64],
+    left_out: &LeftOut,
+) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<ResultVerdict>>> {
+    let query = query_as(COUNTED).bind(json_array(pairs.iter().copied()));
+    let query = query.bind(left_out.of(ChecksummedTable::Verdict));
+    let query = query.bind(left_out.of(ChecksummedTable::VerdictUndo));
+    let found: Vec<ResultVerdict> = query.fetch_all(conn).await?;
+    let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
+    for newest in found {
+        let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
+        // Each reviewer's verdicts come oldest first, so a later verdict on a result replaces the earlier one.
+        of_metric.retain(|old| {
+            old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
+        });
+        of_metric.push(newest);
+    }
+    Ok(counted)
+}

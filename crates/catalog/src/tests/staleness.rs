@@ -1,0 +1,172 @@
+//! Changed settings and inputs requeue a pair from the first affected stage.
+
+use super::{World, fingerprints, name, row};
+use crate::{
+    FailureAction, Fingerprints, InputVersion, InputVersions, Plan, RerunPolicy, StageFailure,
+    StaleReason,
+};
+use mocban_core::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
+
+async fn cursor(world: &World, pair: &str) -> Option<Stage> {
+    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+    detail.expect("the pair").results.next_stage
+}
+
+async fn requeue_stale(world: &World, fingerprints: &Fingerprints) -> u64 {
+    let sent = world
+        .catalog
+        .requeue_stale(fingerprints, None, RerunPolicy::Changed);
+    sent.await.expect("requeued")
+}
+
+#[tokio::test]
+async fn a_changed_register_setting_reruns_register_only() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    let changed = fingerprints([1, 1, 1, 2]);
+    let why = world.catalog.why(&name("p0"), &changed).await;
+    let why = why.expect("a read").expect("a reason");
+    assert_eq!(why.from, Stage::Register);
+    assert_eq!(why.to_string(), "register.revision: 1 -> 2");
+    let status = world.catalog.status(&changed).await.expect("a read");
+    assert_eq!(status.stale, 1);
+    assert_eq!(requeue_stale(&world, &changed).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Register));
+    let page = world.catalog.results_page(None, 1).await.expect("a page");
+    assert_eq!(page[0].stages.len(), 3);
+    assert_eq!(requeue_stale(&world, &changed).await, 0);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn unchanged_settings_requeue_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
+    let plan = plan(&world).await;
+    assert_eq!((plan.pairs(), plan.done), (0, 1));
+}
+
+async fn plan(world: &World) -> Plan {
+    let fingerprints = fingerprints([1; 4]);
+    let plan = world
+        .catalog
+        .plan(&fingerprints, None, RerunPolicy::Changed);
+    plan.await.expect("a plan")
+}
+
+async fn see(world: &World, mesh: &str, print: &str) {
+    let page = world.catalog.known_inputs(None, 10, None).await;
+    let pair = page.expect("a page")[0].pair;
+    let seen = |text: &str| InputVersion {
+        hash: ContentHash::of(text.as_bytes()),
+        stat: format!("{text} touched"),
+    };
+    let inputs = InputVersions {
+        mesh: Some(seen(mesh)),
+        print: Some(seen(print)),
+    };
+    let stored = world.catalog.store_inputs(vec![(pair, inputs)]).await;
+    stored.expect("stored");
+}
+
+#[tokio::test]
+async fn a_new_modification_time_reruns_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    see(&world, "mesh", "print").await;
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
+}
+
+#[tokio::test]
+async fn a_changed_print_requeues_its_pair_from_normalize() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    world.finish_one().await;
+    see(&world, "mesh", "another print").await;
+    let plan = plan(&world).await;
+    assert_eq!(plan.entries.len(), 1);
+    assert_eq!(plan.entries[0].why, StaleReason::Print);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Normalize));
+    assert_eq!(cursor(&world, "p1").await, None);
+}
+
+#[tokio::test]
+async fn a_changed_mesh_requeues_its_pair_from_fit() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    see(&world, "another mesh", "print").await;
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Fit));
+}
+
+#[tokio::test]
+async fn a_changed_unit_in_the_manifest_makes_the_pair_stale() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let mut changed = row("p0");
+    changed.unit = Some(LengthUnit::In);
+    world
+        .catalog
+        .import(vec![changed], 9)
+        .await
+        .expect("imported");
+    let why = world.catalog.why(&name("p0"), &fingerprints([1; 4])).await;
+    let why = why.expect("a read").expect("a reason");
+    assert_eq!((why.from, why.why), (Stage::Fit, StaleReason::Manifest));
+}
+
+#[tokio::test]
+async fn a_changed_path_is_read_again_and_changed_metadata_reruns_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let mut changed = row("p0");
+    changed.mesh_path = "elsewhere.stl".to_owned();
+    changed.character = Some("字".to_owned());
+    world
+        .catalog
+        .import(vec![changed], 9)
+        .await
+        .expect("imported");
+    let known = world.catalog.known_inputs(None, 10, None).await;
+    let mesh = known.expect("a page")[0].mesh.clone().expect("a mesh");
+    assert_eq!(mesh.stat, "");
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
+}
+
+#[tokio::test]
+async fn a_failed_pair_is_requeued_when_its_settings_change() {
+    let world = World::new(1).await;
+    let lease = world.claim(1).await.remove(0);
+    let failed = StageFailure {
+        stage: Stage::Fit,
+        failure: Failure::new(FailureClass::NoSolution, "no relief"),
+        action: FailureAction::Quarantine,
+        fingerprint: world.fingerprints.of(Stage::Fit),
+        attributes: super::done(world.fingerprints, Stage::Fit).attributes,
+        inputs: super::inputs(Stage::Fit),
+        ms: None,
+        at: 5,
+        alive_since: 0,
+    };
+    assert!(world.catalog.fail(lease, failed).await.expect("stored"));
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([1, 2, 1, 1])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([2, 1, 1, 1])).await, 1);
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let results = detail.expect("the pair").results;
+    assert_eq!((results.status, results.failure), (JobStatus::Ready, None));
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_leased_pair_is_never_requeued() {
+    let world = World::new(1).await;
+    let _lease = world.claim(1).await;
+    let fingerprints = fingerprints([2; 4]);
+    let again = RerunPolicy::All(Stage::Fit);
+    let sent = world.catalog.requeue_stale(&fingerprints, None, again);
+    assert_eq!(sent.await.expect("requeued"), 0);
+    world.assert_counters().await;
+}
