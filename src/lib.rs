@@ -24,7 +24,7 @@
 //! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
 //! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
 //! 9. `src/runner/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
-//! 10. `src/stages/pipeline.rs`: chooses the method of `fit`, `normalize` and `register`; `depth` has only one. The
+//! 10. `crates/align/src/stages/pipeline.rs`: chooses the method of `fit`, `normalize` and `register`; `depth` has only one. The
 //!     stages start in `fit/upper_surface.rs` (plane, curvature, carved side), `depth.rs` (depth map),
 //!     `normalize/mod.rs` (ink of the print, heights of tops and ground) and `register/mod.rs` (pose, thresholds,
 //!     stroke maps, scores, confidence)
@@ -191,11 +191,11 @@
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `crates/core/src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `src/report/comparison.rs`: which metrics are compared with each other
-//! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
-//! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
-//! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
+//! - `crates/align/src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
+//! - `crates/align/src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
+//! - `crates/align/src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
-//! Also touched: the weights in `src/stages/register/confidence.rs`, `REVISION` in `src/stages/register/mod.rs`, the
+//! Also touched: the weights in `crates/align/src/stages/register/confidence.rs`, `REVISION` in `crates/align/src/stages/register/mod.rs`, the
 //! help text of `--metric` in `src/cli/contact_sheet.rs` and `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
 //! `migrations/`, `SCHEMA_VERSION` in `crates/catalog/src/db/open.rs`, `README.md`, `docs/reference/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
@@ -261,20 +261,19 @@
 //! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
 //! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
-pub mod block;
 pub mod check;
 pub mod cli;
 pub mod config;
-pub mod demo;
 pub mod documentation;
 pub mod export;
 pub mod local_server;
 pub mod report;
 pub mod review;
 pub mod runner;
-pub mod stages;
 pub mod view;
+pub use mocban_align::{block, stages};
 pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
+pub use mocban_demo as demo;
 pub use mocban_lists::{labels, manifest};
 pub use mocban_store as store;

@@ -7,9 +7,9 @@ use anyhow::Context as _;
 use super::context::{Context, shell_quoted};
 use super::exit::Refusal;
 use super::{files, signals};
-use crate::demo::block::{BlockOptions, block_options};
-use crate::demo::{DatasetError, DemoOptions};
 use crate::runner::Stop;
+use mocban_demo::block::{BlockOptions, block_options};
+use mocban_demo::{DatasetError, DemoOptions};
 use mocban_store::{CATALOG_FILE, ReplacementFolder};
 
 const NOTE: &str = "README.txt";
@@ -143,8 +143,8 @@ pub(super) async fn replace_data<T: Send + 'static>(
 #[cfg(test)]
 mod tests {
     use super::{DemoContent, NOTE, NOTE_TEXT, check_directory};
-    use crate::demo::block::{BlockKind, BlockOptions};
-    use crate::demo::{DemoOptions, Tier};
+    use mocban_demo::block::{BlockKind, BlockOptions};
+    use mocban_demo::{DemoOptions, Tier};
 
     const OPTIONS: DemoOptions = DemoOptions {
         pairs: 4,

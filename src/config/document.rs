@@ -8,7 +8,7 @@ use toml::Value;
 use super::error::ConfigError;
 use super::sources::Preset;
 use super::tree::{Setting, Tree};
-use crate::stages::Settings;
+use mocban_align::stages::Settings;
 use mocban_core::mesh;
 use mocban_core::raster;
 

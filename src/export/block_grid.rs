@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::block_view::{BlockViewError, RegisteredFace};
-use crate::block::{CarvedFace, Support};
+use mocban_align::block::{CarvedFace, Support};
 use mocban_core::domain::LengthUnit;
 use mocban_store::Project;
 

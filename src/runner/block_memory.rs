@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::input_reads::ReadItem;
 use super::memory_budget::{mesh_bytes, print_pixels};
-use crate::block::MAX_MAP_PIXELS;
+use mocban_align::block::MAX_MAP_PIXELS;
 use mocban_catalog::BlockAttributes;
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};
 use mocban_core::raster;
@@ -83,9 +83,9 @@ mod tests {
     use super::{
         BLOCK_BYTES, EstimatedBlock, PAGE_PIXEL_BYTES, STREAMED_SHARE, map_bytes, max_map_pixels,
     };
-    use crate::block::MAX_MAP_PIXELS;
     use crate::runner::input_reads::ReadItem as _;
     use crate::runner::tests::values;
+    use mocban_align::block::MAX_MAP_PIXELS;
     use mocban_core::raster::ImageLimits;
     use mocban_store::Project;
 

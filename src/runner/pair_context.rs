@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::stages::normalize::Normalized;
-use crate::stages::{Print, Scan};
+use mocban_align::stages::normalize::Normalized;
+use mocban_align::stages::{Print, Scan};
 use mocban_catalog::{InputVersions, PairAttributes, PairWork};
 use mocban_core::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
 use mocban_core::raster::DepthMap;

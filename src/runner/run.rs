@@ -26,7 +26,7 @@ use super::scheduler::{RunCounts, Scheduler};
 use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
 use super::worker_session::this_process;
-use crate::stages::Settings;
+use mocban_align::stages::Settings;
 use mocban_catalog::{
     Catalog, DeadWorker, FingerprintIds, Fingerprints, PairSelection, WorkerSettings,
 };

@@ -10,7 +10,7 @@ use super::options::RunOptions;
 use super::run::fingerprints;
 use super::run_selection::RunSelection;
 use super::stop::Stop;
-use crate::stages::Settings;
+use mocban_align::stages::Settings;
 use mocban_catalog::{BlockPlanEntry, Catalog, Plan};
 use mocban_store::Project;
 

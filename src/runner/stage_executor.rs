@@ -9,9 +9,9 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
-use crate::stages::normalize::{NormalizeError, Normalized, PrintMasks};
-use crate::stages::register::RegisterError;
-use crate::stages::{Settings, StageError, depth, pipeline};
+use mocban_align::stages::normalize::{NormalizeError, Normalized, PrintMasks};
+use mocban_align::stages::register::RegisterError;
+use mocban_align::stages::{Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };

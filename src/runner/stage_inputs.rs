@@ -4,8 +4,8 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::run_metrics::{RunMetrics, TimedRead};
 use super::stage_output::ExecutionError;
-use crate::stages::normalize::{Normalized, PrintMasks};
-use crate::stages::{Print, Scan};
+use mocban_align::stages::normalize::{Normalized, PrintMasks};
+use mocban_align::stages::{Print, Scan};
 use mocban_core::domain::artifact_role::{DEPTH, print_mask};
 use mocban_core::domain::{
     DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage, WaitReason,

@@ -20,7 +20,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
 ];
 
 /// Crates without files, processes, clocks and async code.
-const PURE_CRATES: &[&str] = &["core", "lists"];
+const PURE_CRATES: &[&str] = &["core", "lists", "align"];
 const IMPURE: &[&str] = &[
     "tokio::",
     "std::fs",

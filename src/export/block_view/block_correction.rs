@@ -8,10 +8,10 @@ use super::page_layers::{PageRegion, jpeg, overlay, relief};
 use super::page_picture::PagePicture;
 use super::page_view::not_aligned;
 use super::registered_face::{outcome, read_face, unusable};
-use crate::block::{
+use crate::export::pictures::{Rgb, resized};
+use mocban_align::block::{
     AlignOutcome, CarvedFace, ControlPointError, FaceOutcome, HEIGHT_STEP_MM, PageMap, align_at,
 };
-use crate::export::pictures::{Rgb, resized};
 use mocban_catalog::{BlockDetail, Catalog};
 use mocban_core::domain::{
     Affine2, ArtifactSet, BlockName, BlockSide, BlockStage, ContentHash, ControlPoint,

@@ -1,7 +1,7 @@
 //! Why a block cannot be shown.
 
-use crate::block::BlockError;
 use crate::export::source_print::SourcePrintError;
+use mocban_align::block::BlockError;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::{BlockName, BlockStage, ThresholdMetric};
 use mocban_core::raster::PngError;

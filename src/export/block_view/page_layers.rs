@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::block::{CarvedFace, PageInk, PageMap};
 use crate::export::pictures::{BLUE, Rgb, VERMILLION, resized, shaded};
+use mocban_align::block::{CarvedFace, PageInk, PageMap};
 use mocban_core::domain::cancel::ThreadToken;
 use mocban_core::domain::enum_names;
 use mocban_core::raster::{Grid, jpeg_rgb8};
@@ -258,8 +258,10 @@ impl FacePlaces {
 #[cfg(test)]
 pub(super) mod tests {
     use super::{BOTH, INK_BESIDE, PageLayer, PageLayers, PageRegion};
-    use crate::block::{CarvedFace, HeightHeader, Orientation, PageInk, PageMap, StoredHeights};
     use crate::export::pictures::{BLUE, Rgb, VERMILLION};
+    use mocban_align::block::{
+        CarvedFace, HeightHeader, Orientation, PageInk, PageMap, StoredHeights,
+    };
     use mocban_core::domain::Affine2;
     use mocban_core::raster::Grid;
 

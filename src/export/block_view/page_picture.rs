@@ -1,9 +1,9 @@
 //! The image of a page, decoded, with its ink.
 
 use super::block_error::BlockViewError;
-use crate::block::PageInk;
 use crate::export::pictures::{Rgb, eight_bits};
 use crate::export::source_print::SourcePrint;
+use mocban_align::block::PageInk;
 use mocban_core::domain::ContentHash;
 use mocban_core::raster::ImageLimits;
 use mocban_store::Project;

@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 
 use super::block_error::BlockViewError;
-use crate::block::{
+use mocban_align::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, FaceOutcome, FoundFace, PageMap, StoredHeights,
     StoredPageMap, Support, heights_role,
 };

@@ -3,10 +3,10 @@
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::held::{HeldFaces, HeldInputs};
-use crate::block::{
+use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
+use mocban_align::block::{
     self, AlignOutcome, BlockError, CarvedFace, PageAlignment, PageInk, StoredPageMap,
 };
-use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_core::domain::{BlockSide, ControlPoints, FailureClass};
 
 /// Aligns the page with a face of the block: from the control points, if there are some, or else by a search.

@@ -5,11 +5,11 @@ use std::collections::HashSet;
 use super::context::StageContext;
 use super::failure::output;
 use super::held::{HeldInputs, HeldPage};
-use crate::block::{
+use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use mocban_align::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,
 };
-use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockStage, FailureClass};
 use mocban_lists::labels::{self, PageFile, reading_order};

@@ -9,11 +9,11 @@ use super::context::StageContext;
 use super::failure::{failed, output};
 use super::held::HeldInputs;
 use super::scan_stream::ScanStream;
-use crate::block::{
+use crate::runner::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
+use mocban_align::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
 };
-use crate::runner::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
 use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
 use mocban_core::mesh::write::MeshFormat;

@@ -3,10 +3,10 @@
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::scan_stream::ScanStream;
-use crate::block::{
+use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
+use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
-use crate::runner::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_core::domain::{BlockSide, LengthUnit};
 use mocban_core::raster::png_grey16;
 

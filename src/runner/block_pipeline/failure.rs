@@ -4,8 +4,8 @@ use std::io;
 
 use serde::Serialize;
 
-use crate::block::BlockError;
 use crate::runner::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use mocban_align::block::BlockError;
 use mocban_core::domain::FailureClass;
 use mocban_core::mesh::MeshReadError;
 

@@ -5,8 +5,8 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::failure::{StopRequested, failed};
-use crate::block::BlockError;
 use crate::runner::block_stages::{BlockFile, BlockStageError};
+use mocban_align::block::BlockError;
 use mocban_core::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
     binary_stl_triangles, pass_over_binary_stl,

@@ -1,0 +1,195 @@
+//! The two pipelines, stage by stage. The setting `pipeline.method` chooses between them.
+//!
+//! | stage | `default` | `paper` (arXiv 2411.05524) |
+//! |---|---|---|
+//! | fit | one-sided robust surface over the stroke tops on both sides of the mesh; the print helps to find the carved side | PCA, upper set, spaced selection, RANSAC, PCA (III-A) |
+//! | depth | z-buffer along the normal, heights over the surface (III-B) | the same |
+//! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, both images scaled by bounding box and centred by centroid, density and structure thresholds (III-C) |
+//! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations in equal steps, shifts by hill climbing on the IoU, scores (III-D) |
+//!
+//! The fit stage reads the print to decide the carved side. The code map in `src/lib.rs` gives the reason.
+
+use super::depth::{self, DepthError};
+use super::fit::{self, FitError};
+use super::normalize::{self, NormalizeError, Normalized};
+use super::paper_method;
+use super::print::Print;
+use super::register::{self, RegisterError, Registered};
+use super::scan::Scan;
+use super::settings::{AlignmentMethod, Settings};
+use mocban_core::domain::{
+    Affine2, FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric,
+};
+use mocban_core::raster::DepthMap;
+
+/// Why a stage found no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StageError {
+    /// From the fit stage.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// From the depth stage.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// From the normalize stage.
+    #[error(transparent)]
+    Normalize(#[from] NormalizeError),
+    /// From the register stage.
+    #[error(transparent)]
+    Register(#[from] RegisterError),
+}
+
+impl StageError {
+    /// Returns what the failure means for the pair.
+    pub fn class(&self) -> FailureClass {
+        match self {
+            Self::Fit(error) => error.class(),
+            Self::Depth(error) => error.class(),
+            Self::Normalize(error) => error.class(),
+            Self::Register(error) => error.class(),
+        }
+    }
+}
+
+impl Settings {
+    /// Returns whether the fit stage reads the print. If it does not, its results stay valid when the print changes.
+    pub const fn fit_reads_print(&self) -> bool {
+        matches!(self.pipeline.method, AlignmentMethod::Default)
+    }
+}
+
+/// Finds the character plane and the carved side of a mesh. The manifest may give `scanned_face_down`.
+///
+/// # Errors
+/// Returns an error if no plane is found or nothing is carved.
+pub fn fit(
+    scan: &Scan,
+    print: Option<&Print>,
+    scanned_face_down: Option<bool>,
+    settings: &Settings,
+) -> Result<FitOutcome, FitError> {
+    match settings.pipeline.method {
+        AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
+        AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
+    }
+}
+
+/// Prepares print and depth map for registration.
+///
+/// # Errors
+/// Returns an error if the print shows no ink or the depth map no strokes.
+pub fn normalize(
+    depth: &DepthMap,
+    print: &Print,
+    settings: &Settings,
+) -> Result<Normalized, NormalizeError> {
+    let mut normalized = match settings.pipeline.method {
+        AlignmentMethod::Default => normalize::normalize(depth, print, &settings.normalize),
+        AlignmentMethod::Paper => {
+            paper_method::normalize::normalize(depth, print, &settings.normalize)
+        }
+    }?;
+    normalized.outcome.print_turned = print.image().turned;
+    Ok(normalized)
+}
+
+/// Aligns the depth map with the print and scores each metric's masks. `expected` is the pose that is expected from the
+/// registration of a whole block; the method of the paper does not use it.
+///
+/// # Errors
+/// Returns an error if no pose is found or trusted, or a threshold leaves no strokes.
+pub fn register(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    expected: Option<&Affine2>,
+    settings: &Settings,
+) -> Result<Registered, RegisterError> {
+    match settings.pipeline.method {
+        AlignmentMethod::Default => {
+            register::register(depth, normalized, expected, &settings.register)
+        }
+        AlignmentMethod::Paper => {
+            paper_method::register::register(depth, normalized, &settings.register)
+        }
+    }
+}
+
+/// Results of the four stages for one mesh and print.
+#[derive(Debug, Clone)]
+pub struct AlignedPair {
+    /// The plane.
+    pub fit: FitOutcome,
+    /// The depth map, which reads like the print.
+    pub depth: DepthMap,
+    /// Ink and canvas of the print, heights of the relief.
+    pub normalized: Normalized,
+    /// One alignment a metric.
+    pub registered: Registered,
+}
+
+impl AlignedPair {
+    /// Runs the four stages. The unit of the mesh and the direction of its carved face count as unknown.
+    ///
+    /// # Errors
+    /// Returns the error of the first stage that finds no result.
+    ///
+    /// # Examples
+    /// ```
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.rs"));
+    /// # use mocban_core::raster;
+    /// # use mocban_demo as demo;
+    /// # let settings = default_settings()?;
+    /// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+    /// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+    /// use mocban_core::domain::ThresholdMetric;
+    /// use mocban_align::stages::{AlignedPair, AlignmentMethod, Print};
+    ///
+    /// let vertex = pair.mesh.vertices.at(0);
+    /// let (scan, print) = (pair.mesh.into(), Print::from(image));
+    /// let ours = AlignedPair::new(&scan, &print, &settings)?;
+    /// let relief = ours.metric(ThresholdMetric::Relief).ok_or("no result")?;
+    /// // Print pixel of a mesh vertex, and its height over the plane in mesh units.
+    /// let [x, y, height] = ours.print_from_mesh(relief).apply(vertex);
+    /// assert!(x.is_finite() && y.is_finite() && height.is_finite());
+    ///
+    /// let mut paper = settings.clone();
+    /// paper.pipeline.method = AlignmentMethod::Paper;
+    /// let theirs = AlignedPair::new(&scan, &print, &paper)?;
+    /// assert_eq!(theirs.metrics().len(), 3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
+        let fit = fit(scan, Some(print), None, settings)?;
+        let depth = depth::depth(scan, &fit, None, &settings.depth)?;
+        let normalized = match &fit.print_outline {
+            Some(outline) => normalize(&depth, &print.clone().within(Some(outline)), settings),
+            None => normalize(&depth, print, settings),
+        }?;
+        let registered = register(&depth, &normalized, None, settings)?;
+        Ok(Self {
+            fit,
+            depth,
+            normalized,
+            registered,
+        })
+    }
+
+    /// Returns one alignment a metric.
+    pub fn metrics(&self) -> &[MetricOutcome] {
+        &self.registered.outcome.metrics
+    }
+
+    /// Returns a metric's alignment, if the method gives the metric.
+    pub fn metric(&self, metric: ThresholdMetric) -> Option<&MetricOutcome> {
+        self.metrics().iter().find(|found| found.metric == metric)
+    }
+
+    /// Returns the map from mesh points to print pixels under a metric's alignment.
+    pub fn print_from_mesh(&self, metric: &MetricOutcome) -> PrintFromMesh {
+        PrintFromMesh::new(
+            &metric.print_from_depth,
+            &self.depth.scale.depth_from_plane,
+            &self.fit.plane_from_mesh,
+        )
+    }
+}

@@ -1,0 +1,232 @@
+//! Finds the pose, chooses each metric's depth threshold in the aligned frame, and scores the masks.
+//!
+//! The pose is found from soft strokes, whose values fall gradually from 1 to 0, so no exact threshold is needed.
+//! `pose_search` searches all rotations and a band of scales, from coarse to fine. `refine` compares the best poses and
+//! refines the winner at full size. `paper_method::register` is the method of the published paper, which chooses the
+//! thresholds before the pose.
+
+mod anisotropic_scale;
+mod confidence;
+mod half_canvas;
+mod ink_edge;
+mod metric_thresholds;
+mod params;
+mod pose_search;
+mod refine;
+mod scoring;
+mod soft_thresholds;
+mod stroke_map;
+mod tops_edge;
+mod unmatched;
+
+pub use confidence::ConfidenceInputs;
+pub use params::{RegisterError, RegisterParams};
+pub use scoring::Registered;
+pub(super) use scoring::{Alignment, canvas_print, score_alignments};
+pub use stroke_map::StrokeMap;
+
+use super::normalize::{Normalized, relative_depths};
+use crate::stages::binarize::rim_share;
+use half_canvas::HalfCanvas;
+use metric_thresholds::ChosenThreshold;
+use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures};
+use mocban_core::raster::DepthMap;
+use unmatched::Unmatched;
+
+/// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
+pub const REVISION: u32 = 20;
+
+/// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
+/// score. The factor is above 1 because a symmetric character scores about the same both ways.
+const MIRROR_WINS: f64 = 1.06;
+
+/// A pair of low confidence is refused as mirrored above this factor already. Damage can favour the mirrored relief of a
+/// symmetric character by a few percent.
+const MIRROR_LIKELY: f64 = 1.04;
+
+/// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
+/// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
+/// strokes without a partner too.
+const UNLIKELY: f64 = 0.05;
+
+/// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
+/// a character, so these tops are the carved ground, seen from the back of the scanned surface.
+const TOPS_AT_RIM: f64 = 0.6;
+
+/// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
+///
+/// `depth` and `normalized` are the results of earlier stages. The pose maps depth-map pixels to print-image pixels.
+/// All metrics share this pose. `expected` is the pose that the registration of the whole block gave, if the pair was cut
+/// from one: other poses need much better evidence.
+///
+/// # Errors
+/// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not
+/// match: no pose correlates, the mirrored relief matches better, the confidence in the pose is below `min_confidence`,
+/// or print and relief very probably show different characters.
+///
+/// # Examples
+/// ```
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.rs"));
+/// # use mocban_core::raster;
+/// # use mocban_demo as demo;
+/// # let settings = default_settings()?;
+/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+/// use mocban_align::stages::{Print, Scan, depth, fit, normalize, register};
+///
+/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
+/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
+/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
+/// assert_eq!(map.levels.width().max(map.levels.height()), 512);
+/// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
+/// // One mask for each interpretation of the print, the likeliest first.
+/// assert_eq!(normalized.prints.len(), normalized.outcome.inks.len());
+/// let registered = register::register(&map, &normalized, None, &settings.register)?;
+/// for metric in &registered.outcome.metrics {
+///     assert!(metric.confidence.is_some_and(|confidence| confidence > 0.5));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn register(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    expected: Option<&Affine2>,
+    params: &RegisterParams,
+) -> Result<Registered, RegisterError> {
+    let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
+    let depths = relative_depths(depth, &relief);
+    let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
+    let print = &normalized.prints[search.ink];
+    let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
+    require_match(&refined.features, params)?;
+    let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
+    let canvas = HalfCanvas::new(
+        depth,
+        print,
+        &canvas_from_print,
+        &refined.print_from_depth,
+        normalized.outcome.canvas_px,
+    );
+    let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    require_tops(
+        depth,
+        &normalized.outcome.inks,
+        search.ink,
+        &thresholds,
+        params,
+    )?;
+    let features = with_unmatched(refined.features, &canvas, &thresholds);
+    require_character(&features, params)?;
+    let alignments: Vec<Alignment> = thresholds
+        .iter()
+        .map(|ChosenThreshold { choice, .. }| Alignment {
+            metric: choice.metric,
+            level: choice.level,
+            print_from_depth: refined.print_from_depth,
+            margin: refined.margin,
+            at_bound: search.at_bound || choice.at_bound,
+        })
+        .collect();
+    let canvas_print = canvas_print(normalized, search.ink);
+    let stroke_map = |alignment: &Alignment| {
+        StrokeMap::of(&canvas, alignment.level, normalized.outcome.canvas_px)
+    };
+    let mut registered = score_alignments(
+        depth,
+        normalized,
+        search.ink,
+        canvas_print,
+        &alignments,
+        stroke_map,
+        params.window,
+    )?;
+    let probabilities = thresholds.iter().map(|chosen| chosen.probability_right);
+    let metrics = &mut registered.outcome.metrics;
+    registered.confidence_inputs = confidence::set_confidence(metrics, &features, probabilities);
+    registered.outcome.features = Some(features);
+    Ok(registered)
+}
+
+/// Refuses pairs whose strokes without a partner almost rule out that print and relief show the same character. Also
+/// refuses less unlikely pairs whose mirrored relief matches better.
+fn require_character(
+    features: &PoseFeatures,
+    params: &RegisterParams,
+) -> Result<(), RegisterError> {
+    let [pose, character] = [
+        confidence::of_pose(features),
+        confidence::of_character(features),
+    ];
+    if features.mirrored > MIRROR_LIKELY && pose * character < params.min_confidence {
+        return Err(RegisterError::Mirrored {
+            times: features.mirrored,
+        });
+    }
+    if pose * character < UNLIKELY * params.min_confidence {
+        return Err(RegisterError::OtherCharacter { pose, character });
+    }
+    Ok(())
+}
+
+/// Refuses pairs whose print was read as light strokes on dark, if dark strokes are likelier or the tops surround the
+/// character. A mirrored relief that is seen from the back matches the light background of a dark print, and no score of
+/// the alignment shows it.
+fn require_tops(
+    depth: &DepthMap,
+    inks: &[InkHypothesis],
+    ink: usize,
+    thresholds: &[ChosenThreshold],
+    params: &RegisterParams,
+) -> Result<(), RegisterError> {
+    if !inks[ink].light_on_dark || params.min_confidence == 0.0 {
+        return Ok(());
+    }
+    // The last threshold is that of the metric `relief`.
+    let surround = |chosen: &ChosenThreshold| {
+        let tops = depth.stroke_mask(chosen.choice.level);
+        let known = depth.levels.map(|level| *level != 0);
+        rim_share(&tops, &known) > TOPS_AT_RIM
+    };
+    if !inks[0].light_on_dark || thresholds.last().is_some_and(surround) {
+        return Err(RegisterError::Inverted);
+    }
+    Ok(())
+}
+
+/// Adds the strokes without a partner to the evidence for the pose.
+fn with_unmatched(
+    features: PoseFeatures,
+    canvas: &HalfCanvas,
+    thresholds: &[ChosenThreshold],
+) -> PoseFeatures {
+    let levels = || thresholds.iter().map(|chosen| chosen.choice.level);
+    let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
+    let unmatched = Unmatched::of(canvas, range);
+    PoseFeatures {
+        tops_alone: unmatched.tops_alone,
+        ink_alone: unmatched.ink_alone,
+        edge_scatter: unmatched.edge_scatter,
+        ink_area: unmatched.ink_area,
+        ..features
+    }
+}
+
+/// Refuses pairs that are mirrored or whose pose is too unlikely.
+fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
+    let confidence = confidence::of_pose(features);
+    if features.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
+        Err(RegisterError::Mirrored {
+            times: features.mirrored,
+        })
+    } else if confidence >= params.min_confidence {
+        Ok(())
+    } else {
+        Err(RegisterError::NoMatch {
+            confidence,
+            needs: params.min_confidence,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;
