@@ -15,20 +15,20 @@
 //!
 //! 1. `crates/lists/src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `crates/catalog/src/records/import.rs`: stores pairs and their jobs in one transaction
-//! 3. `src/runner/run.rs`: starts a run: takes the lock, registers this process as a worker, recovers jobs of dead
+//! 3. `crates/runner/src/run.rs`: starts a run: takes the lock, registers this process as a worker, recovers jobs of dead
 //!    workers, stores which inputs changed, requeues stale pairs, ends back-offs that are due
-//! 4. `src/runner/scheduler.rs`: the main loop, which starts a task for each leased pair
-//! 5. `src/runner/prefetch.rs`: leases pairs for free slots, and a few more in advance
+//! 4. `crates/runner/src/scheduler.rs`: the main loop, which starts a task for each leased pair
+//! 5. `crates/runner/src/prefetch.rs`: leases pairs for free slots, and a few more in advance
 //! 6. `crates/catalog/src/queue/claim.rs`: leases as many jobs as were asked for in one statement, each with a new fencing
 //!    token; claims, heartbeats and releases are called through `api.rs` beside it
-//! 7. `src/runner/pair_task.rs`: waits for the thread of one leased pair, stores its failure
-//! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
-//! 9. `src/runner/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
+//! 7. `crates/runner/src/pair_task.rs`: waits for the thread of one leased pair, stores its failure
+//! 8. `crates/runner/src/compute_thread.rs`: runs the stages of the pair one after another on a thread
+//! 9. `crates/runner/src/stage_executor.rs`: reads the inputs of a stage, runs it and encodes its result
 //! 10. `crates/align/src/stages/pipeline.rs`: chooses the method of `fit`, `normalize` and `register`; `depth` has only one. The
 //!     stages start in `fit/upper_surface.rs` (plane, curvature, carved side), `depth.rs` (depth map),
 //!     `normalize/mod.rs` (ink of the print, heights of tops and ground) and `register/mod.rs` (pose, thresholds,
 //!     stroke maps, scores, confidence)
-//! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
+//! 11. `crates/runner/src/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `crates/store/src/artifacts.rs`: writes artifact files by content hash
 //! 13. `crates/catalog/src/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
 //!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
@@ -126,11 +126,11 @@
 //! ## A lost lease
 //!
 //! A living worker loses a lease if its heartbeats stop for longer than a lease lasts, or, in PostgreSQL, if it is without
-//! a connection and a heartbeat for seven seconds (`src/runner/liveness.rs`); or if another process of the same run
+//! a connection and a heartbeat for seven seconds (`crates/runner/src/liveness.rs`); or if another process of the same run
 //! recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline
-//! (`src/runner/worker_session.rs`; the times are in `Timing` in `src/runner/policy.rs`). The start of a run
-//! (`src/runner/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
-//! workers are then dead. A repair (`src/cli/check.rs`, `src/check/mod.rs`) must hold the same lock. It resets only the
+//! (`crates/runner/src/worker_session.rs`; the times are in `Timing` in `crates/runner/src/policy.rs`). The start of a run
+//! (`crates/runner/src/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
+//! workers are then dead. A repair (`src/cli/check.rs`, `crates/runner/src/check/mod.rs`) must hold the same lock. It resets only the
 //! jobs of damaged pairs, which ends their leases. After a refused heartbeat, a process recovers the jobs of its own
 //! old id (`register_again`). The statements are in `crates/catalog/src/queue/recovery.rs` and `crates/catalog/src/audit/repair.rs`.
 //! Each of them increases the job's fencing token.
@@ -261,7 +261,6 @@
 //! `benches/peers` runs other tools on the same files; `benches/peers-queue` runs another job queue under the same load
 //! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
-pub mod check;
 pub mod cli;
 pub mod config;
 pub mod documentation;
@@ -269,11 +268,11 @@ pub mod export;
 pub mod local_server;
 pub mod report;
 pub mod review;
-pub mod runner;
 pub mod view;
 pub use mocban_align::{block, stages};
 pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
 pub use mocban_lists::{labels, manifest};
+pub use mocban_runner::{self as runner, check};
 pub use mocban_store as store;

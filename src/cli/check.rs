@@ -14,12 +14,12 @@ use super::error_text;
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
 use super::table::{columns, count, pairs_and_blocks};
-use crate::check::{
-    CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
-};
-use crate::runner::{self, RunError};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::one_line;
+use mocban_runner::check::{
+    CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
+};
+use mocban_runner::{self as runner, RunError};
 use mocban_store::{CATALOG_FILE, LockError, Project, RunLock};
 
 /// Arguments of `check`.

@@ -15,9 +15,9 @@ use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
 use crate::config::{BaseLayer, ConfigError, Loaded, Sources, load};
-use crate::runner;
 use mocban_catalog::{Catalog, SetApart};
 use mocban_core::domain::{UnixMillis, has_password, is_hidden};
+use mocban_runner as runner;
 use mocban_store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).

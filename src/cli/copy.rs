@@ -11,9 +11,9 @@ use super::context::{Context, now, refuse_password, settings_of};
 use super::error_text::ErrorPlace;
 use super::exit::{ExitCode, Refusal};
 use super::table::{columns, count};
-use crate::runner;
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
 use mocban_core::domain::is_address;
+use mocban_runner as runner;
 use mocban_store::{Project, SETTINGS_FILE};
 
 /// Arguments of `copy`.

@@ -22,10 +22,10 @@ use super::run_text;
 use super::screen::Palette;
 use super::table::count;
 use crate::config::{Origin, Tree};
-use crate::runner::{Stop, StopLevel};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
+use mocban_runner::{Stop, StopLevel};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
 /// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.

@@ -12,10 +12,10 @@ use super::demo_folder::{DemoContent, check_directory, replace_data};
 use super::files;
 use super::import_blocks::BlockArgs;
 use super::table::count;
-use crate::runner::{Stop, StopLevel};
 use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 use mocban_demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
+use mocban_runner::{Stop, StopLevel};
 
 /// Id of the block.
 const NAME: &str = "block";

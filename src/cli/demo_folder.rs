@@ -7,9 +7,9 @@ use anyhow::Context as _;
 use super::context::{Context, shell_quoted};
 use super::exit::Refusal;
 use super::{files, signals};
-use crate::runner::Stop;
 use mocban_demo::block::{BlockOptions, block_options};
 use mocban_demo::{DatasetError, DemoOptions};
+use mocban_runner::Stop;
 use mocban_store::{CATALOG_FILE, ReplacementFolder};
 
 const NOTE: &str = "README.txt";

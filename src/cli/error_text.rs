@@ -7,8 +7,8 @@ use super::exit::{ExitCode, Refusal};
 use super::time_text::local;
 use crate::config::ConfigError;
 use crate::export::FolderError;
-use crate::runner::RunError;
 use mocban_catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
+use mocban_runner::RunError;
 use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 use mocban_system::platform;
 

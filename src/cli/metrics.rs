@@ -13,7 +13,7 @@ use tokio::task::AbortHandle;
 use super::context::Context;
 use super::exit::Refusal;
 use crate::local_server::{ConnectionLimits, ServedNames, listen, serve};
-use crate::runner::RunMetrics;
+use mocban_runner::RunMetrics;
 use mocban_system::platform::host_name;
 
 /// Version 0.0.4 of the text format, which every version of Prometheus reads.

@@ -11,8 +11,8 @@ use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use super::time_text::duration;
-use crate::runner::{RunEvent, StopLevel};
 use mocban_core::domain::one_line;
+use mocban_runner::{RunEvent, StopLevel};
 
 /// Shows one run.
 #[derive(Debug)]

@@ -7,9 +7,9 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::pairs_and_blocks;
-use crate::runner::NamedWork;
 use mocban_catalog::{BlockRetry, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
+use mocban_runner::NamedWork;
 
 /// Arguments of `retry`.
 #[derive(Debug, Args)]

@@ -16,10 +16,10 @@ use super::verdict::reviewer_name;
 use crate::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
-use crate::runner::{Stop, StopLevel};
 use mocban_catalog::{SetApart, StatusCounts};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
+use mocban_runner::{Stop, StopLevel};
 
 /// Arguments of `review`.
 #[derive(Debug, Args)]

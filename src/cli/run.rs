@@ -13,9 +13,9 @@ use super::progress::ProgressReporter;
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
 use super::{missing_results, select, signals};
 use crate::config::Config;
-use crate::runner::{self, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_core::domain::Stage;
+use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use mocban_store::Project;
 
 /// Arguments of `run`.

@@ -1,7 +1,7 @@
 //! Counts a run's progress from its events.
 
-use crate::runner::RunEvent;
 use mocban_core::domain::Stage;
+use mocban_runner::RunEvent;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -127,8 +127,8 @@ impl RunProgress {
 #[cfg(test)]
 mod tests {
     use super::RunProgress;
-    use crate::runner::RunEvent;
     use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
+    use mocban_runner::RunEvent;
 
     fn pair() -> PairName {
         "0001".parse().expect("valid id")

@@ -5,9 +5,9 @@ use super::failures::Failures;
 use super::review::review_step;
 use super::table::{columns, count, pairs_and_blocks};
 use super::time_text::duration;
-use crate::runner::{BlockSummary, RunSummary};
 use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
+use mocban_runner::{BlockSummary, RunSummary};
 
 /// Prints how a run ended and which pairs failed.
 pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {

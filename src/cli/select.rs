@@ -2,9 +2,9 @@
 
 use super::exit::Refusal;
 use crate::config::nearest;
-use crate::runner::NamedWork;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, PairName};
+use mocban_runner::NamedWork;
 
 /// Largest number of similar ids in a message.
 const MAX_SIMILAR: usize = 3;

@@ -2,7 +2,7 @@
 
 use tokio::task::JoinHandle;
 
-use crate::runner::Stop;
+use mocban_runner::Stop;
 use mocban_system::platform;
 
 /// Watches Ctrl-C, a request to end and a closed terminal until the handle is aborted.

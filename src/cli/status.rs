@@ -15,9 +15,9 @@ use super::review::review_step;
 use super::screen::{Palette, Tone, clear_code};
 use super::status_hosts;
 use super::table::{columns, count};
-use crate::runner;
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_runner as runner;
 use mocban_store::Project;
 
 /// Arguments of `status`.

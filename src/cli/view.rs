@@ -15,11 +15,11 @@ use super::select;
 use super::signals;
 use crate::export::InputFileLimits;
 use crate::export::scan_view::ScanView;
-use crate::runner::{Stop, StopLevel};
 use crate::view::{self, ViewServer};
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
+use mocban_runner::{Stop, StopLevel};
 use mocban_store::Project;
 
 /// Arguments of `view`.

@@ -9,9 +9,9 @@ use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use super::signals;
 use super::table::pairs_and_blocks;
-use crate::runner::{self, RunPart, Stop};
 use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
+use mocban_runner::{self as runner, RunPart, Stop};
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]

@@ -1,0 +1,43 @@
+//! What the stages of a block have in common: inputs, results of earlier stages, artifacts, limits.
+
+use std::sync::atomic::AtomicBool;
+
+use serde::de::DeserializeOwned;
+
+use crate::block_stages::{BlockArtifacts, BlockInputs, BlockStageError};
+use mocban_core::domain::{BlockStage, BlockStageRecord};
+use mocban_core::mesh::MeshLimits;
+use mocban_core::raster::ImageLimits;
+
+/// What a stage reads and writes.
+pub(super) struct StageContext<'a> {
+    pub(super) inputs: &'a BlockInputs,
+    pub(super) earlier: &'a [BlockStageRecord],
+    pub(super) artifacts: &'a dyn BlockArtifacts,
+    pub(super) stop: &'a AtomicBool,
+    pub(super) mesh_limits: &'a MeshLimits,
+    pub(super) image_limits: &'a ImageLimits,
+    /// Largest height map, in pixels.
+    pub(super) max_map_pixels: usize,
+}
+
+impl StageContext<'_> {
+    /// Returns the record of an earlier stage.
+    pub(super) fn record(&self, stage: BlockStage) -> Result<&BlockStageRecord, BlockStageError> {
+        let record = self.earlier.iter().find(|record| record.stage == stage);
+        record.ok_or(BlockStageError::RerunFrom(stage))
+    }
+
+    /// Returns the outcome of an earlier stage.
+    pub(super) fn outcome<T: DeserializeOwned>(
+        &self,
+        stage: BlockStage,
+    ) -> Result<T, BlockStageError> {
+        let record = self.record(stage)?;
+        let outcome = serde_json::from_str(&record.outcome);
+        outcome.map_err(|error| {
+            tracing::warn!(block = %self.inputs.name, %stage, "the outcome cannot be read: {error}; the stage runs again");
+            BlockStageError::RerunFrom(stage)
+        })
+    }
+}

@@ -1,0 +1,96 @@
+//! Inputs of a block in memory between its stages: faces by the hash of their stage's result, pages by their content.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::context::StageContext;
+use super::failure::failed;
+use crate::block_stages::BlockStageError;
+use mocban_align::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
+use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
+use mocban_core::raster::{self, PrintImage};
+
+/// What the last stage read.
+#[derive(Debug, Default)]
+pub(super) struct HeldInputs {
+    faces: Mutex<Option<(ContentHash, HeldFaces)>>,
+    page: Mutex<Option<Arc<HeldPage>>>,
+}
+
+/// Forgets the inputs when it is dropped, also if a stage is cancelled or panics.
+pub(super) struct HeldGuard<'a>(pub(super) Option<&'a HeldInputs>);
+
+impl Drop for HeldGuard<'_> {
+    fn drop(&mut self) {
+        if let Some(held) = self.0 {
+            held.clear();
+        }
+    }
+}
+
+/// The faces of a block.
+pub(super) type HeldFaces = Arc<Vec<(BlockSide, CarvedFace)>>;
+
+/// A page, its ink and the hash of its file.
+#[derive(Debug)]
+pub(super) struct HeldPage {
+    pub(super) hash: ContentHash,
+    pub(super) image: PrintImage,
+    pub(super) ink: PageInk,
+}
+
+impl HeldInputs {
+    /// Forgets the inputs of a block that is finished.
+    pub(super) fn clear(&self) {
+        *self.faces.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *self.page.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Returns the faces of a block, from memory or from the artifacts of `face`.
+    pub(super) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
+        let record = context.record(BlockStage::Face)?;
+        let mut held = self.faces.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((hash, faces)) = &*held
+            && *hash == record.result_hash
+        {
+            return Ok(Arc::clone(faces));
+        }
+        let outcome: FaceOutcome = context.outcome(BlockStage::Face)?;
+        // The memory of another block is freed first.
+        *held = None;
+        let mut faces = Vec::new();
+        for found in outcome.faces {
+            let bytes = context.artifacts.read(record, &heights_role(found.side))?;
+            let rerun = |_| BlockStageError::RerunFrom(BlockStage::Face);
+            let values = raster::decode_grey16(&bytes).map_err(rerun)?;
+            let header = found.heights;
+            let face = CarvedFace::of(&StoredHeights { header, values });
+            faces.extend(face.map(|face| (found.side, face)));
+        }
+        let faces = Arc::new(faces);
+        *held = Some((record.result_hash, Arc::clone(&faces)));
+        Ok(faces)
+    }
+
+    /// Returns the page of a block and its ink, from memory or from its file.
+    pub(super) fn page(
+        &self,
+        context: &StageContext<'_>,
+    ) -> Result<Arc<HeldPage>, BlockStageError> {
+        let file = &context.inputs.page;
+        let bytes = file.read(context.image_limits.max_bytes, context.stop)?;
+        let hash = ContentHash::of(&bytes);
+        let mut held = self.page.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(page) = held.as_ref().filter(|page| page.hash == hash) {
+            return Ok(Arc::clone(page));
+        }
+        // The memory of another page is freed first.
+        *held = None;
+        let image = raster::decode(&bytes, context.image_limits)
+            .map_err(|error| file.failed(error.class(), error))?;
+        drop(bytes);
+        let ink = PageInk::of(&image).map_err(|error| failed(file, error))?;
+        let page = Arc::new(HeldPage { hash, image, ink });
+        *held = Some(Arc::clone(&page));
+        Ok(page)
+    }
+}

@@ -1,0 +1,100 @@
+//! Passes over the triangles of a block's scan: a binary STL is streamed, other formats are read into memory.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::failure::{StopRequested, failed};
+use crate::block_stages::{BlockFile, BlockStageError};
+use mocban_align::block::BlockError;
+use mocban_core::mesh::{
+    self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
+    binary_stl_triangles, pass_over_binary_stl,
+};
+
+/// Bytes that are read at a time.
+const BUFFER: usize = 1 << 20;
+
+/// The scan of a block.
+pub(super) struct ScanStream<'a> {
+    source: ScanSource,
+    limits: &'a MeshLimits,
+    stop: &'a AtomicBool,
+}
+
+enum ScanSource {
+    /// A binary STL and its number of triangles.
+    Stl(File, u32),
+    /// All triangles.
+    Mesh(Mesh),
+}
+
+impl<'a> ScanStream<'a> {
+    /// Opens the scan of a block.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be read, is no mesh, or has no faces.
+    pub(super) fn open(
+        scan: &BlockFile,
+        limits: &'a MeshLimits,
+        stop: &'a AtomicBool,
+    ) -> Result<Self, BlockStageError> {
+        let mut file = scan.open()?;
+        let read = || -> Result<ScanSource, MeshReadError> {
+            let mut head = Vec::with_capacity(STL_HEAD);
+            Stoppable(&mut file, stop)
+                .take(STL_HEAD as u64)
+                .read_to_end(&mut head)?;
+            if let Some(count) = binary_stl_triangles(&head, scan.size(), scan.name())? {
+                return Ok(ScanSource::Stl(file, count));
+            }
+            file.seek(SeekFrom::Start(0))?;
+            let mut source = BufReader::with_capacity(BUFFER, Stoppable(&mut file, stop));
+            let mesh = mesh::read_from(&mut source, scan.size(), scan.name(), limits)?;
+            Ok(ScanSource::Mesh(mesh))
+        };
+        let source = { read }().map_err(|error| failed(scan, BlockError::Mesh(error)))?;
+        if let ScanSource::Mesh(mesh) = &source
+            && mesh.triangles.is_empty()
+        {
+            let points = mesh.vertices.len();
+            return Err(failed(scan, BlockError::NoFaces { points }));
+        }
+        Ok(Self {
+            source,
+            limits,
+            stop,
+        })
+    }
+}
+
+impl TriangleStream for ScanStream<'_> {
+    fn pass(
+        &mut self,
+        visit: &mut dyn FnMut(&[Triangle]) -> Result<(), MeshReadError>,
+    ) -> Result<(), MeshReadError> {
+        match &mut self.source {
+            ScanSource::Stl(file, count) => {
+                file.seek(SeekFrom::Start(STL_HEAD as u64))?;
+                let mut source = Stoppable(file, self.stop);
+                pass_over_binary_stl(&mut source, *count, self.limits, visit)
+            }
+            ScanSource::Mesh(mesh) => {
+                let mut mesh = &*mesh;
+                mesh.pass(visit)
+            }
+        }
+    }
+}
+
+/// A file whose reads fail once the run stops.
+struct Stoppable<'a>(&'a mut File, &'a AtomicBool);
+
+impl io::Read for Stoppable<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        if self.1.load(Ordering::Relaxed) {
+            return Err(io::Error::other(StopRequested));
+        }
+        self.0.read(bytes)
+    }
+}
