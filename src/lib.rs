@@ -37,10 +37,10 @@
 //!     stage and renew or end the lease
 //! 15. `crates/catalog/src/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
 //!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
-//! 16. `src/report/build.rs`: iterates over all pairs
-//! 17. `src/report/accumulate.rs`: sums results per metric; Acc counts the passes of `consensus.rs`, and
+//! 16. `crates/report/src/build.rs`: iterates over all pairs
+//! 17. `crates/report/src/accumulate.rs`: sums results per metric; Acc counts the passes of `consensus.rs`, and
 //!     `truth_evaluation.rs` compares results with ground truth, if there is any
-//! 18. `src/report/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML, together with
+//! 18. `crates/report/src/render/report_tables.rs`: defines the columns of text, Markdown, LaTeX and HTML, together with
 //!     `comparison_tables.rs` and `risk_coverage_tables.rs`; `csv.rs` has its own columns, and JSON is the serialized
 //!     `Report`
 //!
@@ -190,7 +190,7 @@
 //!
 //! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `crates/core/src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
-//! - `src/report/comparison.rs`: which metrics are compared with each other
+//! - `crates/report/src/comparison.rs`: which metrics are compared with each other
 //! - `crates/align/src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
 //! - `crates/align/src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
 //! - `crates/align/src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
@@ -266,7 +266,6 @@ pub mod config;
 pub mod documentation;
 pub mod export;
 pub mod local_server;
-pub mod report;
 pub mod review;
 pub mod view;
 pub use mocban_align::{block, stages};
@@ -274,5 +273,6 @@ pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
 pub use mocban_lists::{labels, manifest};
+pub use mocban_report as report;
 pub use mocban_runner::{self as runner, check};
 pub use mocban_store as store;

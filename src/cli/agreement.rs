@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::exit::ExitCode;
-use crate::report;
+use mocban_report as report;
 
 pub(super) async fn agreement(context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;

@@ -1,9 +1,9 @@
 //! `report --compare`: the tables of two projects side by side.
 
 use super::table::columns;
-use crate::report::number_format::NumberStyle::{self, Score, Share};
-use crate::report::number_format::{format_number, format_share};
-use crate::report::{MetricRow, Report};
+use mocban_report::number_format::NumberStyle::{self, Score, Share};
+use mocban_report::number_format::{format_number, format_share};
+use mocban_report::{MetricRow, Report};
 
 /// Formats the numbers of both projects and their differences, one line per metric and number.
 ///
@@ -81,7 +81,7 @@ fn signed(difference: f64, style: NumberStyle) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Score, Share, side_by_side, signed};
-    use crate::report::ReportAccumulator;
+    use mocban_report::ReportAccumulator;
 
     #[test]
     fn differences_have_a_sign() {

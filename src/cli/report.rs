@@ -13,11 +13,11 @@ use super::time_text::day;
 use super::{files, output};
 use crate::config::{self, Sources};
 use crate::export::{GallerySelection, draw_gallery};
-use crate::report::{
+use mocban_catalog::Catalog;
+use mocban_report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
     summary,
 };
-use mocban_catalog::Catalog;
 use mocban_store::Project;
 
 /// Seed of the random choice of images; the HTML page states it.

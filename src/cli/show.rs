@@ -15,11 +15,11 @@ use super::show_block::show_block;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::local;
 use super::verdict;
-use crate::report::ManualCorrection;
 use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
+use mocban_report::ManualCorrection;
 use mocban_runner::{self as runner, NamedWork};
 use mocban_store::Project;
 

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::files::RefusedLine;
-use crate::report::ground_truth::TruthRecord;
 use mocban_core::domain::{PairName, UniqueKeys};
+use mocban_report::ground_truth::TruthRecord;
 
 /// Longest line in bytes. The values of a line take about ten times as much memory.
 const MAX_LINE_BYTES: usize = 16 << 20;

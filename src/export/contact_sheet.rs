@@ -6,13 +6,13 @@ use super::pictures::{
     ContactSheetCell, FrameKind, NOTE_SPACE, Rgb, SheetLegend, contact_sheet, tile_side,
 };
 use super::source_print::result_images;
-use crate::report::ground_truth::TruthErrors;
-use crate::report::number_format::NumberStyle::{Degrees, Percent, Score};
-use crate::report::number_format::{counted, format_count, format_number};
-use crate::report::{Consensus, evaluate_pairs};
 use mocban_catalog::{Catalog, CatalogError, PairResults, SetApart};
 use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::ImageLimits;
+use mocban_report::ground_truth::TruthErrors;
+use mocban_report::number_format::NumberStyle::{Degrees, Percent, Score};
+use mocban_report::number_format::{counted, format_count, format_number};
+use mocban_report::{Consensus, evaluate_pairs};
 use mocban_store::Project;
 
 /// Pairs in memory at a time while the worst are selected.
@@ -282,10 +282,10 @@ fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
 mod tests {
     use super::{ContactSheetOptions, ContactSheetOrder, frame, is_shown, rank, state};
     use crate::export::pictures::FrameKind;
-    use crate::report::Consensus;
-    use crate::report::test_fixtures;
     use mocban_core::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use mocban_core::raster::ImageLimits;
+    use mocban_report::Consensus;
+    use mocban_report::test_fixtures;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
         ContactSheetOptions {

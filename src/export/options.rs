@@ -6,9 +6,9 @@ use serde_json::Value;
 use super::format::ExportFormat;
 use super::pair_pictures::InputFileLimits;
 use super::split::SplitSettings;
-use crate::report::Consensus;
 use mocban_catalog::MetricRecord;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
+use mocban_report::Consensus;
 
 /// Default size of shards in MiB.
 const SHARD_MIB: u64 = 256;

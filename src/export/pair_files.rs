@@ -5,13 +5,13 @@ use serde::Serialize;
 
 use super::format_writer::EncodedPair;
 use super::pair_pictures::{PairPictures, PictureError};
-use crate::report::pair_artifacts::same_alignment;
 use mocban_catalog::MetricRecord;
 use mocban_core::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask, stroke_map};
 use mocban_core::domain::{
     DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_core::raster::{compact_rgb8, png_grey16, png_mask};
+use mocban_report::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
 const PAIR: &str = "pairs/*";

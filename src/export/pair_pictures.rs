@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use super::pictures::{PrintView, Rgb, eight_bits};
 use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::domain::artifact_role::DEPTH;
 use mocban_core::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
@@ -15,6 +14,7 @@ use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb,
 };
+use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::{InputError, Project, open_input};
 
 /// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.

@@ -10,9 +10,9 @@ use super::pair_pictures::{PairPictures, PictureError, canvas_from_print};
 use super::record::{ManualAlignmentFields, PairRecord};
 use super::split::SplitPlan;
 use super::stage_outcomes::StageOutcomes;
-use crate::report::pair_artifacts::PairArtifacts;
 use mocban_catalog::{CutOrigin, MetricRecord, PairResults};
 use mocban_core::domain::{Affine2, Failure, FailureClass};
+use mocban_report::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// One format of an export.

@@ -5,12 +5,12 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::stage_outcomes::StageOutcomes;
-use crate::report::Consensus;
 use mocban_catalog::{CutOrigin, MetricRecord, PairResults, ReviewerVerdict, StoredAlignment};
 use mocban_core::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
+use mocban_report::Consensus;
 
 /// State of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 
 use super::pictures::{PrintView, Rgb, eight_bits};
-use crate::report::pair_artifacts::PairArtifacts;
 use mocban_catalog::PairResults;
 use mocban_core::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
 use mocban_core::raster::{self, DecodeError, ImageLimits, PrintImage, png_rgb8};
+use mocban_report::pair_artifacts::PairArtifacts;
 use mocban_store::{InputError, InputFile, Project, read_input};
 
 /// Why a print cannot be used.

@@ -1,9 +1,9 @@
 //! The parsed outcomes of all stages of a finished pair.
 
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, NormalizeOutcome, RegisterOutcome, Stage,
 };
+use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// The outcomes of the stages of a finished pair.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::answer::{InvalidInput, check_note};
 use super::item::ReviewItem;
 use super::item_images::{IMAGE_SIDE, ItemImages};
-use crate::report::ManualCorrection;
 use mocban_catalog::ManualAlignment;
 use mocban_catalog::check_event;
 use mocban_core::domain::Affine2;
+use mocban_report::ManualCorrection;
 
 /// Accepted scale of the relief relative to the image.
 const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;

@@ -2,8 +2,8 @@
 
 use crate::export::{PictureError, SourcePrintError};
 use crate::local_server::WorkFailed;
-use crate::report::pair_artifacts::PairArtifactsError;
 use mocban_catalog::CatalogError;
+use mocban_report::pair_artifacts::PairArtifactsError;
 
 /// Why the images of an item cannot be rendered.
 #[derive(Debug, thiserror::Error)]

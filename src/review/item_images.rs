@@ -17,12 +17,12 @@ use crate::export::pictures::PrintView;
 use crate::export::scan_view::ScanView;
 use crate::export::{InputFileLimits, SourcePrint};
 use crate::local_server::WorkThread;
-use crate::report::pair_artifacts::PairArtifacts;
 use mocban_align::stages::normalize::PrintMasks;
 use mocban_align::stages::register::StrokeMap;
 use mocban_catalog::{Catalog, PairResults};
 use mocban_core::domain::{Affine2, Stage};
 use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
+use mocban_report::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// Longer side of an image in pixels.

@@ -8,10 +8,10 @@ use super::item::{ItemView, ReviewItem};
 use super::options::QueueOptions;
 use super::order;
 use crate::local_server::{WorkFailed, WorkThread};
-use crate::report::consensus::{is_disputed, partition_verdicts};
-use crate::report::pair_artifacts::{PairArtifacts, group_identical};
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
+use mocban_report::consensus::{is_disputed, partition_verdicts};
+use mocban_report::pair_artifacts::{PairArtifacts, group_identical};
 use mocban_store::Project;
 
 /// Number of pairs read from the catalog at a time.
@@ -184,10 +184,10 @@ async fn faults(
 #[cfg(test)]
 mod tests {
     use super::{is_open_conflict, is_reliable, items_of_pair};
-    use crate::report::test_fixtures;
     use crate::review::{CheckRates, QueueOptions};
     use mocban_catalog::ReviewerVerdict;
     use mocban_core::domain::{ReviewOrder, ThresholdMetric, Verdict};
+    use mocban_report::test_fixtures;
 
     fn options(order: ReviewOrder, faults: f64, duplicates: f64) -> QueueOptions {
         QueueOptions {

@@ -23,9 +23,9 @@ use super::review_queue::QueueError;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
-use crate::report::pair_artifacts::PairArtifactsError;
 use mocban_catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
+use mocban_report::pair_artifacts::PairArtifactsError;
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {

@@ -6,8 +6,8 @@ use super::page_view::BlockView;
 use crate::export::pictures::{
     BLUE, LegendEntry, MarkedBox, PictureLegend, Rgb, VERMILLION, mark, with_legend,
 };
-use crate::report::number_format::NumberStyle::Percent;
-use crate::report::number_format::{counted, format_number};
+use mocban_report::number_format::NumberStyle::Percent;
+use mocban_report::number_format::{counted, format_number};
 
 /// Pixels per mm of the page with boxes. Names are then readable in boxes of 5 mm.
 const BOXES_PX_PER_MM: f64 = 12.0;
@@ -112,8 +112,8 @@ mod tests {
     use crate::export::block_view::characters::tests::stored;
     use crate::export::block_view::page_layers::tests::ridges;
     use crate::export::block_view::{CharacterStatus, CharacterView};
-    use crate::report::test_fixtures;
     use mocban_core::domain::BlockCharacterState;
+    use mocban_report::test_fixtures;
 
     fn characters() -> Vec<CharacterView> {
         let done = test_fixtures::with_confidence("b_c1", 0.9);

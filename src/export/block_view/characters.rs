@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::export::pictures::{BLUE, ORANGE, VERMILLION};
-use crate::report::Consensus;
 use mocban_catalog::{MetricRecord, PairResults, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, JobStatus, ThresholdMetric, enum_names};
+use mocban_report::Consensus;
 
 /// Colour of characters whose pairs have no result yet.
 const GREY: [u8; 3] = [120, 120, 120];
@@ -172,9 +172,9 @@ fn status(
 #[cfg(test)]
 pub(super) mod tests {
     use super::{CharacterStatus, CharacterView, PositionConfidence};
-    use crate::report::test_fixtures;
     use mocban_catalog::{PairResults, StoredCharacter};
     use mocban_core::domain::{BlockCharacterState, FailureClass, ThresholdMetric, Verdict};
+    use mocban_report::test_fixtures;
 
     /// A character at a box of the page.
     pub(in crate::export::block_view) fn stored(

@@ -154,9 +154,9 @@ fn edges(mask: &Mask, width: usize) -> Grid<bool> {
 #[cfg(test)]
 mod tests {
     use super::{EDGE, PrintView, TRUE_EDGE, edges};
-    use crate::report::test_fixtures;
     use mocban_core::domain::{Affine2, ThresholdMetric};
     use mocban_core::raster::{DepthMap, Grid, Mask, PrintImage};
+    use mocban_report::test_fixtures;
 
     /// A bar of 4 x 20 px at (8, 5) on a lower level in a map of 30 x 30 px.
     fn depth() -> DepthMap {

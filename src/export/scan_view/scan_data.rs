@@ -9,9 +9,9 @@ use super::view_inputs::ViewInputs;
 use crate::export::mesh::texture_coordinates;
 use crate::export::pair_pictures::{InputFileLimits, PairPictures, PictureError};
 use crate::export::stage_outcomes::StageOutcomes;
-use crate::report::pair_artifacts::PairArtifacts;
 use mocban_catalog::PairResults;
 use mocban_core::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome, ThresholdMetric};
+use mocban_report::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// Share of the heights below and above the range of the threshold slider.

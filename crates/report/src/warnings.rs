@@ -1,0 +1,221 @@
+//! Caveats on the numbers of a report, in whole sentences.
+
+use super::attention_checks::AttentionCheckRates;
+use super::model::{MetricRow, PairProgress};
+use super::number_format::NumberStyle::Score;
+use super::number_format::{counted, format_count, format_number};
+use super::score_bootstrap::BootstrapSkipped;
+use super::stats::{MAX_UNITS, MIN_UNITS};
+use super::truth_evaluation::TruthProblems;
+use mocban_core::domain::sanitize;
+
+/// Tolerance for rounding in sums before a mean is called impossible.
+const ROUNDING: f64 = 1e-9;
+
+/// Returns the warnings that apply to the numbers of a report.
+pub(super) fn warnings(
+    progress: PairProgress,
+    rows: &[MetricRow],
+    truth: &TruthProblems,
+    skipped: Option<BootstrapSkipped>,
+    attention_checks: Option<&AttentionCheckRates>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    warnings.extend(missing_pairs(progress));
+    warnings.extend(rows.iter().filter_map(impossible_dice));
+    warnings.extend(qualified_results(rows));
+    warnings.extend(unusable_truth(truth));
+    warnings.extend(skipped.map(bootstrap_skipped));
+    warnings.extend(attention_checks.into_iter().flat_map(missed_checks));
+    warnings
+}
+
+/// Returns a warning for each reviewer who missed most planted faults.
+fn missed_checks(rates: &AttentionCheckRates) -> impl Iterator<Item = String> {
+    rates.inattentive().into_iter().map(|(reviewer, rate)| {
+        let [noticed, n] = [rate.count, rate.n].map(format_count);
+        format!(
+            "{} noticed {noticed} of {n} attention checks. Let another person judge the same results, or let this one \
+             practise (key ? on the review page) and judge again.",
+            sanitize(reviewer, 60)
+        )
+    })
+}
+
+fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
+    let why = match skipped {
+        BootstrapSkipped::TooMany(by) => format!(
+            "there are more than {} {}, and sampling error is negligible",
+            format_count(MAX_UNITS as u64),
+            by.plural()
+        ),
+        BootstrapSkipped::TooFew { units, by } => format!(
+            "an interval needs at least {MIN_UNITS} {}; here: {units}",
+            by.plural()
+        ),
+    };
+    format!("Means have no intervals, and metrics are not compared by score, because {why}.")
+}
+
+fn missing_pairs(progress: PairProgress) -> Option<String> {
+    let missing = progress.failed + progress.pending;
+    let counts = progress.without_results()?;
+    let verb = if missing == 1 { "is" } else { "are" };
+    let pairs = counted(progress.done + missing, "pair");
+    let missing = format_count(missing);
+    Some(format!("{missing} of {pairs} {verb} in no row: {counts}."))
+}
+
+/// Returns a warning if the mean Dice exceeds the largest value that the mean `IoU` allows.
+///
+/// For each pair, Dice is `2 J / (1 + J)`, where J is the `IoU`. This function is concave, so the mean Dice cannot
+/// exceed the function's value at the mean `IoU`.
+fn impossible_dice(row: &MetricRow) -> Option<String> {
+    let (iou, dice) = (row.iou?, row.dice?);
+    let bound = 2.0 * iou / (1.0 + iou);
+    let [iou, shown_bound, shown_dice] =
+        [iou, bound, dice].map(|score| format_number(score, Score));
+    (dice > bound + ROUNDING).then(|| {
+        format!(
+            "{}: a mean Dice of {shown_dice} is above {shown_bound}, the most that a mean IoU of {iou} allows; the two \
+             cannot be of the same masks.",
+            row.metric.title()
+        )
+    })
+}
+
+/// Returns warnings that count stale verdicts, conflicts and mirrored results. Metrics with the same counts share one.
+fn qualified_results(rows: &[MetricRow]) -> Vec<String> {
+    let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
+    for (row, text) in rows
+        .iter()
+        .flat_map(|row| qualifications(row).map(move |text| (row, text)))
+    {
+        match groups.iter_mut().find(|(known, _)| *known == text) {
+            Some((_, titles)) => titles.push(row.metric.title()),
+            None => groups.push((text, vec![row.metric.title()])),
+        }
+    }
+    let groups = groups.into_iter();
+    groups
+        .map(|(text, titles)| format!("{}: {text}", titles.join(", ")))
+        .collect()
+}
+
+/// Returns the counts of one metric, each as a sentence without the metric.
+fn qualifications(row: &MetricRow) -> impl Iterator<Item = String> + use<> {
+    let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
+    let counts = [
+        (
+            row.stale,
+            ["has", "have"],
+            "a verdict on an earlier result only",
+        ),
+        (
+            row.conflicts,
+            ["is", "are"],
+            "unsure because reviewers disagree",
+        ),
+        (
+            mirrored,
+            ["is", "are"],
+            "mirrored (angle error 180 degrees)",
+        ),
+    ];
+    let results = counted(row.n, "result");
+    let counts = counts.into_iter().filter(|(n, _, _)| *n > 0);
+    counts.map(move |(n, [one, more], what)| {
+        let verb = if n == 1 { one } else { more };
+        format!("of {results}, {} {verb} {what}.", format_count(n))
+    })
+}
+
+fn unusable_truth(truth: &TruthProblems) -> Option<String> {
+    truth.first.as_ref().map(|first| {
+        let records = counted(truth.count, "ground truth record");
+        format!("{records} cannot be used and count nowhere. The first: {first}.")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bootstrap_skipped, impossible_dice, missing_pairs, qualified_results};
+    use crate::model::PairProgress;
+    use crate::score_bootstrap::BootstrapSkipped;
+    use crate::stats::ResamplingUnit;
+    use crate::test_fixtures;
+    use mocban_core::domain::ThresholdMetric;
+
+    #[test]
+    fn the_reason_for_no_bootstrap_is_given() {
+        let few = bootstrap_skipped(BootstrapSkipped::TooFew {
+            units: 5,
+            by: ResamplingUnit::Block,
+        });
+        assert!(
+            few.ends_with("because an interval needs at least 10 blocks; here: 5."),
+            "{few}"
+        );
+        let many = bootstrap_skipped(BootstrapSkipped::TooMany(ResamplingUnit::Block));
+        assert!(
+            many.contains("there are more than 100,000 blocks"),
+            "{many}"
+        );
+    }
+
+    #[test]
+    fn the_papers_density_row_is_impossible_and_its_others_are_not() {
+        let row = |iou, dice| test_fixtures::row(ThresholdMetric::Density, iou, dice);
+        let said = impossible_dice(&row(0.708, 0.870)).expect("0.870 is above 0.829");
+        assert!(said.contains("0.870 is above 0.829"), "{said}");
+        assert_eq!(impossible_dice(&row(0.776, 0.870)), None);
+        assert_eq!(impossible_dice(&row(0.805, 0.890)), None);
+    }
+
+    #[test]
+    fn equal_masks_meet_the_bound_without_a_warning() {
+        let iou = 0.7;
+        let dice = 2.0 * iou / (1.0 + iou);
+        assert_eq!(
+            impossible_dice(&test_fixtures::row(ThresholdMetric::NlSsim, iou, dice)),
+            None
+        );
+    }
+
+    #[test]
+    fn metrics_with_the_same_counts_share_a_warning() {
+        let row = |metric, conflicts| crate::MetricRow {
+            conflicts,
+            ..test_fixtures::row(metric, 0.8, 0.88)
+        };
+        let rows = [
+            row(ThresholdMetric::NlSsim, 1),
+            row(ThresholdMetric::Density, 2),
+            row(ThresholdMetric::Ensemble, 1),
+        ];
+        assert_eq!(
+            qualified_results(&rows),
+            [
+                "Non-luminous SSIM, Ensemble: of 587 results, 1 is unsure because reviewers disagree.",
+                "Pixel density: of 587 results, 2 are unsure because reviewers disagree.",
+            ]
+        );
+    }
+
+    #[test]
+    fn failed_and_unfinished_pairs_are_named() {
+        let said = |done, failed, pending| {
+            missing_pairs(PairProgress {
+                done,
+                failed,
+                pending,
+            })
+        };
+        assert_eq!(said(5, 0, 0), None);
+        let three = said(5, 2, 1).expect("three are missing");
+        assert_eq!(
+            three,
+            "3 of 8 pairs are in no row: 2 failed, 1 not finished."
+        );
+    }
+}
