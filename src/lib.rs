@@ -202,7 +202,7 @@
 //!
 //! ## An export
 //!
-//! `src/export/exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog.
+//! `crates/export/src/exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog.
 //! `record.rs` defines the record of a pair that all formats share, `record_fields.rs` its fields with unit and frame,
 //! `pair_pictures.rs` reads inputs and artifacts when a format needs them, and `format_writer.rs` says what a format must
 //! implement; the formats are in `formats/`. `block_lines.rs` and `block_grid.rs` write whole blocks with the maps of their
@@ -210,14 +210,14 @@
 //!
 //! ## The 3D view
 //!
-//! `src/export/scan_view/scan_data.rs` encodes a scan in the frame of its print with textures, which `view_inputs.rs` beside
+//! `crates/export/src/scan_view/scan_data.rs` encodes a scan in the frame of its print with textures, which `view_inputs.rs` beside
 //! it reads; `crates/core/src/mesh/clustering.rs` simplifies large scans. `assets/scan-viewer/scan-viewer.js` shows the data in three
 //! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
 //! ## Seeing a block
 //!
-//! `src/export/block_view` reads the stored results of a block again: `page_view.rs` the files, `page_layers.rs` draws any
+//! `crates/export/src/block_view` reads the stored results of a block again: `page_view.rs` the files, `page_layers.rs` draws any
 //! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
 //! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
 //! the same layers, and for the 3D view of a character's pair. `view::correction_server` lets a person choose the same
@@ -264,7 +264,6 @@
 pub mod cli;
 pub mod config;
 pub mod documentation;
-pub mod export;
 pub mod local_server;
 pub mod review;
 pub mod view;
@@ -272,6 +271,7 @@ pub use mocban_align::{block, stages};
 pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
+pub use mocban_export as export;
 pub use mocban_lists::{labels, manifest};
 pub use mocban_report as report;
 pub use mocban_runner::{self as runner, check};

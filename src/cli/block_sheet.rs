@@ -10,10 +10,10 @@ use super::exit::{ExitCode, Refusal};
 use super::files::{self, input_file_limits};
 use super::select;
 use super::table::count;
-use crate::export::block_view::{BlockView, BlockViewError};
 use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
+use mocban_export::block_view::{BlockView, BlockViewError};
 use mocban_store::Project;
 
 /// What to draw of a block, and where to.

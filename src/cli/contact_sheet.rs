@@ -12,9 +12,9 @@ use super::exit::{ExitCode, Refusal};
 use super::files;
 use super::select;
 use super::table::count;
-use crate::export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
+use mocban_export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::exit::{ExitCode, Refusal};
 use super::time_text::local;
 use crate::config::ConfigError;
-use crate::export::FolderError;
 use mocban_catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
+use mocban_export::FolderError;
 use mocban_runner::RunError;
 use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 use mocban_system::platform;
@@ -331,8 +331,8 @@ mod tests {
     use super::without_error_numbers;
     use super::{ExitCode, Refusal};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
-    use crate::export::ExportError;
     use mocban_catalog::{CatalogError, LockOwner};
+    use mocban_export::ExportError;
 
     #[test]
     fn refusal_keeps_its_code_under_context() {

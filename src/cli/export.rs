@@ -12,11 +12,11 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::files::input_file_limits;
 use super::table::count;
-use crate::export::{
+use mocban_core::domain::ThresholdMetric;
+use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
-use mocban_core::domain::ThresholdMetric;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -160,7 +160,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
     }
     context.warn_about_stale(&catalog).await?;
     let busy = Busy::start(context, "exporting");
-    let summary = crate::export::export(&catalog, &project, &args.output, &formats, options).await;
+    let summary = mocban_export::export(&catalog, &project, &args.output, &formats, options).await;
     drop(busy);
     let summary = summary?;
     catalog.close().await;

@@ -8,9 +8,9 @@ use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::config::Config;
-use crate::export::InputFileLimits;
 use mocban_catalog::Catalog;
 use mocban_core::domain::sanitize;
+use mocban_export::InputFileLimits;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };

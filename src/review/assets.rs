@@ -1,6 +1,6 @@
 //! Scripts and styles of the page, embedded in the program. The page loads nothing from other hosts.
 
-use crate::export::scan_view;
+use mocban_export::scan_view;
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";

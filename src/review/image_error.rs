@@ -1,8 +1,8 @@
 //! Why the images of an item cannot be rendered.
 
-use crate::export::{PictureError, SourcePrintError};
 use crate::local_server::WorkFailed;
 use mocban_catalog::CatalogError;
+use mocban_export::{PictureError, SourcePrintError};
 use mocban_report::pair_artifacts::PairArtifactsError;
 
 /// Why the images of an item cannot be rendered.

@@ -13,15 +13,15 @@ use super::alignment_inputs::{AlignmentInputs, PlacedRelief, require_current};
 use super::cache_slots::CacheSlots;
 use super::image_error::ImageError;
 use super::item::ReviewItem;
-use crate::export::pictures::PrintView;
-use crate::export::scan_view::ScanView;
-use crate::export::{InputFileLimits, SourcePrint};
 use crate::local_server::WorkThread;
 use mocban_align::stages::normalize::PrintMasks;
 use mocban_align::stages::register::StrokeMap;
 use mocban_catalog::{Catalog, PairResults};
 use mocban_core::domain::{Affine2, Stage};
 use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
+use mocban_export::pictures::PrintView;
+use mocban_export::scan_view::ScanView;
+use mocban_export::{InputFileLimits, SourcePrint};
 use mocban_report::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 

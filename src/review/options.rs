@@ -5,8 +5,8 @@ use std::net::SocketAddr;
 
 use super::check_items::CheckRates;
 use super::i18n::Language;
-use crate::export::InputFileLimits;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
+use mocban_export::InputFileLimits;
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]

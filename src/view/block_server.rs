@@ -13,10 +13,10 @@ use axum::routing::get;
 use super::correction_server::{self, CorrectionStore};
 use super::page;
 use super::server::{ViewError, ViewServer, jpeg};
-use crate::export::block_view::{BlockView, PageLayer, PageRegion};
-use crate::export::scan_view::assets;
 use crate::local_server::WorkThread;
 use mocban_core::domain::BlockName;
+use mocban_export::block_view::{BlockView, PageLayer, PageRegion};
+use mocban_export::scan_view::assets;
 
 const SCRIPT_KIND: &str = "text/javascript; charset=utf-8";
 const STYLE_KIND: &str = "text/css; charset=utf-8";

@@ -15,9 +15,9 @@ use serde_json::json;
 
 use super::page;
 use super::server::jpeg;
-use crate::export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 use crate::local_server::{AccessControl, WorkThread};
 use mocban_core::domain::{BlockName, BlockSide, ContentHash, ControlPoints};
+use mocban_export::block_view::{BlockCorrection, PicturePoint, TriedAlignment};
 
 /// Reads a block for its correction, and stores the control points.
 pub trait CorrectionStore: Send + Sync + 'static {

@@ -12,8 +12,8 @@ use axum::{Extension, Router};
 use tokio::net::TcpListener;
 
 use super::page;
-use crate::export::scan_view::{ScanView, assets};
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use mocban_export::scan_view::{ScanView, assets};
 
 /// The script of the page.
 const SCRIPT: &str = include_str!("../../assets/scan-viewer/view.js");

@@ -16,7 +16,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("pulp", &["core"]),
     ("quick-xml", &["lists"]),
     ("sqlx", &["catalog"]),
-    ("tiff", &["core"]),
+    ("tiff", &["core", "export"]),
 ];
 
 /// Crates without files, processes, clocks and async code.

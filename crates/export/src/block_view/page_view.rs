@@ -1,0 +1,153 @@
+//! Reads a block with its results, so that it can be shown.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::block_error::BlockViewError;
+use super::characters::{CharacterView, shown_record};
+use super::page_layers::PageLayers;
+use super::page_picture::PagePicture;
+use super::registered_face::RegisteredFace;
+use crate::pair_pictures::{InputFileLimits, PictureError};
+use crate::scan_view::ScanView;
+use mocban_catalog::{BlockDetail, Catalog, PairResults, StoredCharacter};
+use mocban_core::domain::{BlockCharacterState, BlockName, PairName, ThresholdMetric};
+use mocban_core::raster::ImageLimits;
+use mocban_store::Project;
+
+/// A block that is aligned with its page, and the results of its characters.
+#[derive(Debug)]
+pub struct BlockView {
+    /// The user's id.
+    pub name: BlockName,
+    /// The page, and the relief in its frame.
+    pub layers: PageLayers,
+    /// The characters that have a box.
+    pub characters: Vec<CharacterView>,
+    /// Share of the places of the face that agree with the page, 0..=1.
+    pub agreement: f64,
+    pairs: Vec<Option<PairResults>>,
+    metric: Option<ThresholdMetric>,
+    limits: InputFileLimits,
+    project: Project,
+}
+
+impl BlockView {
+    /// Reads a block with the results of a metric, or of the default one if `metric` is `None`.
+    ///
+    /// # Errors
+    /// Returns an error if the block is not aligned with its page, if no character has a result of the metric that was asked
+    /// for, or if the catalog, the page or the heights cannot be read.
+    pub async fn read(
+        catalog: &Catalog,
+        project: &Project,
+        name: &BlockName,
+        metric: Option<ThresholdMetric>,
+        limits: InputFileLimits,
+    ) -> Result<Self, BlockViewError> {
+        let detail = catalog.block(name).await?;
+        let detail = detail.ok_or_else(|| BlockViewError::Gone(name.clone()))?;
+        let registered = RegisteredFace::of(&detail)?.ok_or_else(|| not_aligned(name, &detail))?;
+        let characters = catalog.block_characters(name).await?;
+        let is_on_page = |one: &StoredCharacter| one.state != BlockCharacterState::Retired;
+        let characters: Vec<StoredCharacter> = characters.into_iter().filter(is_on_page).collect();
+        let pairs = pairs_of(catalog, name, &characters).await?;
+        let has_metric = |metric| {
+            pairs
+                .iter()
+                .flatten()
+                .any(|pair| pair.metric(metric).is_some())
+        };
+        if let Some(metric) = metric.filter(|metric| !has_metric(*metric)) {
+            let block = name.clone();
+            return Err(BlockViewError::NoResult { block, metric });
+        }
+        let shown = characters.iter().zip(&pairs);
+        let characters = shown
+            .map(|(stored, pair)| CharacterView::new(stored, pair.as_ref(), metric))
+            .collect();
+        let agreement = registered.agreement;
+        let (page_path, own) = (detail.state.attributes.page_path, project.clone());
+        let read = move || read_layers(&registered, &page_path, &own, &limits.image);
+        Ok(Self {
+            name: name.clone(),
+            layers: tokio::task::spawn_blocking(read).await??,
+            characters,
+            agreement,
+            pairs,
+            metric,
+            limits,
+            project: project.clone(),
+        })
+    }
+
+    /// Returns what the page in the browser shows: the size of the page and the characters, as JSON.
+    pub fn to_json(&self) -> Value {
+        json!({
+            "block": self.name,
+            "page_size": self.layers.size(),
+            "agreement": self.agreement,
+            "characters": self.characters,
+        })
+    }
+
+    /// Reads the 3D view of a character by its index, encoded. Returns `None` if its pair has no result.
+    ///
+    /// # Errors
+    /// Returns an error if a file of the pair cannot be read, has changed since it was aligned, or exceeds the limits.
+    pub fn scan(&self, index: usize) -> Result<Option<Vec<u8>>, PictureError> {
+        let Some(Some(pair)) = self.pairs.get(index) else {
+            return Ok(None);
+        };
+        let Some(record) = shown_record(pair, self.metric) else {
+            return Ok(None);
+        };
+        let view = ScanView::read(&self.project, pair, record.outcome.metric, self.limits)?;
+        Ok(view.map(|view| view.to_bytes()))
+    }
+}
+
+/// Returns the pair of each character with its results; `None` for characters without a pair in the queue.
+async fn pairs_of(
+    catalog: &Catalog,
+    block: &BlockName,
+    characters: &[StoredCharacter],
+) -> Result<Vec<Option<PairResults>>, BlockViewError> {
+    let name = |one: &StoredCharacter| PairName::new(one.pair.as_deref()?).ok();
+    let names = characters.iter().map(name);
+    let found = catalog.pairs_of_block(block).await?.into_iter();
+    let mut by_name: BTreeMap<PairName, PairResults> = found
+        .map(|pair| (pair.attributes.name.clone(), pair))
+        .collect();
+    let pairs = names.map(|name| by_name.remove(&name?));
+    Ok(pairs.collect())
+}
+
+/// Reads the page and the heights of a block.
+fn read_layers(
+    registered: &RegisteredFace,
+    page_path: &str,
+    project: &Project,
+    limits: &ImageLimits,
+) -> Result<PageLayers, BlockViewError> {
+    let page = PagePicture::read(project, page_path, registered.page_hash, limits)?;
+    Ok(PageLayers {
+        page: page.picture,
+        ink: page.ink,
+        face: registered.read_face(project)?,
+        map: registered.map()?,
+    })
+}
+
+/// Returns the error of a block without alignment, with its failure or what to do.
+pub(super) fn not_aligned(name: &BlockName, detail: &BlockDetail) -> BlockViewError {
+    let why = match &detail.state.failure {
+        Some(stored) => format!("{} failed: {}", stored.stage, stored.failure.message),
+        None => "it has not run yet; use `run` first".to_owned(),
+    };
+    BlockViewError::NotAligned {
+        block: name.clone(),
+        why,
+    }
+}

@@ -1,0 +1,260 @@
+//! The format `csv`: a table with one row per pair and metric, for spreadsheets and R.
+
+use ::csv::{Terminator, WriterBuilder};
+use serde_json::{Map, Value};
+
+use crate::export_folder::{FolderError, SharedFile};
+use crate::format_writer::{EncodedPair, FormatFolder, FormatGuide, FormatWriter, PairView};
+use crate::pair_pictures::PictureError;
+use crate::record::{MetricFields, PairFields, PairRecord, ReviewerFields};
+use crate::record_fields::{METRIC_FIELDS, PAIR_FIELDS, RecordField, markdown_table, schema_of};
+
+/// The table.
+const TABLE: &str = "pairs.csv";
+/// Mark by which Excel recognizes UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// Fixed lengths of the lists that become one column per element.
+const LISTS: [(&str, &[usize]); 12] = [
+    ("box", &[4]),
+    ("plane_from_mesh", &[4, 4]),
+    ("depth_from_plane", &[2, 3]),
+    ("canvas_from_print", &[2, 3]),
+    ("picture_from_print", &[2, 3]),
+    ("page_from_crop", &[3, 3]),
+    ("page_from_mesh", &[3, 4]),
+    ("depth_size_px", &[2]),
+    ("curvature", &[6]),
+    ("shift_px", &[2]),
+    ("print_from_mesh", &[3, 4]),
+    ("print_from_depth", &[3, 3]),
+];
+
+/// A column and where its value is in the JSON of a row.
+struct ResultColumn {
+    name: String,
+    pointer: String,
+}
+
+/// Writes `pairs.csv`.
+pub(super) struct CsvWriter {
+    folder: FormatFolder,
+    columns: Vec<ResultColumn>,
+    table: SharedFile,
+}
+
+impl CsvWriter {
+    pub(super) fn begin(folder: FormatFolder) -> Result<Self, FolderError> {
+        let mut table = SharedFile::create(&folder.root, TABLE)?;
+        if folder.context.options.csv_bom {
+            table.append(BYTE_ORDER_MARK)?;
+        }
+        let columns = columns(&folder.context.meta_columns);
+        table.append(&rows([columns
+            .iter()
+            .map(|column| text_cell(&column.name))
+            .collect()]))?;
+        Ok(Self {
+            folder,
+            columns,
+            table,
+        })
+    }
+
+    /// Returns the cells of a pair and metric.
+    fn cells(&self, pair: &Map<String, Value>, metric: &MetricFields) -> Vec<String> {
+        let mut row = pair.clone();
+        row["verdicts_text"] = judgements(&metric.verdicts).into();
+        if let Ok(Value::Object(fields)) = serde_json::to_value(metric) {
+            row.extend(fields);
+        }
+        let row = Value::Object(row);
+        let cell =
+            |column: &ResultColumn| row.pointer(&column.pointer).map_or_else(String::new, cell);
+        self.columns.iter().map(cell).collect()
+    }
+}
+
+impl FormatWriter for CsvWriter {
+    fn encode(&self, view: &PairView<'_>) -> Result<EncodedPair, PictureError> {
+        let pair = pair_values(&view.record.pair);
+        let metrics = self.folder.context.metrics.iter().copied();
+        let missing: Vec<_> = if view.record.metrics.is_empty() {
+            metrics.map(MetricFields::without_result).collect()
+        } else {
+            Vec::new()
+        };
+        let metrics = view.record.metrics.iter().chain(&missing);
+        let text = rows(metrics.map(|metric| self.cells(&pair, metric)));
+        Ok(EncodedPair {
+            files: Vec::new(),
+            shared: vec![text],
+        })
+    }
+
+    fn append(&mut self, _: &PairRecord, shared: Vec<Vec<u8>>) -> Result<(), FolderError> {
+        shared.iter().try_for_each(|rows| self.table.append(rows))
+    }
+
+    fn finish(&mut self) -> Result<Vec<String>, FolderError> {
+        self.table.flush()?;
+        Ok(vec![TABLE.to_owned()])
+    }
+
+    fn guide(&self) -> FormatGuide {
+        let tables = [("Columns", &PAIR_FIELDS[..]), ("", &METRIC_FIELDS[..])];
+        FormatGuide {
+            purpose: "Results of block scans aligned with prints, as a table with one row per pair and metric.".to_owned(),
+            files: vec![[TABLE, "the table: UTF-8, comma-separated, lines end with CR LF"].map(str::to_owned)],
+            usage: "\
+Elements of lists and matrices are columns with their indices from 1: `print_from_mesh_2_4` is row 2, column 4. The
+user's columns begin with `meta_`. `curvature_1` to `curvature_6` are `height_from_mesh.curvature`. `verdicts` lists
+the newest verdict of each reviewer, as `lan=pass; minh=fail (angle)`. A text that a spreadsheet would run as a formula
+begins with `'`.
+
+```r
+pairs <- read.csv(\"pairs.csv\", fileEncoding = \"UTF-8-BOM\")
+```"
+            .to_owned(),
+            fields: markdown_table(&schema_of::<RowSchema>(), &tables),
+            ..FormatGuide::default()
+        }
+    }
+}
+
+/// The fields of a row, for the README.
+#[derive(schemars::JsonSchema)]
+struct RowSchema {
+    #[serde(flatten)]
+    _pair: PairFields,
+    #[serde(flatten)]
+    _metric: MetricFields,
+}
+
+/// Returns the columns in the order of the fields.
+fn columns(meta: &[String]) -> Vec<ResultColumn> {
+    let mut columns = Vec::new();
+    for RecordField { name, .. } in PAIR_FIELDS.iter().chain(&METRIC_FIELDS) {
+        match *name {
+            "meta" => columns.extend(meta.iter().map(|key| ResultColumn {
+                name: format!("meta_{key}"),
+                pointer: format!("/meta/{}", key.replace('~', "~0").replace('/', "~1")),
+            })),
+            "height_from_mesh" => {
+                add_list(&mut columns, "curvature", "/height_from_mesh/curvature");
+            }
+            "manual_alignment" => {
+                for name in ["reviewer", "at", "iou", "dice", "note"] {
+                    columns.push(ResultColumn {
+                        name: format!("manual_alignment_{name}"),
+                        pointer: format!("/manual_alignment/{name}"),
+                    });
+                }
+            }
+            "verdicts" => columns.push(ResultColumn {
+                name: "verdicts".to_owned(),
+                pointer: "/verdicts_text".to_owned(),
+            }),
+            name => add_list(&mut columns, name, &format!("/{name}")),
+        }
+    }
+    columns
+}
+
+/// Adds a column for a value, or one for each element if it is a list.
+fn add_list(columns: &mut Vec<ResultColumn>, name: &str, pointer: &str) {
+    let lengths = LISTS.iter().find(|(list, _)| *list == name);
+    let mut places = vec![(name.to_owned(), pointer.to_owned())];
+    for length in lengths.map_or(&[][..], |(_, lengths)| lengths) {
+        places = places
+            .iter()
+            .flat_map(|(name, pointer)| {
+                (0..*length).map(move |i| (format!("{name}_{}", i + 1), format!("{pointer}/{i}")))
+            })
+            .collect();
+    }
+    columns.extend(
+        places
+            .into_iter()
+            .map(|(name, pointer)| ResultColumn { name, pointer }),
+    );
+}
+
+/// Returns the fields of a pair by name.
+fn pair_values(pair: &PairFields) -> Map<String, Value> {
+    match serde_json::to_value(pair) {
+        Ok(Value::Object(mut fields)) => {
+            fields.insert("verdicts_text".to_owned(), Value::Null);
+            fields
+        }
+        Ok(_) | Err(_) => Map::new(),
+    }
+}
+
+/// Returns the reviewers' verdicts as text, such as `lan=pass; minh=fail (angle)`.
+fn judgements(verdicts: &[ReviewerFields]) -> String {
+    let each = verdicts.iter().map(|given| {
+        let reason = given
+            .reason
+            .map_or(String::new(), |reason| format!(" ({reason})"));
+        format!("{}={}{reason}", given.reviewer, given.verdict)
+    });
+    each.collect::<Vec<_>>().join("; ")
+}
+
+/// Returns a value as a cell: numbers with all digits, lists and objects as JSON.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(text) => text_cell(text),
+        // Display of f64 has no exponent, unlike JSON.
+        Value::Number(number) if number.is_f64() => number
+            .as_f64()
+            .map_or_else(String::new, |number| number.to_string()),
+        other => other.to_string(),
+    }
+}
+
+/// First characters of a text that a spreadsheet may run as a formula, as OWASP lists them ("CSV Injection"), with their
+/// full-width forms.
+const FORMULA_STARTS: [char; 11] = ['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'];
+
+/// Returns a text as a cell. A leading `'` keeps spreadsheets from running it as a formula.
+fn text_cell(text: &str) -> String {
+    let is_formula = text.starts_with(FORMULA_STARTS);
+    if is_formula { "'" } else { "" }.to_owned() + text
+}
+
+/// Returns rows as CSV (RFC 4180).
+fn rows(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
+    let mut writer = WriterBuilder::new()
+        .terminator(Terminator::CRLF)
+        .from_writer(Vec::new());
+    for row in rows {
+        writer
+            .write_record(row)
+            .expect("memory takes rows of equal length");
+    }
+    writer.into_inner().expect("memory is written")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::cell;
+
+    #[test]
+    fn no_text_is_a_formula_and_numbers_stay_numbers() {
+        for text in [
+            "=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "＝1", "＋1", "－1", "＠1",
+        ] {
+            assert_eq!(cell(&json!(text)), format!("'{text}"));
+        }
+        for text in ["", "1-1", "a=1", "'=1", "天"] {
+            assert_eq!(cell(&json!(text)), text);
+        }
+        assert_eq!(cell(&json!(-1.5e-7)), "-0.00000015");
+        assert_eq!(cell(&json!(-3)), "-3");
+    }
+}
