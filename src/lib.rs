@@ -212,14 +212,14 @@
 //!
 //! `crates/export/src/scan_view/scan_data.rs` encodes a scan in the frame of its print with textures, which `view_inputs.rs` beside
 //! it reads; `crates/core/src/mesh/clustering.rs` simplifies large scans. `assets/scan-viewer/scan-viewer.js` shows the data in three
-//! places: on the page of `src/view/server.rs`, in a dialog of the review page, and in pages without a server
+//! places: on the page of `crates/pages/src/view/server.rs`, in a dialog of the review page, and in pages without a server
 //! (`standalone_page.rs`).
 //!
 //! ## Seeing a block
 //!
 //! `crates/export/src/block_view` reads the stored results of a block again: `page_view.rs` the files, `page_layers.rs` draws any
 //! part of the page, of the relief in the frame of the page, or of both over each other, and `block_sheets.rs` the two
-//! pictures of `contact-sheet --block`. The page of `view BLOCK` (`src/view/block_server.rs`, `assets/block-view`) asks for
+//! pictures of `contact-sheet --block`. The page of `view BLOCK` (`crates/pages/src/view/block_server.rs`, `assets/block-view`) asks for
 //! the same layers, and for the 3D view of a character's pair. `view::correction_server` lets a person choose the same
 //! places on the relief and on the page; the catalog stores them as control points, and `align` starts from them.
 //!
@@ -264,15 +264,13 @@
 pub mod cli;
 pub mod config;
 pub mod documentation;
-pub mod local_server;
-pub mod review;
-pub mod view;
 pub use mocban_align::{block, stages};
 pub use mocban_catalog as catalog;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
 pub use mocban_export as export;
 pub use mocban_lists::{labels, manifest};
+pub use mocban_pages::{local_server, review, view};
 pub use mocban_report as report;
 pub use mocban_runner::{self as runner, check};
 pub use mocban_store as store;

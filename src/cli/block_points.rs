@@ -3,10 +3,10 @@
 use tokio::runtime::Handle;
 
 use super::context::Context;
-use crate::view::{CorrectionStore, PointsSaved};
 use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
+use mocban_pages::view::{CorrectionStore, PointsSaved};
 use mocban_store::Project;
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays

@@ -12,7 +12,7 @@ use tokio::task::AbortHandle;
 
 use super::context::Context;
 use super::exit::Refusal;
-use crate::local_server::{ConnectionLimits, ServedNames, listen, serve};
+use mocban_pages::local_server::{ConnectionLimits, ServedNames, listen, serve};
 use mocban_runner::RunMetrics;
 use mocban_system::platform::host_name;
 

@@ -13,12 +13,12 @@ use super::output;
 use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
-use crate::review::{
-    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
-};
 use mocban_catalog::{SetApart, StatusCounts};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
+use mocban_pages::review::{
+    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
+};
 use mocban_runner::{Stop, StopLevel};
 
 /// Arguments of `review`.
@@ -263,8 +263,8 @@ fn language_of_system() -> Option<Language> {
 mod tests {
     use super::{QueueCounts, order, percent, progress, review_command};
     use crate::config::{Sources, load};
-    use crate::review::key_map;
     use mocban_core::domain::ReviewOrder;
+    use mocban_pages::review::key_map;
 
     #[test]
     fn default_settings_give_every_action_its_own_key() {

@@ -13,12 +13,12 @@ use super::exit::{ExitCode, Refusal};
 use super::output;
 use super::select;
 use super::signals;
-use crate::view::{self, ViewServer};
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
+use mocban_pages::view::{self, ViewServer};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::Project;
 

@@ -18,7 +18,7 @@ impl AccessControl {
     /// are those below the path of the session, so links between pages must be relative.
     pub fn guarded(self: &Arc<Self>, pages: Router) -> Router {
         let script = [(header::CONTENT_TYPE, "text/javascript; charset=utf-8")];
-        let text = include_str!("../../assets/local-server/session.js");
+        let text = include_str!("../../../../assets/local-server/session.js");
         Router::new()
             .route(START, get(start))
             .with_state(Arc::clone(self))

@@ -12,7 +12,7 @@ macro_rules! asset {
         (
             $name,
             $kind,
-            include_str!(concat!("../../assets/review/", $name)),
+            include_str!(concat!("../../../../assets/review/", $name)),
         )
     };
 }

@@ -38,27 +38,27 @@ macro_rules! example {
             practice: $practice,
             layers: [
                 include_bytes!(concat!(
-                    "../../assets/review/examples/",
+                    "../../../../assets/review/examples/",
                     $name,
                     "/print.jpg"
                 )),
                 include_bytes!(concat!(
-                    "../../assets/review/examples/",
+                    "../../../../assets/review/examples/",
                     $name,
                     "/print-mask.png"
                 )),
                 include_bytes!(concat!(
-                    "../../assets/review/examples/",
+                    "../../../../assets/review/examples/",
                     $name,
                     "/relief.jpg"
                 )),
                 include_bytes!(concat!(
-                    "../../assets/review/examples/",
+                    "../../../../assets/review/examples/",
                     $name,
                     "/depth-mask.png"
                 )),
                 include_bytes!(concat!(
-                    "../../assets/review/examples/",
+                    "../../../../assets/review/examples/",
                     $name,
                     "/stroke-map.png"
                 )),

@@ -16,7 +16,7 @@ use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, s
 use mocban_export::scan_view::{ScanView, assets};
 
 /// The script of the page.
-const SCRIPT: &str = include_str!("../../assets/scan-viewer/view.js");
+const SCRIPT: &str = include_str!("../../../../assets/scan-viewer/view.js");
 
 /// Why the server cannot start.
 #[derive(Debug, thiserror::Error)]

@@ -25,27 +25,27 @@ const ASSETS: [(&str, &str, &str); 5] = [
     (
         "block-view.js",
         SCRIPT_KIND,
-        include_str!("../../assets/block-view/block-view.js"),
+        include_str!("../../../../assets/block-view/block-view.js"),
     ),
     (
         "block-correct.js",
         SCRIPT_KIND,
-        include_str!("../../assets/block-view/block-correct.js"),
+        include_str!("../../../../assets/block-view/block-correct.js"),
     ),
     (
         "block-messages.js",
         SCRIPT_KIND,
-        include_str!("../../assets/block-view/block-messages.js"),
+        include_str!("../../../../assets/block-view/block-messages.js"),
     ),
     (
         "block-camera.js",
         SCRIPT_KIND,
-        include_str!("../../assets/block-view/block-camera.js"),
+        include_str!("../../../../assets/block-view/block-camera.js"),
     ),
     (
         "block-view.css",
         STYLE_KIND,
-        include_str!("../../assets/block-view/block-view.css"),
+        include_str!("../../../../assets/block-view/block-view.css"),
     ),
 ];
 /// Longer side of the image of a whole layer or of a region, pixels. Closer views ask for regions, which show a smaller

@@ -7,7 +7,7 @@ use mocban_core::domain::enum_names;
 
 /// The text of each message by language. The script replaces placeholders such as `{n}` by values.
 static MESSAGES: LazyLock<BTreeMap<&str, BTreeMap<&str, &str>>> = LazyLock::new(|| {
-    let text = include_str!("../../assets/review/messages.json");
+    let text = include_str!("../../../../assets/review/messages.json");
     serde_json::from_str(text).expect("the messages are JSON without escapes")
 });
 
@@ -104,7 +104,7 @@ mod tests {
             assert!(!english.is_empty() && !vietnamese.is_empty(), "{key}");
             assert_eq!(placeholders(english), placeholders(vietnamese), "{key}");
         }
-        let lines = include_str!("../../assets/review/messages.json").lines();
+        let lines = include_str!("../../../../assets/review/messages.json").lines();
         let keys = lines.filter(|line| line.starts_with("  \""));
         assert_eq!(keys.count(), MESSAGES.len(), "a key is there twice");
     }
