@@ -7,9 +7,38 @@ use image::codecs::jpeg::JpegEncoder;
 
 use super::{Grid, Mask};
 
+/// Most pixels of a map that is read back: 16,384 x 16,384. No stage makes a larger one.
+const MAX_MAP_PIXELS: u64 = 1 << 28;
+/// Most pixels of a mask that is read back. Masks have the size of prints, which `limits.image.max_pixels` limits to this.
+const MAX_MASK_PIXELS: u64 = 1_000_000_000;
+/// Most bytes that one byte of a PNG decodes to: the highest ratio of deflate (RFC 1951).
+const MAX_DEFLATE_RATIO: u64 = 1032;
+
 /// Why an artifact could not be read back.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
+    /// More pixels than any map or mask has.
+    #[error(
+        "the PNG is {width} x {height} pixels, and the largest that a stage stores has {limit} pixels"
+    )]
+    TooLarge {
+        /// Columns in the header.
+        width: u32,
+        /// Rows in the header.
+        height: u32,
+        /// Largest number of pixels.
+        limit: u64,
+    },
+    /// More pixels than a file of this length can hold.
+    #[error("the PNG of {bytes} bytes is too short for its {width} x {height} pixels")]
+    TooShort {
+        /// Columns in the header.
+        width: u32,
+        /// Rows in the header.
+        height: u32,
+        /// Length of the file.
+        bytes: usize,
+    },
     /// Not a complete PNG.
     #[error("the PNG is damaged: {0}")]
     Damaged(#[from] png::DecodingError),
@@ -183,6 +212,7 @@ fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec
     let wanted = depth as u8;
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
     let info = reader.info();
+    check_size([info.width, info.height], wanted, bytes.len())?;
     let (width, height) = (info.width as usize, info.height as usize);
     if info.color_type != png::ColorType::Grayscale || info.bit_depth != depth {
         return Err(PngError::Kind {
@@ -195,6 +225,31 @@ fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec
     reader.next_frame(&mut samples)?;
     reader.finish()?;
     Ok((width, height, samples))
+}
+
+/// Checks the size in the header before memory is allocated for it.
+fn check_size([width, height]: [u32; 2], bits: u8, bytes: usize) -> Result<(), PngError> {
+    let pixels = u64::from(width) * u64::from(height);
+    let limit = if bits == 8 {
+        MAX_MASK_PIXELS
+    } else {
+        MAX_MAP_PIXELS
+    };
+    if pixels > limit {
+        return Err(PngError::TooLarge {
+            width,
+            height,
+            limit,
+        });
+    }
+    if pixels * u64::from(bits / 8) > MAX_DEFLATE_RATIO * bytes as u64 {
+        return Err(PngError::TooShort {
+            width,
+            height,
+            bytes,
+        });
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -230,6 +285,33 @@ mod tests {
             picture.rgb,
             grid.map(|c| c.map(|value| u16::from(value) * 257))
         );
+    }
+
+    #[test]
+    fn a_forged_size_is_refused_before_memory_is_allocated() {
+        let forged = |width, height| {
+            let mut out = Vec::new();
+            let mut encoder = png::Encoder::new(&mut out, width, height);
+            encoder.set_depth(png::BitDepth::Sixteen);
+            let mut writer = encoder.write_header().expect("writes");
+            writer
+                .write_chunk(png::chunk::IDAT, &[0x78, 1, 3, 0])
+                .expect("writes");
+            drop(writer);
+            let error = decode_grey16(&out).expect_err("refused").to_string();
+            (error, out.len())
+        };
+        assert_eq!(
+            forged(60_000, 60_000).0,
+            "the PNG is 60000 x 60000 pixels, and the largest that a stage stores has 268435456 pixels"
+        );
+        let (error, bytes) = forged(16_384, 16_384);
+        assert_eq!(
+            error,
+            format!("the PNG of {bytes} bytes is too short for its 16384 x 16384 pixels")
+        );
+        let flat = Grid::new(3000, 2000, 7_u16);
+        assert_eq!(decode_grey16(&png_grey16(&flat)).expect("reads"), flat);
     }
 
     #[test]
