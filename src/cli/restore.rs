@@ -1,6 +1,7 @@
 //! `restore`: makes a project of a backup.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -148,7 +149,7 @@ async fn restore_into(
 }
 
 /// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
-/// missing meshes and prints.
+/// missing meshes and prints. A file that cannot be looked up is an error, because it may not be missing.
 async fn locate_inputs(
     project: &Project,
     new: &Path,
@@ -156,14 +157,22 @@ async fn locate_inputs(
 ) -> anyhow::Result<Vec<String>> {
     let catalog = Catalog::open(new).await?;
     let (project, inputs) = (project.clone(), inputs.to_owned());
+    let unreadable = Arc::new(OnceLock::new());
+    let first_unreadable = Arc::clone(&unreadable);
     let replaced = catalog.replace_input_paths(move |stored| {
         if project.input(stored).exists() {
             return Some(stored.to_owned());
         }
-        project.find_input(stored, &inputs).ok()?
+        project.find_input(stored, &inputs).unwrap_or_else(|error| {
+            let _ = first_unreadable.set(error);
+            None
+        })
     });
     let missing = replaced.await;
     catalog.close().await;
+    if let Some(error) = unreadable.get() {
+        anyhow::bail!("cannot look for a mesh or print: {error}");
+    }
     // Changes that are still in the write-ahead log would be lost when the file is renamed.
     let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
     anyhow::ensure!(
