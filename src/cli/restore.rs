@@ -43,7 +43,7 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         check_inputs(inputs)?;
     }
     check_directory(&Project::at(&dir))?;
-    require_local(&context.at(&dir))?;
+    require_local(&context.at(&dir), "the restored project")?;
     let existed = dir.exists();
     let busy = Busy::start(context, "restoring the project");
     let restored = restore_into(&backup, &dir, inputs.as_deref()).await;
@@ -201,9 +201,9 @@ fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Resu
     Err(Refusal::Usage(text).into())
 }
 
-/// Refuses settings of the environment, of flags or of a file in the directory that lead commands in it to a catalog on a
-/// server or to an object store, instead of what was restored.
-fn require_local(context: &Context) -> anyhow::Result<()> {
+/// Refuses settings of the environment, of flags or of a file in the directory that lead commands on a new project to a
+/// catalog on a server or to an object store, instead of its folder.
+pub(super) fn require_local(context: &Context, project: &str) -> anyhow::Result<()> {
     let settings = context.settings()?;
     let storage = &settings.config.storage;
     let catalog = context.catalog_url()?.unwrap_or_default();
@@ -224,7 +224,7 @@ fn require_local(context: &Context) -> anyhow::Result<()> {
             settings.tree.origin(key).to_string()
         };
         return Err(Refusal::Usage(format!(
-            "{origin} sets {key} to {place}, so commands on the restored project would work there and not in its folder; remove that setting, or give {instead} to this command and all others on the project"
+            "{origin} sets {key} to {place}, so commands on {project} would work there and not in its folder; remove that setting, or give {instead} to this command and all others on the project"
         ))
         .into());
     }
