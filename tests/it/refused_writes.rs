@@ -100,3 +100,30 @@ fn a_demo_never_goes_to_a_server_or_a_store_that_settings_name() {
     call(command.args(local)).expect(0);
     assert!(dir.path().join("d/catalog.sqlite").is_file());
 }
+
+#[test]
+fn manual_pages_replace_only_pages_of_this_program() {
+    let dir = empty();
+    let pages = dir.path().join("pages");
+    mocban(dir.path(), &["man", "pages"]).expect(0);
+    let page = pages.join("mocban.1");
+    let written = std::fs::read_to_string(&page).expect("a page");
+    std::fs::write(&page, written.replace("mocban ", "mocban  ")).expect("written");
+    mocban(dir.path(), &["man", "pages"]).expect(0);
+    assert_eq!(std::fs::read_to_string(&page).expect("a page"), written);
+
+    let mine = pages.join("mocban-run.1");
+    std::fs::write(&mine, "my notes").expect("written");
+    std::fs::remove_file(&page).expect("removed");
+    let before = files(&pages);
+    let refused = mocban(dir.path(), &["man", "pages"]).expect(2);
+    assert!(
+        refused
+            .err
+            .contains("mocban-run.1 exists and is not a manual page of this program"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(files(&pages), before);
+    assert_eq!(std::fs::read_to_string(&mine).expect("mine"), "my notes");
+}
