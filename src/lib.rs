@@ -235,7 +235,7 @@
 //! | `simd` | runtime dispatch to the widest vector instructions of the processor | |
 //! | `raster` | grids, masks, depth maps, print images, warps; decoders of PNG, JPEG, TIFF | `domain`, `simd` |
 //! | `platform` | operations that differ between operating systems: identity of files, syncing, signals | |
-//! | `page_vec` | vectors on huge pages with a cache of freed pages | |
+//! | `page_vec` | vectors on huge pages with a cache of freed pages | `domain` |
 //! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two directories; lists of blocks | `domain` |
 //! | `labels` | boxes of characters on a page: readers of eight formats, writers of VIA and COCO, names in reading order | `domain` |

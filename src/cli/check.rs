@@ -90,7 +90,9 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
     } else {
         context.open_read_only().await?
     };
-    let running = runner::is_running(&project, &catalog, now()).await?;
+    // The lock of a repair excludes other processes, except on a server.
+    let asks = !args.repair || catalog.is_shared();
+    let running = asks && runner::is_running(&project, &catalog, now()).await?;
     let lock = if args.repair {
         exclusive_lock(&project, &catalog, running).context("nothing was repaired")?
     } else {

@@ -17,6 +17,7 @@ use super::files;
 use super::import::{self, ImportArgs};
 use super::import_blocks::{self, BlockSource};
 use super::report;
+use super::restore::require_local;
 use super::run::{self, drive};
 use super::run_text;
 use super::screen::Palette;
@@ -65,6 +66,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let context = context.at(&dir);
     // Before settings and data are written there.
     check_directory(&dir, &dir.join("data"), &content)?;
+    require_local(&context, "the demo")?;
     context.data_locations()?;
     let context = &save_settings(&dir, &context)?;
     let options = match content {

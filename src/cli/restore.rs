@@ -1,6 +1,7 @@
 //! `restore`: makes a project of a backup.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -42,7 +43,7 @@ pub(super) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Res
         check_inputs(inputs)?;
     }
     check_directory(&Project::at(&dir))?;
-    require_local(&context.at(&dir))?;
+    require_local(&context.at(&dir), "the restored project")?;
     let existed = dir.exists();
     let busy = Busy::start(context, "restoring the project");
     let restored = restore_into(&backup, &dir, inputs.as_deref()).await;
@@ -148,7 +149,7 @@ async fn restore_into(
 }
 
 /// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
-/// missing meshes and prints.
+/// missing meshes and prints. A file that cannot be looked up is an error, because it may not be missing.
 async fn locate_inputs(
     project: &Project,
     new: &Path,
@@ -156,14 +157,22 @@ async fn locate_inputs(
 ) -> anyhow::Result<Vec<String>> {
     let catalog = Catalog::open(new).await?;
     let (project, inputs) = (project.clone(), inputs.to_owned());
+    let unreadable = Arc::new(OnceLock::new());
+    let first_unreadable = Arc::clone(&unreadable);
     let replaced = catalog.replace_input_paths(move |stored| {
         if project.input(stored).exists() {
             return Some(stored.to_owned());
         }
-        project.find_input(stored, &inputs).ok()?
+        project.find_input(stored, &inputs).unwrap_or_else(|error| {
+            let _ = first_unreadable.set(error);
+            None
+        })
     });
     let missing = replaced.await;
     catalog.close().await;
+    if let Some(error) = unreadable.get() {
+        anyhow::bail!("cannot look for a mesh or print: {error}");
+    }
     // Changes that are still in the write-ahead log would be lost when the file is renamed.
     let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
     anyhow::ensure!(
@@ -192,9 +201,9 @@ fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Resu
     Err(Refusal::Usage(text).into())
 }
 
-/// Refuses settings of the environment, of flags or of a file in the directory that lead commands in it to a catalog on a
-/// server or to an object store, instead of what was restored.
-fn require_local(context: &Context) -> anyhow::Result<()> {
+/// Refuses settings of the environment, of flags or of a file in the directory that lead commands on a new project to a
+/// catalog on a server or to an object store, instead of its folder.
+pub(super) fn require_local(context: &Context, project: &str) -> anyhow::Result<()> {
     let settings = context.settings()?;
     let storage = &settings.config.storage;
     let catalog = context.catalog_url()?.unwrap_or_default();
@@ -215,7 +224,7 @@ fn require_local(context: &Context) -> anyhow::Result<()> {
             settings.tree.origin(key).to_string()
         };
         return Err(Refusal::Usage(format!(
-            "{origin} sets {key} to {place}, so commands on the restored project would work there and not in its folder; remove that setting, or give {instead} to this command and all others on the project"
+            "{origin} sets {key} to {place}, so commands on {project} would work there and not in its folder; remove that setting, or give {instead} to this command and all others on the project"
         ))
         .into());
     }

@@ -25,8 +25,9 @@ pub(super) struct RetryArgs {
 pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open().await?;
     let (selection, block_selection) = selection(&args, &catalog).await?;
-    let retried = catalog.retry(&selection).await?;
-    let blocks = catalog.retry_blocks(&block_selection).await?;
+    let [retried, blocks] = catalog
+        .retry_pairs_and_blocks(&selection, &block_selection)
+        .await?;
     catalog.close().await;
     if retried + blocks == 0 {
         return Err(Refusal::NothingSelected(no_match(&selection)).into());

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::backup::files;
-use crate::cli::{Call, empty, mocban};
+use crate::cli::{Call, binary, call, empty, mocban};
 use crate::postgres_server::url;
 
 /// Rows of more than two chunks that an import sends to the catalog.
@@ -68,4 +68,62 @@ fn a_demo_that_is_refused_writes_nothing() {
     let demo = ["demo", "other", "--no-run", "--catalog", address];
     mocban(dir.path(), &demo).expect(2);
     assert!(!dir.path().join("other").exists());
+}
+
+#[test]
+fn a_demo_never_goes_to_a_server_or_a_store_that_settings_name() {
+    let dir = empty();
+    let server = "postgres://db.example/lab";
+    let store = "s3://lab/x";
+    let set_store = format!("storage.artifacts={store}");
+    let pairs: &[&str] = &["demo", "d", "--pairs", "1", "--no-run"];
+    for (variable, args, more) in [
+        ("MOCBAN_STORAGE__CATALOG", pairs, &[] as &[&str]),
+        ("MOCBAN_STORAGE__CATALOG", &["demo", "d", "--block"], &[]),
+        ("MOCBAN_NONE", pairs, &["--catalog", server]),
+        ("MOCBAN_NONE", pairs, &["--set", &set_store]),
+    ] {
+        let mut command = binary();
+        command.current_dir(dir.path());
+        if variable != "MOCBAN_NONE" {
+            command.env(variable, server);
+        }
+        let refused = call(command.args(args).args(more)).expect(2);
+        let says = "so commands on the demo would work there";
+        assert!(refused.err.contains(says), "{}", refused.err);
+        assert!(!dir.path().join("d").exists());
+    }
+    let mut command = binary();
+    command.current_dir(dir.path());
+    command.env("MOCBAN_STORAGE__CATALOG", server);
+    let local = ["demo", "d", "--pairs", "1", "--no-run", "--catalog", ""];
+    call(command.args(local)).expect(0);
+    assert!(dir.path().join("d/catalog.sqlite").is_file());
+}
+
+#[test]
+fn manual_pages_replace_only_pages_of_this_program() {
+    let dir = empty();
+    let pages = dir.path().join("pages");
+    mocban(dir.path(), &["man", "pages"]).expect(0);
+    let page = pages.join("mocban.1");
+    let written = std::fs::read_to_string(&page).expect("a page");
+    std::fs::write(&page, written.replace("mocban ", "mocban  ")).expect("written");
+    mocban(dir.path(), &["man", "pages"]).expect(0);
+    assert_eq!(std::fs::read_to_string(&page).expect("a page"), written);
+
+    let mine = pages.join("mocban-run.1");
+    std::fs::write(&mine, "my notes").expect("written");
+    std::fs::remove_file(&page).expect("removed");
+    let before = files(&pages);
+    let refused = mocban(dir.path(), &["man", "pages"]).expect(2);
+    assert!(
+        refused
+            .err
+            .contains("mocban-run.1 exists and is not a manual page of this program"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(files(&pages), before);
+    assert_eq!(std::fs::read_to_string(&mine).expect("mine"), "my notes");
 }

@@ -14,11 +14,14 @@ use std::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 
+use crate::domain::cancel::poll;
 use page_cache::PageBuffer;
 pub use page_cache::{keep_few_pages, keep_memory};
 
 /// Vectors of at least this many bytes use pages.
 const MIN_PAGED_BYTES: usize = 1 << 20;
+/// Elements that are copied between two polls for a cancellation.
+const ELEMENTS_PER_POLL: usize = 1 << 16;
 
 /// A vector of plain numbers that may be large. It dereferences to a slice.
 pub struct PageVec<T>(Storage<T>);
@@ -66,7 +69,11 @@ impl<T: Pod> PageVec<T> {
             Storage::Heap(vec) => vec.extend_from_slice(elements),
             Storage::Pages { pages, len } => {
                 if let Some(room) = as_elements(pages)[*len..].get_mut(..elements.len()) {
-                    room.copy_from_slice(elements);
+                    let parts = elements.chunks(ELEMENTS_PER_POLL);
+                    for (room, part) in room.chunks_mut(ELEMENTS_PER_POLL).zip(parts) {
+                        poll();
+                        room.copy_from_slice(part);
+                    }
                     *len += elements.len();
                 } else {
                     self.extend(elements.iter().copied());
@@ -157,8 +164,8 @@ impl<T: Pod> Extend<T> for PageVec<T> {
             match &mut self.0 {
                 Storage::Heap(vec) => return vec.extend(elements),
                 Storage::Pages { pages, len } => {
-                    for (place, element) in as_elements(pages)[*len..].iter_mut().zip(&mut elements)
-                    {
+                    let room = as_elements(pages)[*len..].iter_mut();
+                    for (place, element) in room.take(ELEMENTS_PER_POLL).zip(&mut elements) {
                         *place = element;
                         *len += 1;
                     }
@@ -167,7 +174,10 @@ impl<T: Pod> Extend<T> for PageVec<T> {
             if elements.peek().is_none() {
                 return;
             }
-            self.grow();
+            poll();
+            if self.len() == self.capacity() {
+                self.grow();
+            }
         }
     }
 }
@@ -225,6 +235,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{MIN_PAGED_BYTES, PageVec, Storage};
+    use crate::domain::cancel::{CancelToken, Cancelled};
 
     type Element = [u32; 3];
 
@@ -238,6 +249,22 @@ mod tests {
         };
         assert_eq!(is_on_pages(count), cfg!(target_os = "linux"));
         assert!(!is_on_pages(9));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_copy_of_a_large_vector_is_cancelled() {
+        let large: PageVec<Element> = (0..9 * MIN_PAGED_BYTES as u32).map(|k| [k; 3]).collect();
+        assert!(matches!(large.0, Storage::Pages { .. }));
+        let mut grown = large.clone();
+        let count = large.len();
+        for cancelled in [
+            CancelToken::cancelled_at(5).run(|| drop(large.clone())),
+            CancelToken::cancelled_at(5).run(|| grown.grow()),
+        ] {
+            assert_eq!(cancelled, Err(Cancelled));
+        }
+        assert_eq!(grown.len(), count, "as it was before");
     }
 
     #[test]

@@ -8,10 +8,18 @@ use super::input_reads::ReadItem;
 use mocban_catalog::PairAttributes;
 use mocban_core::domain::Stage;
 use mocban_core::raster;
+use mocban_align::stages::depth::DepthParams;
 use mocban_store::{Input, Project};
 
-/// Bytes reserved for each pair's maps and masks, in addition to its mesh and print.
+/// Bytes reserved for each pair's maps and masks, in addition to its mesh and print, with a depth map of up to
+/// [`INCLUDED_MAP_PIXELS`].
 pub(super) const PAIR_BYTES: u64 = 32 << 20;
+const INCLUDED_MAP_PIXELS: u64 = 512 * 512;
+/// Bytes needed for each further pixel of the depth map. Measured: 16 to 17, with maps of 4 and 38 million pixels.
+const MAP_PIXEL_BYTES: u64 = 20;
+/// Length of the longest usual character. If a pixel has a size in mm, a depth map grows with its scan, whose length is
+/// not known before it is read: a longer scan takes more memory than is reserved.
+const USUAL_MM: f64 = 50.0;
 /// Bytes needed per byte of a mesh file, including the file's content. Measured with one to two million vertices:
 /// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, point clouds 2.5. For OBJ it is 1.8, or 5.7 with
 /// normals or texture coordinates.
@@ -22,6 +30,14 @@ const PIXEL_BYTES: u64 = 50;
 /// Pixels assumed for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
+
+/// Returns the memory in bytes for the maps and masks of a pair with these settings.
+pub(super) fn map_bytes(depth: &DepthParams) -> u64 {
+    let more = depth
+        .max_pixels(USUAL_MM)
+        .saturating_sub(INCLUDED_MAP_PIXELS);
+    PAIR_BYTES.saturating_add(more.saturating_mul(MAP_PIXEL_BYTES))
+}
 
 /// Memory that is reserved for running pairs and a block, in estimated bytes.
 #[derive(Debug)]
@@ -80,13 +96,16 @@ pub(super) struct EstimatedPair {
     /// Next stage.
     pub(super) from: Stage,
     pub(super) limits: raster::ImageLimits,
+    /// Memory for its maps and masks.
+    pub(super) map_bytes: u64,
 }
 
 impl ReadItem for EstimatedPair {
     type Output = u64;
 
     fn read(&self) -> u64 {
-        estimated_bytes(&self.project, &self.attributes, self.from, &self.limits)
+        let inputs = input_bytes(&self.project, &self.attributes, self.from, &self.limits);
+        self.map_bytes.saturating_add(inputs)
     }
 
     fn path(&self) -> PathBuf {
@@ -94,9 +113,9 @@ impl ReadItem for EstimatedPair {
     }
 }
 
-/// Estimates the memory in bytes that a pair needs if it continues at stage `from`. A missing file counts as empty,
-/// because its pair soon fails.
-fn estimated_bytes(
+/// Estimates the memory in bytes that mesh and print of a pair need if it continues at stage `from`. A missing file counts
+/// as empty, because its pair soon fails.
+fn input_bytes(
     project: &Project,
     pair: &PairAttributes,
     from: Stage,
@@ -112,7 +131,7 @@ fn estimated_bytes(
         }
         Stage::Register => 0,
     };
-    PAIR_BYTES.saturating_add(mesh).saturating_add(print)
+    mesh.saturating_add(print)
 }
 
 /// Estimates the memory in bytes for a mesh that is read as a whole.
@@ -154,10 +173,15 @@ fn extension(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, estimated_bytes, print_bytes};
-    use crate::tests::values;
+    use super::{
+        EstimatedPair, MAP_PIXEL_BYTES, MemoryBudget, PAIR_BYTES, PIXEL_BYTES, input_bytes,
+        map_bytes, print_bytes,
+    };
     use mocban_core::domain::Stage;
     use mocban_core::raster;
+    use crate::input_reads::ReadItem as _;
+    use crate::tests::values;
+    use mocban_align::stages::depth::{DepthParams, ResolutionBy};
     use mocban_store::{Input, Project};
 
     #[test]
@@ -208,8 +232,7 @@ mod tests {
             max_pixels: 10,
             ..raster::ImageLimits::SUGGESTED
         };
-        let from =
-            |stage, limits| estimated_bytes(&project, &attributes, stage, limits) - PAIR_BYTES;
+        let from = |stage, limits| input_bytes(&project, &attributes, stage, limits);
         let print = 100 * 8 * 50 + 100;
         assert_eq!(
             from(Stage::Fit, &raster::ImageLimits::SUGGESTED),
@@ -221,5 +244,35 @@ mod tests {
         );
         assert_eq!(from(Stage::Normalize, &few), 10 * 50 + 100);
         assert_eq!(from(Stage::Register, &few), 0);
+    }
+
+    #[test]
+    fn the_estimate_follows_the_size_of_the_depth_map() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let estimate = |depth: &DepthParams| {
+            let pair = EstimatedPair {
+                project: Project::create(dir.path()).expect("a project"),
+                attributes: values::pair_attributes("none.obj", "none.jpg"),
+                from: Stage::Register,
+                limits: raster::ImageLimits::SUGGESTED,
+                map_bytes: map_bytes(depth),
+            };
+            pair.read()
+        };
+        let by_side = |longest_px| DepthParams {
+            resolution_by: ResolutionBy::LongestSide,
+            longest_px,
+            px_per_mm: 40.0,
+        };
+        for (longest_px, pixels) in [(512, 512_u64.pow(2)), (16_384, 1 << 28)] {
+            let more = (pixels - 512 * 512) * MAP_PIXEL_BYTES;
+            assert_eq!(estimate(&by_side(longest_px)), PAIR_BYTES + more);
+        }
+        let by_mm = DepthParams {
+            resolution_by: ResolutionBy::PxPerMm,
+            ..by_side(512)
+        };
+        let more = (2003_u64.pow(2) - 512 * 512) * MAP_PIXEL_BYTES;
+        assert_eq!(estimate(&by_mm), PAIR_BYTES + more);
     }
 }

@@ -13,7 +13,7 @@ pub struct RunOptions {
     /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
     /// Memory limit in bytes for a block and all pairs computed at the same time. Their memory is estimated from the
-    /// file size of the mesh and the pixel count of print or page. One that exceeds the limit runs alone. `None` means
+    /// file size of the mesh, the pixel count of print or page, and the size of depth maps in the settings. One that exceeds the limit runs alone. `None` means
     /// no limit.
     pub memory: Option<u64>,
     /// What to do besides computing.

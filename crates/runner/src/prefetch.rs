@@ -11,7 +11,7 @@ use super::claim_size::{CLAIM_AHEAD, DurationEstimate, FETCH_AHEAD, Load};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::input_reads::{ReadLimits, read_each};
-use super::memory_budget::{EstimatedPair, MemoryBudget, PAIR_BYTES};
+use super::memory_budget::{EstimatedPair, MemoryBudget};
 use super::options::RunOptions;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
@@ -316,11 +316,12 @@ impl Prefetch {
         };
         let estimates = estimates.into_iter().chain(std::iter::repeat(None));
         let leased = leased.into_iter().zip(estimates);
+        let map_bytes = self.context.executor.map_bytes();
         self.queue
             .extend(leased.map(|((lease, work), bytes)| LeasedPair {
                 lease,
                 work,
-                bytes: bytes.unwrap_or(PAIR_BYTES),
+                bytes: bytes.unwrap_or(map_bytes),
             }));
     }
 
@@ -336,6 +337,7 @@ impl Prefetch {
             attributes: work.attributes.clone(),
             from: lease.cursor(),
             limits: self.image_limits,
+            map_bytes: self.context.executor.map_bytes(),
         });
         let estimated: Vec<_> = estimated.take_while(|_| is_needed).collect();
         let others = vec![Some(0); leased.len() - estimated.len()];

@@ -5,6 +5,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::block_size;
+use super::memory_budget::{self, PAIR_BYTES};
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
@@ -23,6 +24,11 @@ use mocban_store::Project;
 pub(super) trait StageExecutor: Send + Sync + 'static {
     /// Runs a stage, and leaves in the pair what later stages need.
     fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError>;
+
+    /// Returns the memory in bytes for the maps and masks of a pair.
+    fn map_bytes(&self) -> u64 {
+        PAIR_BYTES
+    }
 }
 
 /// Runs the stages of a project with its settings.
@@ -40,6 +46,10 @@ impl StageExecutor for PipelineExecutor {
             Stage::Normalize => self.normalize(pair),
             Stage::Register => self.register(pair),
         }
+    }
+
+    fn map_bytes(&self) -> u64 {
+        memory_budget::map_bytes(&self.settings.depth)
     }
 }
 

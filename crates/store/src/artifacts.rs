@@ -94,9 +94,14 @@ impl Project {
     /// Reads an artifact in the project's folder.
     fn read_local(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
         let path = self.local_path(artifact);
-        let (mut file, _) = open_regular(&path)?;
+        let (file, meta) = open_regular(&path)?;
+        if meta.len() != artifact.bytes {
+            return Err(ArtifactError::Changed(path));
+        }
         let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes)
+        // The file may still grow.
+        file.take(artifact.bytes)
+            .read_to_end(&mut bytes)
             .map_err(ArtifactError::io(&path))?;
         if ContentHash::of(&bytes) == artifact.hash {
             Ok(bytes)

@@ -167,15 +167,19 @@ impl Project {
     /// down to its file name. Returns the first existing path in the form in which it is stored.
     ///
     /// # Errors
-    /// Returns an error if the working directory is unknown, or the path is not UTF-8.
+    /// Returns an error if a path cannot be looked up for another reason than that it does not exist, the working directory
+    /// is unknown, or the path is not UTF-8.
     pub fn find_input(&self, stored: &str, folder: &Path) -> Result<Option<String>, StoreError> {
         let parts = Path::new(stored).components();
         let parts = parts.filter(|part| matches!(part, Component::Normal(_)));
         let parts: Vec<_> = parts.collect();
-        let mut paths =
-            (0..parts.len()).map(|first| folder.join(PathBuf::from_iter(&parts[first..])));
-        let found = paths.find(|path| path.exists());
-        found.map(|path| self.stored_path(&path)).transpose()
+        for first in 0..parts.len() {
+            let path = folder.join(PathBuf::from_iter(&parts[first..]));
+            if exists(&path).map_err(StoreError::io(&path))? {
+                return self.stored_path(&path).map(Some);
+            }
+        }
+        Ok(None)
     }
 
     /// Returns the form in which a path is stored. A path below a named root is stored relative to the root, and so is
@@ -209,6 +213,17 @@ impl Project {
     }
 }
 
+/// Returns whether a path exists. A path below a file, and one that no folder can hold, do not.
+fn exists(path: &Path) -> std::io::Result<bool> {
+    use std::io::ErrorKind::{InvalidFilename, NotADirectory, NotFound};
+    match std::fs::metadata(path) {
+        Err(error) if matches!(error.kind(), InvalidFilename | NotADirectory | NotFound) => {
+            Ok(false)
+        }
+        found => found.map(|_| true),
+    }
+}
+
 /// Returns the path relative to `dir` after links are resolved, or `None` if it does not exist or is not below `dir`.
 fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
@@ -234,6 +249,34 @@ mod tests {
         let stored = project.stored_path(&outside).expect("a path");
         assert_eq!(Path::new(&stored), outside);
         assert_eq!(project.input_path(&stored), outside);
+    }
+
+    #[test]
+    fn a_moved_input_is_found_by_the_end_of_its_path() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(&dir.path().join("project")).expect("a project");
+        let folder = project.dir().join("moved");
+        std::fs::create_dir_all(folder.join("b")).expect("a folder");
+        std::fs::write(folder.join("b/1.stl"), "x").expect("written");
+        let find = |stored: &str| project.find_input(stored, &folder).expect("looked up");
+        assert_eq!(find("/old/b/1.stl").as_deref(), Some("moved/b/1.stl"));
+        for missing in ["/old/c/1.stl", "1.stl/2.stl", &"n".repeat(300)] {
+            assert_eq!(find(missing), None);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_cannot_be_read_is_not_a_missing_input() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        let folder = dir.path().join("moved");
+        std::fs::create_dir(&folder).expect("a folder");
+        // Also fails for root, unlike a folder without permissions.
+        std::os::unix::fs::symlink("b", folder.join("b")).expect("a link to itself");
+        let error = project.find_input("/old/b/1.stl", &folder);
+        let text = error.expect_err("not readable").to_string();
+        assert!(text.contains("moved/b/1.stl: "), "{text}");
     }
 
     #[test]

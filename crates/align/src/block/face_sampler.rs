@@ -67,11 +67,32 @@ impl CarvedFace {
         let (left, top) = (x.floor(), y.floor());
         let (across, down) = ((x - left) as f32, (y - top) as f32);
         let (left, top) = (left as i64, top as i64);
+        // The largest integer wraps around to the smallest one: both are outside of the map.
+        let (right, bottom) = (left.wrapping_add(1), top.wrapping_add(1));
         [
             ([left, top], (1.0 - across) * (1.0 - down)),
-            ([left + 1, top], across * (1.0 - down)),
-            ([left, top + 1], (1.0 - across) * down),
-            ([left + 1, top + 1], across * down),
+            ([right, top], across * (1.0 - down)),
+            ([left, bottom], (1.0 - across) * down),
+            ([right, bottom], across * down),
         ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_world::TestWorld;
+
+    #[test]
+    fn points_far_away_and_points_that_are_no_numbers_have_no_height() {
+        let face = TestWorld::new(12).face();
+        assert!(face.height_at([40.0, 50.0]).is_some());
+        let far = i64::MAX as f64;
+        for odd in [1e300, -1e300, far, -far, f64::INFINITY, f64::NAN] {
+            for point in [[odd, 50.0], [40.0, odd], [odd, odd]] {
+                assert_eq!(face.height_at(point), None, "{point:?}");
+                assert_eq!(face.strokes_at(point), None, "{point:?}");
+                assert_eq!(face.mesh_point(point), None, "{point:?}");
+            }
+        }
     }
 }

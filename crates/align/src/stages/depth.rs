@@ -14,6 +14,8 @@ pub const REVISION: u32 = 5;
 
 /// Limit for the longest side of a depth map, in pixels. A square map of this size has 268 million pixels.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;
+/// Pixels of a side that are not covered by the scan.
+const BORDER_PX: f64 = 3.0;
 
 /// What sets the size of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,6 +37,27 @@ pub struct DepthParams {
     pub longest_px: u32,
     /// Pixels per millimetre, above 0.
     pub px_per_mm: f64,
+}
+
+impl DepthParams {
+    /// Returns the largest number of pixels of a map of a scan that is at most `longest_mm` long.
+    ///
+    /// ```
+    /// use mocban::stages::depth::{DepthParams, ResolutionBy};
+    ///
+    /// let by_side = DepthParams { resolution_by: ResolutionBy::LongestSide, longest_px: 512, px_per_mm: 10.0 };
+    /// assert_eq!(by_side.max_pixels(40.0), 512 * 512);
+    /// let by_mm = DepthParams { resolution_by: ResolutionBy::PxPerMm, ..by_side };
+    /// assert_eq!(by_mm.max_pixels(40.0), 403 * 403);
+    /// assert_eq!(by_mm.max_pixels(1e9), 16_384 * 16_384);
+    /// ```
+    pub fn max_pixels(&self, longest_mm: f64) -> u64 {
+        let longest_px = match self.resolution_by {
+            ResolutionBy::LongestSide => f64::from(self.longest_px),
+            ResolutionBy::PxPerMm => longest_mm * self.px_per_mm + BORDER_PX,
+        };
+        (longest_px.min(LONGEST_PX_LIMIT).ceil() as u64).pow(2)
+    }
 }
 
 /// Why the depth stage found no result.
@@ -145,7 +168,7 @@ fn longest_px(
         ResolutionBy::LongestSide => f64::from(params.longest_px),
         ResolutionBy::PxPerMm => {
             let mm = unit.ok_or(DepthError::UnitUnknown)?.mm();
-            (high[0] - low[0]).max(high[1] - low[1]) * mm * params.px_per_mm + 3.0
+            (high[0] - low[0]).max(high[1] - low[1]) * mm * params.px_per_mm + BORDER_PX
         }
     };
     if longest_px > LONGEST_PX_LIMIT {

@@ -2,7 +2,9 @@
 
 use crate::blocks::checkpoint::{self, BlockAttempt, fenced};
 use crate::blocks::model::{BlockFailure, BlockFailureAction, BlockLease};
+use crate::db::conn::Conn;
 use crate::db::query::query_scalar;
+use crate::queue::requeue::{RetrySelection, retry_pairs};
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, FailureClass, JobStatus};
 use mocban_system::failpoint::{self, Point};
@@ -79,26 +81,38 @@ impl Catalog {
         .await
     }
 
-    /// Makes failed blocks ready, and returns their number. Unknown names are ignored.
+    /// Makes failed pairs and blocks ready in one transaction, and returns the number of each. Unknown names of blocks
+    /// are ignored.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn retry_blocks(&self, selection: &BlockRetry) -> Result<u64> {
-        let (names, class) = match selection {
-            BlockRetry::All => (None, None),
-            BlockRetry::Class(class) => (None, Some(class.name())),
-            BlockRetry::Names(names) => {
-                let names: Vec<&str> = names.iter().map(BlockName::as_str).collect();
-                (Some(serde_json::to_string(&names)?), None)
-            }
-        };
+    /// Returns an error if a named pair does not exist, or if a database operation fails. In that case nothing changes.
+    pub async fn retry_pairs_and_blocks(
+        &self,
+        pairs: &RetrySelection,
+        blocks: &BlockRetry,
+    ) -> Result<[u64; 2]> {
+        let (pairs, blocks) = (pairs.clone(), blocks.clone());
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let retried = query_scalar(RETRY).bind(&names).bind(class);
-                let retried: Vec<BlockId> = retried.fetch_all(conn).await?;
-                Ok(retried.len() as u64)
+                let retried = retry_pairs(conn, &pairs).await?;
+                Ok([retried, retry_blocks(conn, &blocks).await?])
             })
         })
         .await
     }
+}
+
+/// Makes failed blocks ready, and returns their number.
+async fn retry_blocks(conn: &mut Conn, selection: &BlockRetry) -> Result<u64> {
+    let (names, class) = match selection {
+        BlockRetry::All => (None, None),
+        BlockRetry::Class(class) => (None, Some(class.name())),
+        BlockRetry::Names(names) => {
+            let names: Vec<&str> = names.iter().map(BlockName::as_str).collect();
+            (Some(serde_json::to_string(&names)?), None)
+        }
+    };
+    let retried = query_scalar(RETRY).bind(names).bind(class);
+    let retried: Vec<BlockId> = retried.fetch_all(conn).await?;
+    Ok(retried.len() as u64)
 }

@@ -72,17 +72,16 @@ impl Catalog {
         let mut conn = opened.map_err(unreadable)?;
         match identity(&mut conn).await {
             // Checked before anything is written, and in the backup itself, which the error then names.
-            Ok(Identity::Current) => schema::require_own(&mut conn, backup).await?,
+            Ok(Identity::Current) => {
+                let checked = schema::require_own(&mut conn, backup).await;
+                checked.map_err(|error| in_file(backup, error))?;
+            }
             Ok(Identity::Uninitialized) => return Err(CatalogError::Empty(backup.to_owned())),
             Ok(Identity::Other(number)) => return Err(wrong_identity(backup, number)),
-            Err(CatalogError::Database(error)) => return Err(unreadable(error)),
-            Err(error) => return Err(error),
+            Err(error) => return Err(in_file(backup, error)),
         }
         let copied = vacuum_into(&mut conn, file).await?;
-        copied.map_err(|error| match not_copied(file, error) {
-            CatalogError::Database(error) => unreadable(error),
-            error => error,
-        })?;
+        copied.map_err(|error| in_file(backup, not_copied(file, error)))?;
         conn.close().await.map_err(unreadable)?;
         let renewed = renew_identity(file).await;
         renewed.map_err(|error| disk_error(file, error))?;
@@ -164,10 +163,7 @@ async fn verify(file: &Path) -> Result<()> {
     let unreadable = |error| disk_error(file, error);
     let opened = options.read_only(true).immutable(true).connect().await;
     let mut copy = opened.map_err(unreadable)?;
-    let in_copy = |error| match error {
-        CatalogError::Database(error) => disk_error(file, error),
-        error => error,
-    };
+    let in_copy = |error| in_file(file, error);
     let found = identity(&mut copy).await.map_err(in_copy)?;
     let faults = integrity::integrity(&mut copy, true)
         .await
@@ -190,6 +186,14 @@ fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
         // The original may be damaged. The copy is verified later.
         Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => error.into(),
         _ => disk_error(file, error),
+    }
+}
+
+/// Names the file of an error of the database.
+fn in_file(file: &Path, error: CatalogError) -> CatalogError {
+    match error {
+        CatalogError::Database(error) => disk_error(file, error),
+        error => error,
     }
 }
 

@@ -131,16 +131,19 @@ impl Catalog {
     pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
         let selection = selection.clone();
         self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let failed = failed_jobs(conn, &selection).await?;
-                let same_stage = failed
-                    .iter()
-                    .filter_map(|job| Some((*job, job.key.stage()?)));
-                requeue(conn, &same_stage.collect::<Vec<_>>()).await
-            })
+            Box::pin(async move { retry_pairs(conn, &selection).await })
         })
         .await
     }
+}
+
+/// Requeues the selected pairs that failed or back off at the stage that failed, and returns their number.
+pub(crate) async fn retry_pairs(conn: &mut Conn, selection: &RetrySelection) -> Result<u64> {
+    let failed = failed_jobs(conn, selection).await?;
+    let same_stage = failed
+        .iter()
+        .filter_map(|job| Some((*job, job.key.stage()?)));
+    requeue(conn, &same_stage.collect::<Vec<_>>()).await
 }
 
 /// Returns an error unless the groups contain all jobs. A wrong counter could hide stale jobs.

@@ -5,12 +5,12 @@ use serde_json::json;
 use super::{World, register};
 use crate::{
     BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CutPair, CutReply, CutSummary,
-    DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy,
+    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CatalogError, CutPair, CutReply,
+    CutSummary, DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy, RetrySelection,
 };
 use mocban_core::domain::{
     ArtifactSet, BlockCharacterState, BlockName, BlockStage, BlockStageRecord, ContentHash,
-    Failure, FailureClass, WorkerId,
+    Failure, FailureClass, PairName, WorkerId,
 };
 
 pub(super) fn block(text: &str) -> BlockName {
@@ -330,11 +330,13 @@ async fn a_refused_block_stays_until_a_retry_or_another_page() {
         .fail_block(lease, refused)
         .await
         .expect("stored");
-    let retried = world
-        .catalog
-        .retry_blocks(&BlockRetry::Names(vec![block("b")]))
-        .await;
-    assert_eq!(retried.expect("a reply"), 1);
+    let names = BlockRetry::Names(vec![block("b")]);
+    let unknown = RetrySelection::Names(vec![PairName::new("none").expect("a name")]);
+    let refused = world.catalog.retry_pairs_and_blocks(&unknown, &names).await;
+    assert!(matches!(refused, Err(CatalogError::UnknownPair(_))));
+    let none = RetrySelection::Names(Vec::new());
+    let retried = world.catalog.retry_pairs_and_blocks(&none, &names).await;
+    assert_eq!(retried.expect("stored"), [0, 1]);
     assert_eq!(world.leased_block().await.0.attempt(), 1);
 }
 

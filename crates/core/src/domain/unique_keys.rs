@@ -5,6 +5,8 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
+use super::cancel::poll;
+
 /// End of the message about a key that an object has twice.
 pub const KEY_TWICE: &str = "is given twice";
 
@@ -21,6 +23,7 @@ pub struct UniqueKeys(pub Value);
 
 impl<'de> Deserialize<'de> for UniqueKeys {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        poll();
         deserializer.deserialize_any(ValueVisitor).map(Self)
     }
 }
@@ -87,6 +90,15 @@ mod tests {
     use serde_json::Value;
 
     use super::UniqueKeys;
+    use crate::domain::cancel::{CancelToken, Cancelled};
+
+    #[test]
+    fn parsing_is_cancelled() {
+        let text = format!("[{}0]", "[0],".repeat(99));
+        let parse = || serde_json::from_str::<UniqueKeys>(&text).is_ok();
+        assert_eq!(CancelToken::default().run(parse), Ok(true));
+        assert_eq!(CancelToken::cancelled_at(50).run(parse), Err(Cancelled));
+    }
 
     #[test]
     fn values_equal_those_of_the_plain_parser() {

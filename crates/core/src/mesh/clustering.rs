@@ -2,11 +2,14 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::triangle_mesh::Mesh;
+use super::robust_bounds::{Bounds, bulk_box, is_in_box};
+use super::triangle_mesh::{Mesh, Vertices};
 use crate::domain::cancel::polled;
 
-/// Cells along the longest side of the finest grid. Three coordinates of a cell fit into 64 bits.
+/// Cells along the longest side of the finest grid.
 const MAX_CELLS: u32 = 1 << 16;
+/// Bits of a coordinate of a cell. Three coordinates fit into 64 bits.
+const CELL_BITS: u32 = 21;
 
 impl Mesh {
     /// Returns a mesh of at most `max_elements` triangles, or points if it is a point set. Returns the mesh itself if
@@ -15,7 +18,8 @@ impl Mesh {
     /// The vertices in each cell of a cubic grid become one vertex at their mean (Rossignac and Borrel 1993). The grid is
     /// the finest that satisfies the limit. Triangles with two corners in one cell are removed, and of triangles with
     /// equal corners and winding, the first is kept. The result depends only on the mesh, lies within its bounding box,
-    /// and reaches each side of the box up to one cell.
+    /// and reaches each side of the box up to one cell. Specks far away keep their places and do not make the grid
+    /// coarser: its cells are chosen for the bulk of the mesh.
     ///
     /// ```
     /// use mocban_core::mesh::Mesh;
@@ -41,11 +45,12 @@ impl Mesh {
         if count <= max_elements {
             return self;
         }
-        // Coarser grids leave fewer elements, apart from effects of single cells.
-        let (mut fits, mut exceeds) = (1, MAX_CELLS + 1);
+        let bulk = bulk_bounds(&self.vertices);
+        // Coarser grids leave fewer elements, apart from effects of single cells. With 0 cells, all vertices merge.
+        let (mut fits, mut exceeds) = (0, MAX_CELLS + 1);
         while exceeds - fits > 1 {
             let middle = fits.midpoint(exceeds);
-            let cells = CellGrid::new(&self, middle).cells(&self);
+            let cells = CellGrid::new(bulk, middle).cells(&self);
             let left = if is_point_set {
                 polled(&cells).collect::<HashSet<_>>().len()
             } else {
@@ -57,7 +62,7 @@ impl Mesh {
                 exceeds = middle;
             }
         }
-        let cells = CellGrid::new(&self, fits).cells(&self);
+        let cells = CellGrid::new(bulk, fits).cells(&self);
         self.merged(&cells)
     }
 
@@ -116,39 +121,61 @@ fn smallest_first([a, b, c]: [u32; 3]) -> [u32; 3] {
     }
 }
 
-/// A cubic grid over the bounding box of a mesh.
+/// Returns the exact bounds of the vertices that are no specks.
+fn bulk_bounds(vertices: &Vertices) -> Bounds<3> {
+    let limits = match vertices {
+        Vertices::Single(all) => bulk_box(all),
+        Vertices::Double(all) => bulk_box(all),
+    };
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for vertex in polled(vertices.iter()).filter(|vertex| is_in_box(&limits, vertex)) {
+        for k in 0..3 {
+            bounds[0][k] = bounds[0][k].min(vertex[k]);
+            bounds[1][k] = bounds[1][k].max(vertex[k]);
+        }
+    }
+    bounds
+}
+
+/// A cubic grid over the bulk of a mesh, which continues outside of it.
 struct CellGrid {
-    low: [f64; 3],
+    bulk: Bounds<3>,
     cells_per_unit: f64,
     last: f64,
 }
 
 impl CellGrid {
-    /// Creates the grid with `count` cells along the longest side of the box.
-    fn new(mesh: &Mesh, count: u32) -> Self {
-        let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for vertex in polled(mesh.vertices.iter()) {
-            for k in 0..3 {
-                bounds[0][k] = bounds[0][k].min(vertex[k]);
-                bounds[1][k] = bounds[1][k].max(vertex[k]);
-            }
-        }
-        let [low, high] = bounds;
+    /// Creates the grid with `count` cells along the longest side of the bulk; 0 for one cell that holds everything.
+    fn new(bulk: Bounds<3>, count: u32) -> Self {
+        let [low, high] = bulk;
         let sides = [0, 1, 2].map(|k| high[k] - low[k]);
         let longest = sides.into_iter().fold(f64::MIN_POSITIVE, f64::max);
         Self {
-            low,
+            bulk,
             cells_per_unit: f64::from(count) / longest,
-            last: f64::from(count - 1),
+            last: f64::from(count.max(1) - 1),
         }
     }
 
-    /// Returns the cell of each vertex.
+    /// Returns the cell of each vertex. Specks that are further away than any cell share the outermost cells.
     fn cells(&self, mesh: &Mesh) -> Vec<u64> {
+        const MIDDLE: f64 = (1_u32 << (CELL_BITS - 1)) as f64;
+        if self.cells_per_unit == 0.0 {
+            return vec![0; mesh.vertices.len()];
+        }
+        let [low, high] = self.bulk;
         let cell = |vertex: [f64; 3]| {
             [0, 1, 2].into_iter().fold(0, |cell, k| {
-                let place = (vertex[k] - self.low[k]) * self.cells_per_unit;
-                (cell << 16) | place.clamp(0.0, self.last) as u64
+                let place = ((vertex[k] - low[k]) * self.cells_per_unit).floor();
+                // The upper border of the bulk belongs to its last cell.
+                let is_at_most_high = vertex[k] <= high[k];
+                let place = if is_at_most_high {
+                    place.min(self.last)
+                } else {
+                    place
+                };
+                let shifted = (place + MIDDLE).clamp(0.0, 2.0 * MIDDLE - 1.0) as u64;
+                (cell << CELL_BITS) | shifted
             })
         };
         polled(mesh.vertices.iter()).map(cell).collect()
@@ -206,6 +233,34 @@ mod tests {
             for k in 0..3 {
                 assert!(low[k] <= low_small[k] && low_small[k] <= low[k] + cell);
                 assert!(high_small[k] <= high[k] && high[k] - cell <= high_small[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_speck_far_away_makes_the_grid_no_coarser() {
+        let mesh = sheet(120);
+        for distance in [1e4, 1e9, 1e300] {
+            let mut with_speck = mesh.clone();
+            let speck = with_speck.vertices.len() as u32;
+            with_speck.vertices.push([-distance, distance, 3.0]);
+            with_speck.triangles.push([0, 1, speck]);
+            let small = with_speck.clone().clustered(3_000);
+            let count = small.triangles.len();
+            assert!((1_500..=3_000).contains(&count), "{count} at {distance}");
+            let points = Mesh {
+                triangles: Vec::new().into(),
+                ..with_speck
+            };
+            let cloud = points.clustered(3_000);
+            let count = cloud.vertices.len();
+            assert!((1_500..=3_000).contains(&count), "{count} at {distance}");
+            for small in [small, cloud] {
+                let [low, high] = bounds(&small);
+                assert_eq!((low[0], high[1]), (-distance, distance));
+                let in_sheet = |v: &[f64; 3]| v[0] >= -1e-9 && v[1] <= 119.0;
+                let others = small.vertices.iter().filter(|v| !in_sheet(v)).count();
+                assert_eq!(others, 1, "the speck keeps its place and no other moves");
             }
         }
     }

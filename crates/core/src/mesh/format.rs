@@ -42,7 +42,9 @@ impl DetectedFormat {
             FileKind::Text | FileKind::Binary => match first_words(bytes) {
                 Some(format) => Ok(format),
                 // A truncated binary STL with a text header cannot be recognised by its size, so the file name decides.
-                None if has_extension(name, "stl") && bytes.contains(&0) => Ok(Self::StlBinary),
+                None if has_extension(name, "stl") && text::contains(bytes, 0) => {
+                    Ok(Self::StlBinary)
+                }
                 None => Err(MeshError::NotAMesh(kind)),
             },
             _ => Err(MeshError::NotAMesh(kind)),
@@ -57,6 +59,7 @@ pub(super) fn has_extension(name: &str, wanted: &str) -> bool {
 }
 
 fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
+    let bytes = &bytes[..bytes.len().min(text::MAX_LINE_BYTES)];
     for (number, line) in text::lines(bytes).take(LINES_TRIED) {
         let mut words = text::words(line);
         let Some(first) = words.next() else { continue };

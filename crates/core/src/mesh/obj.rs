@@ -22,9 +22,10 @@ use crate::domain::cancel::polled;
 /// point set with all its vertices.
 ///
 /// # Errors
-/// Returns an error if the file exceeds the limits, a `v` or `f` line cannot be parsed, a face refers to a missing
+/// Returns an error if the file exceeds the limits, a line is too long, a `v` or `f` line cannot be parsed, a face refers to a missing
 /// vertex, or a used coordinate is not finite.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    text::check_lines(bytes)?;
     if let Some(parsed) = parser::parse(bytes, limits) {
         limits.check_vertices(parsed.vertices.len() as u64)?;
         limits.check_triangles(parsed.triangles.len() as u64)?;
@@ -34,6 +35,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     }
     let joined = join_continued_lines(bytes);
     let bytes = joined.as_deref().unwrap_or(bytes);
+    text::check_lines(bytes)?;
     let [vertices, triangles] = count(bytes);
     limits.check_vertices(vertices)?;
     limits.check_triangles(triangles)?;

@@ -1,16 +1,62 @@
 //! Lines, words and numbers of text formats, without copies.
 
-use crate::domain::cancel::polled;
+use super::error::MeshError;
+use crate::domain::cancel::{PollCounter, poll, polled};
+
+/// Longest line or word in bytes. Code that reads one takes a few milliseconds for it between two polls for a cancellation.
+pub(super) const MAX_LINE_BYTES: usize = 4 << 20;
+/// Bytes that are searched between two polls.
+const BYTES_PER_POLL: usize = 1 << 20;
 
 /// Returns the trimmed lines with their line numbers, counted from 1. Lines may end in LF or CRLF, or in CR if the file
 /// has no LF.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
-    // Files of classic Mac OS have carriage returns only.
-    let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-    polled(bytes.split(move |byte| *byte == end))
+    let end = line_end(bytes);
+    let mut counter = PollCounter::default();
+    bytes
+        .split(move |byte| *byte == end)
+        .inspect(move |line| counter.add(poll_items(line.len())))
         .map(<[u8]>::trim_ascii)
         .zip(1..)
         .map(|(line, number)| (number, line))
+}
+
+/// Returns the byte at the end of each line. Files of classic Mac OS have carriage returns only.
+fn line_end(bytes: &[u8]) -> u8 {
+    if contains(bytes, b'\n') { b'\n' } else { b'\r' }
+}
+
+/// Returns how many items of a [`PollCounter`] stand for a line of this length: about one for each microsecond.
+pub(super) fn poll_items(bytes: usize) -> u32 {
+    1 + (bytes / 256).min(1 << 16) as u32
+}
+
+/// Returns whether a text contains a byte.
+pub(super) fn contains(bytes: &[u8], wanted: u8) -> bool {
+    bytes.chunks(BYTES_PER_POLL).any(|part| {
+        poll();
+        part.contains(&wanted)
+    })
+}
+
+/// Checks that each line has at most [`MAX_LINE_BYTES`] bytes. Looks at few bytes of a file with short lines.
+///
+/// # Errors
+/// Returns an error that names the first longer line.
+pub(super) fn check_lines(bytes: &[u8]) -> Result<(), MeshError> {
+    let end = line_end(bytes);
+    let mut rest = bytes;
+    while let Some(window) = rest.get(..=MAX_LINE_BYTES) {
+        poll();
+        let Some(last) = window.iter().rposition(|byte| *byte == end) else {
+            let before = &bytes[..bytes.len() - rest.len()];
+            let line = polled(before).filter(|byte| **byte == end).count() as u64 + 1;
+            let reason = format!("it has more than {MAX_LINE_BYTES} bytes");
+            return Err(MeshError::Line { line, reason });
+        };
+        rest = &rest[last + 1..];
+    }
+    Ok(())
 }
 
 /// Returns the words between white space.
@@ -52,7 +98,59 @@ pub(super) fn sanitize(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{quote, sanitize};
+    use super::{MAX_LINE_BYTES, check_lines, lines, quote, sanitize};
+    use crate::domain::cancel::{CancelToken, Cancelled};
+    use crate::mesh::{MeshLimits, read};
+
+    #[test]
+    fn lines_are_limited_and_long_ones_are_polled() {
+        let longest = [vec![b'#'; MAX_LINE_BYTES], b"\n".to_vec()].concat();
+        let short = b"v 0 0 0\n".repeat(3);
+        for end in [b'\n', b'\r'] {
+            let with_end = |mut text: Vec<u8>| {
+                for byte in text.iter_mut().filter(|byte| **byte == b'\n') {
+                    *byte = end;
+                }
+                text
+            };
+            let whole = with_end([&short[..], &longest, &longest, &short].concat());
+            assert_eq!(check_lines(&whole), Ok(()));
+            let long = with_end([&short[..], &longest, b"#", &longest].concat());
+            let error = check_lines(&long).expect_err("too long").to_string();
+            assert_eq!(error, "line 5: it has more than 4194304 bytes");
+        }
+        let many = longest.repeat(9);
+        // The search for the end of lines polls 5 times, and each line once.
+        let token = CancelToken::cancelled_at(12);
+        assert_eq!(token.run(|| lines(&many).count()), Err(Cancelled));
+    }
+
+    #[test]
+    fn a_huge_line_is_refused_in_every_text_format() {
+        let huge = "7".repeat(MAX_LINE_BYTES + 9);
+        let header = "format ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+            property float z\nend_header\n";
+        for (name, text, place) in [
+            ("a.obj", format!("v 0 0 0\n# {huge}\n"), "line 2: "),
+            ("a.xyz", format!("0 0 0\n# {huge}\n"), "line 2: "),
+            ("a.stl", format!("solid\nfacet {huge}\n"), "line 2: "),
+            ("a.ply", format!("ply\n{header}0 0 {huge}\n"), "vertex 1: "),
+        ] {
+            let limits = MeshLimits::SUGGESTED;
+            let error = read(text.as_bytes(), name, &limits).expect_err("too long");
+            let said = error.to_string();
+            let is_short = said.len() < 200;
+            assert!(
+                is_short && said.contains("more than 4194304 bytes"),
+                "{said}"
+            );
+            assert!(said.contains(place), "{said}");
+        }
+        // Lines that are continued become one line.
+        let joined = format!("v 0 0 0\n# {}\n", "x \\\n".repeat(MAX_LINE_BYTES / 4 + 9));
+        let error = read(joined.as_bytes(), "a.obj", &MeshLimits::SUGGESTED).expect_err("too long");
+        assert!(error.to_string().starts_with("line 2: "), "{error}");
+    }
 
     #[test]
     fn quoted_words_are_sanitized_and_short() {

@@ -8,6 +8,7 @@ const SHORTEST_LINE: usize = 6;
 /// Reads the positions and ignores further columns such as normals and colours. Numbers may be separated by white
 /// space, commas or semicolons. The first line may be the number of points or the names of the columns.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    text::check_lines(bytes)?;
     let mut vertices = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
     let mut first = true;
     for (line_number, line) in text::lines(bytes) {

@@ -2,7 +2,11 @@
 
 use super::warp_mask::warp_level_sets;
 use super::{Grid, Mask};
+use crate::domain::cancel::poll;
 use crate::domain::{Affine2, DepthScale};
+
+/// Levels that are copied between two polls for a cancellation.
+const LEVELS_PER_POLL: usize = 1 << 16;
 
 /// A 16-bit depth map. Level 0 means no data. Levels 1..=65535 are linear in height.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,8 +28,12 @@ impl DepthMap {
 
     /// Returns the levels of all pixels with data, row by row.
     pub fn valid_levels(&self) -> Vec<u16> {
-        let levels = self.levels.data().iter().copied();
-        levels.filter(|level| *level > 0).collect()
+        let mut valid = Vec::new();
+        for part in self.levels.data().chunks(LEVELS_PER_POLL) {
+            poll();
+            valid.extend(part.iter().copied().filter(|level| *level > 0));
+        }
+        valid
     }
 
     /// Returns the stroke mask at a threshold: the pixels whose level is at least `level`. Pixels without data are never

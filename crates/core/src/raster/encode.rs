@@ -1,15 +1,45 @@
 //! Encodes and decodes artifacts as lossless PNG, and encodes images for viewing as JPEG. Equal grids give equal bytes.
 
-use std::io::Cursor;
+use std::io::{Cursor, Write as _};
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
 use super::{Grid, Mask};
+use crate::domain::cancel::{PolledReader, poll};
+
+/// Most pixels of a map that is read back: 16,384 x 16,384. No stage makes a larger one.
+const MAX_MAP_PIXELS: u64 = 1 << 28;
+/// Most pixels of a mask that is read back. Masks have the size of prints, which `limits.image.max_pixels` limits to this.
+const MAX_MASK_PIXELS: u64 = 1_000_000_000;
+/// Most bytes that one byte of a PNG decodes to: the highest ratio of deflate (RFC 1951).
+const MAX_DEFLATE_RATIO: u64 = 1032;
 
 /// Why an artifact could not be read back.
 #[derive(Debug, thiserror::Error)]
 pub enum PngError {
+    /// More pixels than any map or mask has.
+    #[error(
+        "the PNG is {width} x {height} pixels, and the largest that a stage stores has {limit} pixels"
+    )]
+    TooLarge {
+        /// Columns in the header.
+        width: u32,
+        /// Rows in the header.
+        height: u32,
+        /// Largest number of pixels.
+        limit: u64,
+    },
+    /// More pixels than a file of this length can hold.
+    #[error("the PNG of {bytes} bytes is too short for its {width} x {height} pixels")]
+    TooShort {
+        /// Columns in the header.
+        width: u32,
+        /// Rows in the header.
+        height: u32,
+        /// Length of the file.
+        bytes: usize,
+    },
     /// Not a complete PNG.
     #[error("the PNG is damaged: {0}")]
     Damaged(#[from] png::DecodingError),
@@ -41,7 +71,11 @@ pub enum PngError {
 /// # Panics
 /// Panics if the grid has no pixels, as every encoder of this module does. Every stage produces grids with pixels.
 pub fn png_grey16(grid: &Grid<u16>) -> Vec<u8> {
-    let samples: Vec<u8> = grid.data().iter().flat_map(|v| v.to_be_bytes()).collect();
+    let mut samples = Vec::with_capacity(2 * grid.data().len());
+    for part in grid.data().chunks(SAMPLES_PER_POLL) {
+        poll();
+        samples.extend(part.iter().flat_map(|v| v.to_be_bytes()));
+    }
     png_of(
         grid,
         png::ColorType::Grayscale,
@@ -113,6 +147,14 @@ pub fn jpeg_rgb8(grid: &Grid<[u8; 3]>, quality: u8) -> Vec<u8> {
     out
 }
 
+/// Images of at least this many bytes are encoded row by row, so that a cancellation is noticed. 4 MiB take about 6 ms, and
+/// 30 ms with [`compact_rgb8`].
+const STREAMED_BYTES: usize = 4 << 20;
+/// Samples that are converted between two polls for a cancellation.
+const SAMPLES_PER_POLL: usize = 1 << 16;
+/// Length of the chunks of such images.
+const STREAMED_CHUNK: usize = 1 << 20;
+
 fn png_of<T: Copy>(
     grid: &Grid<T>,
     color: png::ColorType,
@@ -139,7 +181,16 @@ fn encode<T: Copy>(
     encoder
         .write_header()
         .and_then(|mut writer| {
-            writer.write_image_data(samples)?;
+            if samples.len() < STREAMED_BYTES {
+                writer.write_image_data(samples)?;
+            } else {
+                let mut rows = writer.stream_writer_with_size(STREAMED_CHUNK)?;
+                for row in samples.chunks(samples.len() / grid.height()) {
+                    poll();
+                    rows.write_all(row)?;
+                }
+                rows.finish()?;
+            }
             writer.finish()
         })
         .expect("a grid with pixels is written to memory");
@@ -153,7 +204,11 @@ fn encode<T: Copy>(
 pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, PngError> {
     let (width, height, samples) = grey_samples(bytes, png::BitDepth::Sixteen)?;
     let (pairs, _) = samples.as_chunks::<2>();
-    let levels = pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+    let mut levels = Vec::with_capacity(pairs.len());
+    for part in pairs.chunks(SAMPLES_PER_POLL) {
+        poll();
+        levels.extend(part.iter().map(|pair| u16::from_be_bytes(*pair)));
+    }
     Ok(Grid::from_vec(width, height, levels).expect("two bytes for each pixel"))
 }
 
@@ -181,8 +236,9 @@ pub fn decode_mask(bytes: &[u8]) -> Result<Mask, PngError> {
 /// Decodes a grey PNG of the given bit depth. Returns its width, height and bytes.
 fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec<u8>), PngError> {
     let wanted = depth as u8;
-    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
+    let mut reader = png::Decoder::new(PolledReader(Cursor::new(bytes))).read_info()?;
     let info = reader.info();
+    check_size([info.width, info.height], wanted, bytes.len())?;
     let (width, height) = (info.width as usize, info.height as usize);
     if info.color_type != png::ColorType::Grayscale || info.bit_depth != depth {
         return Err(PngError::Kind {
@@ -197,14 +253,40 @@ fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec
     Ok((width, height, samples))
 }
 
+/// Checks the size in the header before memory is allocated for it.
+fn check_size([width, height]: [u32; 2], bits: u8, bytes: usize) -> Result<(), PngError> {
+    let pixels = u64::from(width) * u64::from(height);
+    let limit = if bits == 8 {
+        MAX_MASK_PIXELS
+    } else {
+        MAX_MAP_PIXELS
+    };
+    if pixels > limit {
+        return Err(PngError::TooLarge {
+            width,
+            height,
+            limit,
+        });
+    }
+    if pixels * u64::from(bits / 8) > MAX_DEFLATE_RATIO * bytes as u64 {
+        return Err(PngError::TooShort {
+            width,
+            height,
+            bytes,
+        });
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::{
-        PngError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
-        png_mask, png_rgb8,
+        PngError, STREAMED_BYTES, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
+        png_grey16, png_mask, png_rgb8,
     };
+    use crate::domain::cancel::{CancelToken, Cancelled};
     use crate::raster::{Grid, ImageLimits, Mask, decode};
 
     #[test]
@@ -230,6 +312,46 @@ mod tests {
             picture.rgb,
             grid.map(|c| c.map(|value| u16::from(value) * 257))
         );
+    }
+
+    #[test]
+    fn large_images_are_read_back_exactly_and_their_encoding_is_cancelled() {
+        let noise = |x: usize, y: usize| (x * 40_503) as u16 ^ (y * 30_011) as u16;
+        let wide = Grid::from_fn(2000, 1100, noise);
+        assert!(2 * wide.data().len() >= STREAMED_BYTES);
+        let png = png_grey16(&wide);
+        assert_eq!(decode_grey16(&png).expect("reads"), wide);
+        let token = CancelToken::cancelled_at(500);
+        assert_eq!(token.run(|| png_grey16(&wide)), Err(Cancelled));
+        let token = CancelToken::cancelled_at(50);
+        assert_eq!(token.run(|| decode_grey16(&png).is_ok()), Err(Cancelled));
+    }
+
+    #[test]
+    fn a_forged_size_is_refused_before_memory_is_allocated() {
+        let forged = |width, height| {
+            let mut out = Vec::new();
+            let mut encoder = png::Encoder::new(&mut out, width, height);
+            encoder.set_depth(png::BitDepth::Sixteen);
+            let mut writer = encoder.write_header().expect("writes");
+            writer
+                .write_chunk(png::chunk::IDAT, &[0x78, 1, 3, 0])
+                .expect("writes");
+            drop(writer);
+            let error = decode_grey16(&out).expect_err("refused").to_string();
+            (error, out.len())
+        };
+        assert_eq!(
+            forged(60_000, 60_000).0,
+            "the PNG is 60000 x 60000 pixels, and the largest that a stage stores has 268435456 pixels"
+        );
+        let (error, bytes) = forged(16_384, 16_384);
+        assert_eq!(
+            error,
+            format!("the PNG of {bytes} bytes is too short for its 16384 x 16384 pixels")
+        );
+        let flat = Grid::new(3000, 2000, 7_u16);
+        assert_eq!(decode_grey16(&png_grey16(&flat)).expect("reads"), flat);
     }
 
     #[test]

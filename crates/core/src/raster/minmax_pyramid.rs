@@ -1,6 +1,7 @@
 //! Min-max pyramid: bounds of the values in any box of a grid in constant time.
 
 use super::Grid;
+use crate::domain::cancel::poll;
 
 /// Side of the finest cells, in pixels. It doubles at each level.
 const FINEST_CELL_PX: usize = 4;
@@ -17,6 +18,7 @@ impl<T: Copy + Ord> MinMaxPyramid<T> {
         let [across, down] = size.map(|side| side.div_ceil(FINEST_CELL_PX));
         let mut cells = Vec::with_capacity(across * down);
         for y in 0..down {
+            poll();
             let last = ((y + 1) * FINEST_CELL_PX).min(size[1]);
             let mut lowest = values.row(y * FINEST_CELL_PX).to_vec();
             let mut highest = lowest.clone();

@@ -113,6 +113,9 @@ impl Supersampler {
         rows: &Range<usize>,
     ) -> [[i64; 2]; 2] {
         const SLACK: f64 = 1e-6;
+        // No grid reaches as far, and sums of such numbers do not overflow.
+        const FAR: f64 = (1_u64 << 52) as f64;
+        let floor = |value: f64| floor(value.clamp(-FAR, FAR));
         let ends = |range: &Range<usize>| [range.start as f64, range.end as f64 - 1.0];
         let ([left, right], [top, bottom]) = (ends(columns), ends(rows));
         let middle = [f64::midpoint(left, right), f64::midpoint(top, bottom)];
@@ -126,10 +129,11 @@ impl Supersampler {
     }
 }
 
-/// Rounds down by a cast and a comparison, because `f64::floor` would be a function call.
+/// Rounds down by a cast and a comparison, because `f64::floor` would be a function call. Values below the range of the
+/// integers wrap around to the largest one, which is also outside of every grid.
 fn floor(value: f64) -> i64 {
     let cut = value as i64;
-    cut - i64::from(cut as f64 > value)
+    cut.wrapping_sub(i64::from(cut as f64 > value))
 }
 
 /// Returns the values of the four pixels around a position, and the position's offset from the upper left one, 0..1.
@@ -141,13 +145,16 @@ pub(super) fn bilinear_cell<T: Copy + Default>(
 ) -> ([T; 4], [f64; 2]) {
     let (x0, y0) = (floor(x), floor(y));
     let width = values.width();
-    let is_inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
+    let is_inside = |i: i64, side: usize| i >= 0 && i < side as i64 - 1;
     let near = if is_inside(x0, width) && is_inside(y0, values.height()) {
         let from = &values.data()[y0 as usize * width + x0 as usize..][..width + 2];
         [from[0], from[1], from[width], from[width + 1]]
     } else {
-        [(0, 0), (1, 0), (0, 1), (1, 1)]
-            .map(|(dx, dy)| values.get(x0 + dx, y0 + dy).unwrap_or_default())
+        // The largest integer wraps around to the smallest one: both are outside.
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| {
+            let (x, y) = (x0.wrapping_add(dx), y0.wrapping_add(dy));
+            values.get(x, y).unwrap_or_default()
+        })
     };
     (near, [x - x0 as f64, y - y0 as f64])
 }
@@ -179,4 +186,46 @@ pub(super) fn interpolate([a, b, c, d]: [f64; 4], [fx, fy]: [f64; 2]) -> f64 {
 pub(super) fn bilinear_weights([fx, fy]: [f64; 2]) -> [f64; 4] {
     let (left, above) = (1.0 - fx, 1.0 - fy);
     [left * above, fx * above, left * fy, fx * fy]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Supersampler, bilinear_cell};
+    use crate::domain::Affine2;
+    use crate::raster::Grid;
+
+    const EXTREMES: [f64; 6] = [
+        1e300,
+        -1e300,
+        i64::MAX as f64,
+        i64::MIN as f64,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+
+    #[test]
+    fn positions_far_away_have_no_pixels_around_them() {
+        let grid = Grid::new(3, 2, 7_u8);
+        for far in EXTREMES {
+            for place in [[far, 0.5], [0.5, far], [far, far]] {
+                assert_eq!(bilinear_cell(&grid, place).0, [0; 4], "{place:?}");
+            }
+        }
+        // Not a number counts as 0, and the offset is not a number either.
+        let (_, within) = bilinear_cell(&grid, [f64::NAN, 0.5]);
+        assert!(within[0].is_nan());
+    }
+
+    #[test]
+    fn bounds_of_extreme_maps_hold_every_grid_that_their_samples_may_meet() {
+        for far in EXTREMES {
+            let shifted = Supersampler::new(&Affine2([[1.0, 0.0, far], [0.0, 1.0, 0.0]]));
+            let [[first, last], [top, bottom]] = shifted.source_bounds(&(0..4), &(0..4));
+            assert!(last < 0 || first > 1 << 40, "{far}: {first}..={last}");
+            assert!(top <= 0 && bottom >= 3, "{far}: {top}..={bottom}");
+        }
+        let scaled = Supersampler::new(&Affine2([[1e300, 0.0, -1e300], [0.0, 1.0, 0.0]]));
+        let [[first, last], _] = scaled.source_bounds(&(0..4), &(0..4));
+        assert!(first < -(1 << 40) && last > 1 << 40, "{first}..={last}");
+    }
 }

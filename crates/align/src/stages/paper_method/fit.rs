@@ -124,7 +124,9 @@ fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -
         }
         let [i, j, k] = cell(&p);
         let crowded = (-1..=1)
-            .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c])))
+            .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [a, b, c])))
+            // Specks may be further away than the largest number of a cell; their neighbours are of no importance.
+            .map(|[a, b, c]| [i.wrapping_add(a), j.wrapping_add(b), k.wrapping_add(c)])
             .filter_map(|c| near.get(&c))
             .flatten()
             .any(|q| (Vector3::from(*q) - Vector3::from(p)).norm() <= spacing);

@@ -37,7 +37,7 @@ pub(super) struct ParsedObj {
 /// contains an invalid number or index.
 pub(super) fn parse(bytes: &[u8], limits: &MeshLimits) -> Option<ParsedObj> {
     // Lines of classic Mac OS end in a carriage return only.
-    if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
+    if !text::contains(bytes, b'\n') && text::contains(bytes, b'\r') {
         return None;
     }
     let mut vertices: PageVec<[f64; 3]> = PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX);
@@ -48,7 +48,7 @@ pub(super) fn parse(bytes: &[u8], limits: &MeshLimits) -> Option<ParsedObj> {
     };
     let mut counter = PollCounter::default();
     while !cursor.rest.is_empty() && limits.allow(vertices.len(), triangles.len()) {
-        counter.tick();
+        let before = cursor.rest.len();
         cursor.skip_space();
         match cursor.rest {
             [b'v', space, rest @ ..] if is_space(*space) => {
@@ -62,6 +62,7 @@ pub(super) fn parse(bytes: &[u8], limits: &MeshLimits) -> Option<ParsedObj> {
             _ => {}
         }
         cursor.next_line()?;
+        counter.add(text::poll_items(before - cursor.rest.len()));
     }
     Some(ParsedObj {
         vertices,

@@ -2,7 +2,7 @@
 
 use super::header::{PlyElement, PlyHeader, PlyScalar, PlyType};
 use super::source::{BodyFault, NumberSource};
-use crate::domain::cancel::PollCounter;
+use crate::domain::cancel::{PollCounter, polled};
 use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
@@ -36,7 +36,7 @@ pub(super) fn read(
     // Some programs end the file with a line break or fill its last block.
     let is_padding = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
     let rest = body.source.rest();
-    if !rest.iter().all(is_padding) {
+    if !polled(rest).all(is_padding) {
         return Err(MeshError::BytesAfterRows {
             format: header.encoding.name(),
             bytes: rest.len() as u64,

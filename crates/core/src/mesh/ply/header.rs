@@ -164,10 +164,11 @@ impl PlyHeader {
         let mut encoding = None;
         let mut elements = Vec::new();
         let mut at = 0;
-        while let Some((line, next)) = line_at(bytes, at) {
+        let head = &bytes[..bytes.len().min(MAX_HEADER_BYTES + 1)];
+        while let Some((line, next)) = line_at(head, at) {
             at = next;
             if at > MAX_HEADER_BYTES {
-                return Err(header_error("it is longer than 1 MiB"));
+                break;
             }
             let words: Vec<&[u8]> = text::words(line).collect();
             match words.as_slice() {
@@ -191,7 +192,11 @@ impl PlyHeader {
                 }
             }
         }
-        Err(header_error("the file ends before end_header"))
+        Err(header_error(if head.len() > MAX_HEADER_BYTES {
+            "it is longer than 1 MiB"
+        } else {
+            "the file ends before end_header"
+        }))
     }
 
     /// Returns whether 32-bit floats represent all vertices of a binary body exactly. Returns `false` for text.

@@ -15,7 +15,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     let (header, start) = PlyHeader::parse(bytes)?;
     let rest = &bytes[start..];
     match header.encoding {
-        PlyEncoding::Ascii => body::read(&header, AsciiSource { rest }, limits),
+        PlyEncoding::Ascii => body::read(&header, AsciiSource::new(rest), limits),
         PlyEncoding::LittleEndian => body::read(&header, BinarySource::<false> { rest }, limits),
         PlyEncoding::BigEndian => body::read(&header, BinarySource::<true> { rest }, limits),
     }

@@ -1,7 +1,7 @@
 //! Readers of the numbers in a PLY body: words of text, or bytes in either byte order.
 
 use super::header::{PlyElement, PlyScalar};
-use crate::domain::cancel::polled;
+use crate::domain::cancel::{PollCounter, poll, polled};
 use crate::mesh::error::MeshError;
 use crate::mesh::text;
 
@@ -46,17 +46,48 @@ pub(super) trait NumberSource {
 
 /// Words between white space; rows need not be lines.
 pub(super) struct AsciiSource<'a> {
-    pub(super) rest: &'a [u8],
+    rest: &'a [u8],
+    counter: PollCounter,
+}
+
+impl<'a> AsciiSource<'a> {
+    /// Starts at the beginning of a body.
+    pub(super) fn new(rest: &'a [u8]) -> Self {
+        Self {
+            rest,
+            counter: PollCounter::default(),
+        }
+    }
+
+    /// Skips white space, part by part.
+    fn skip_space(&mut self) {
+        loop {
+            let part = &self.rest[..self.rest.len().min(text::MAX_LINE_BYTES)];
+            let space = part.len() - part.trim_ascii_start().len();
+            self.rest = &self.rest[space..];
+            if space == 0 || space < part.len() {
+                return;
+            }
+            poll();
+        }
+    }
 }
 
 impl NumberSource for AsciiSource<'_> {
     fn next(&mut self, _: PlyScalar) -> Result<f64, BodyFault> {
-        let rest = self.rest.trim_ascii_start();
-        let len = rest
+        self.skip_space();
+        let longest = self.rest.len().min(text::MAX_LINE_BYTES + 1);
+        let len = self.rest[..longest]
             .iter()
             .position(u8::is_ascii_whitespace)
-            .unwrap_or(rest.len());
-        let (word, rest) = rest.split_at(len);
+            .unwrap_or(longest);
+        if len > text::MAX_LINE_BYTES {
+            let longest = text::MAX_LINE_BYTES;
+            let reason = format!("a word has more than {longest} bytes");
+            return Err(BodyFault::Invalid(reason));
+        }
+        self.counter.add(text::poll_items(len));
+        let (word, rest) = self.rest.split_at(len);
         self.rest = rest;
         if word.is_empty() {
             return Err(BodyFault::End);

@@ -7,6 +7,7 @@ use crate::mesh::triangle_mesh::Mesh;
 
 /// Reads an ASCII STL with one or more solids. Loops of more than three corners are triangulated as fans.
 pub(crate) fn read_ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    text::check_lines(bytes)?;
     let mut parser = AsciiParser::default();
     for (line, content) in text::lines(bytes) {
         parser.line = line;

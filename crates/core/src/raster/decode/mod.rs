@@ -120,6 +120,8 @@ fn decode_pixels(
         return Err(DecodeError::Truncated(kind));
     }
     let orientation = orientation::of_decoder(&mut decoder);
+    // A JPEG is decoded in one call without a poll. Measured: 30 to 50 ns per pixel with the profile of tests, so at most
+    // 1.5 s for 30 million pixels, the default of `limits.image.max_pixels`.
     let pixels = DynamicImage::from_decoder(decoder).map_err(refused)?;
     Ok((pixels, orientation))
 }

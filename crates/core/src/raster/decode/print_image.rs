@@ -2,7 +2,7 @@
 
 use image::DynamicImage;
 
-use crate::domain::cancel::{poll, polled};
+use crate::domain::cancel::poll;
 use crate::raster::Grid;
 
 /// A print in 16-bit red, green and blue. Values of 8-bit files are multiplied by 257, so that white is always 65535.
@@ -27,6 +27,9 @@ pub(super) fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
     c.map(|c| ((u64::from(c) * a + FULL * (FULL - a) + FULL / 2) / FULL) as u16)
 }
 
+/// Rows that are converted between two polls for a cancellation.
+const BAND_ROWS: u32 = 16;
+
 const fn widen(value: u8) -> u16 {
     value as u16 * 257
 }
@@ -48,7 +51,14 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
             }
         }
         // The cost of a copy does not matter for other kinds (16 bits, transparency, floats in 0..=1), which are rare.
-        other => colours.extend(polled(other.to_rgba16().pixels()).map(|p| on_white(p.0))),
+        other => {
+            for top in (0..other.height()).step_by(BAND_ROWS as usize) {
+                poll();
+                let rows = BAND_ROWS.min(other.height() - top);
+                let band = other.crop_imm(0, top, other.width(), rows).to_rgba16();
+                colours.extend(band.pixels().map(|p| on_white(p.0)));
+            }
+        }
     }
     // An image of w x h pixels has as many colours.
     Grid::from_vec(width, height, colours).expect("one colour for each pixel")

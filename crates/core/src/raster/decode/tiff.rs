@@ -12,7 +12,7 @@ use super::print_image::on_white;
 use super::tiff_pages::TiffBytes;
 use super::{DecodeError, ImageLimits};
 use crate::domain::FileKind;
-use crate::domain::cancel::poll;
+use crate::domain::cancel::{PolledReader, poll};
 use crate::raster::Grid;
 
 /// Layout of the pixels according to the tags.
@@ -34,7 +34,7 @@ struct TiffLayout {
 
 impl TiffLayout {
     /// Reads the tags. Returns `None` if the image is not one of the uncommon kinds.
-    fn read(reader: &mut Decoder<Cursor<&[u8]>>) -> TiffResult<Option<Self>> {
+    fn read(reader: &mut Decoder<PolledReader<Cursor<&[u8]>>>) -> TiffResult<Option<Self>> {
         let (width, height) = reader.dimensions()?;
         let tag = reader.find_tag_unsigned(Tag::PhotometricInterpretation)?;
         let Some(photometric) = tag.and_then(Photometric::from_u16) else {
@@ -90,8 +90,8 @@ pub(super) fn decode_uncommon(
     limits: &ImageLimits,
 ) -> Result<Option<Grid<[u16; 3]>>, DecodeError> {
     // The common decoder reports faults of the tags.
-    let layout =
-        Decoder::new(Cursor::new(bytes)).and_then(|mut reader| TiffLayout::read(&mut reader));
+    let layout = Decoder::new(PolledReader(Cursor::new(bytes)))
+        .and_then(|mut reader| TiffLayout::read(&mut reader));
     let Ok(Some(layout)) = layout else {
         return Ok(None);
     };
@@ -150,7 +150,7 @@ impl TiffSamples {
             usize::try_from(limits.max_decoder_bytes()).unwrap_or(usize::MAX);
         memory.intermediate_buffer_size = memory.decoding_buffer_size;
         let mut values = DecodingResult::U8(Vec::new());
-        let read = Decoder::new(Cursor::new(bytes))
+        let read = Decoder::new(PolledReader(Cursor::new(bytes)))
             .and_then(|reader| reader.with_limits(memory).read_image_to_buffer(&mut values))
             .map_err(|error| tiff_error(&error))?;
         let pixel = if read.planes > 1 { 1 } else { layout.samples };
