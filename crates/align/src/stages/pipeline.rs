@@ -135,7 +135,7 @@ impl AlignedPair {
     ///
     /// # Examples
     /// ```
-    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.rs"));
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"));
     /// # use mocban_core::raster;
     /// # use mocban_demo as demo;
     /// # let settings = default_settings()?;

@@ -67,7 +67,7 @@ impl Settings {
     ///
     /// # Examples
     /// ```
-    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.rs"));
+    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"));
     /// use mocban_core::domain::Stage;
     ///
     /// let before = default_settings()?;

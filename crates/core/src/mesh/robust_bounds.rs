@@ -62,7 +62,7 @@ impl BulkRange {
         (self.least..=self.most).contains(&value)
     }
 
-    /// Of the values added so far, returns the lowest and the highest that belong to the bulk.
+    /// Returns the lowest and the highest of the values added so far that belong to the bulk.
     pub fn range(&self) -> [f32; 2] {
         [
             self.low.into_iter().fold(f32::INFINITY, f32::min),

@@ -66,7 +66,7 @@ const TOPS_AT_RIM: f64 = 0.6;
 ///
 /// # Examples
 /// ```
-/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.rs"));
+/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"));
 /// # use mocban_core::raster;
 /// # use mocban_demo as demo;
 /// # let settings = default_settings()?;
