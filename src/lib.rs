@@ -262,10 +262,10 @@
 //! (see `benches/queue/main.rs`), and `benches/queue/peers` has scripts for two queues on PostgreSQL.
 
 pub mod cli;
-pub mod config;
 pub mod documentation;
 pub use mocban_align::{block, stages};
 pub use mocban_catalog as catalog;
+pub use mocban_config as config;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
 pub use mocban_export as export;

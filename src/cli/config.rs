@@ -6,7 +6,7 @@ use serde_json::{Map, json};
 use super::context::Context;
 use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
-use crate::config::{Origin, Setting, explanation};
+use mocban_config::{Origin, Setting, explanation};
 
 /// Commands on settings.
 #[derive(Debug, Subcommand)]
@@ -93,7 +93,7 @@ fn line(setting: &Setting) -> String {
 #[cfg(test)]
 mod tests {
     use super::{ConfigShowArgs, Palette, as_toml};
-    use crate::config::{Origin, Setting};
+    use mocban_config::{Origin, Setting};
 
     #[test]
     fn output_is_a_settings_file() {

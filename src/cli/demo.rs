@@ -22,7 +22,7 @@ use super::run::{self, drive};
 use super::run_text;
 use super::screen::Palette;
 use super::table::count;
-use crate::config::{Origin, Tree};
+use mocban_config::{Origin, Tree};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
@@ -281,7 +281,7 @@ fn changed_settings(tree: &Tree) -> String {
 #[cfg(test)]
 mod tests {
     use super::changed_settings;
-    use crate::config::{BaseLayer, Preset, Sources, load};
+    use mocban_config::{BaseLayer, Preset, Sources, load};
 
     #[test]
     fn saved_settings_are_those_of_preset_and_flags() {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::exit::{ExitCode, Refusal};
 use super::time_text::local;
-use crate::config::ConfigError;
 use mocban_catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
+use mocban_config::ConfigError;
 use mocban_export::FolderError;
 use mocban_runner::RunError;
 use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 
 use super::exit::Refusal;
-use crate::config::Config;
 use mocban_catalog::Catalog;
+use mocban_config::Config;
 use mocban_core::domain::sanitize;
 use mocban_export::InputFileLimits;
 use mocban_store::{

@@ -11,8 +11,8 @@ use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::time_text::day;
 use super::{files, output};
-use crate::config::{self, Sources};
 use mocban_catalog::Catalog;
+use mocban_config::{self as config, Sources};
 use mocban_export::{GallerySelection, draw_gallery};
 use mocban_report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,

@@ -14,8 +14,8 @@ use super::error_text::describe;
 use super::exit::{ExitCode, Refusal};
 use super::files::{self, is_backup, metadata};
 use super::table::count;
-use crate::config::{LocalSettings, make_local};
 use mocban_catalog::Catalog;
+use mocban_config::{LocalSettings, make_local};
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
 };

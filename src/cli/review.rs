@@ -262,7 +262,7 @@ fn language_of_system() -> Option<Language> {
 #[cfg(test)]
 mod tests {
     use super::{QueueCounts, order, percent, progress, review_command};
-    use crate::config::{Sources, load};
+    use mocban_config::{Sources, load};
     use mocban_core::domain::ReviewOrder;
     use mocban_pages::review::key_map;
 

@@ -1,8 +1,8 @@
 //! Pairs and blocks named on the command line.
 
 use super::exit::Refusal;
-use crate::config::nearest;
 use mocban_catalog::Catalog;
+use mocban_config::nearest;
 use mocban_core::domain::{BlockName, PairName};
 use mocban_runner::NamedWork;
 

@@ -124,7 +124,7 @@ mod tests {
     use toml::{Table, Value};
 
     use super::{Config, Preset, Tree, read};
-    use crate::config::Origin;
+    use crate::Origin;
 
     fn keys(table: &Table, prefix: &str, into: &mut Vec<String>) {
         for (key, value) in table {

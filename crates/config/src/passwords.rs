@@ -45,7 +45,7 @@ fn contains_password(value: &Value) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{BaseLayer, Sources, load};
+    use crate::{BaseLayer, Sources, load};
 
     #[test]
     fn an_address_with_a_password_is_refused_in_every_layer_and_not_quoted() {

@@ -117,7 +117,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::{ASCENDING, Origin, RANGES, RangeInclusive, Tree, check, numbers, range_text};
-    use crate::config::{Preset, explanation};
+    use crate::{Preset, explanation};
 
     fn tree() -> Tree {
         Tree::new(Preset::Default.table().expect("valid TOML"))

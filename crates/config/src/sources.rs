@@ -29,8 +29,8 @@ impl Preset {
     /// Returns the TOML text, with a comment for each setting.
     pub const fn text(self) -> &'static str {
         match self {
-            Self::Default => include_str!("../../config/default.toml"),
-            Self::Paper => include_str!("../../config/paper.toml"),
+            Self::Default => include_str!("../../../config/default.toml"),
+            Self::Paper => include_str!("../../../config/paper.toml"),
         }
     }
 
