@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::input_paths::plain_letters;
-use mocban_config::nearest;
+use mocban_core::domain::spelling::nearest;
 use mocban_store::CATALOG_FILE;
 
 /// Largest number of entries of a folder that are read.

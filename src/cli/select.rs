@@ -2,7 +2,7 @@
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
-use mocban_config::nearest;
+use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName};
 use mocban_runner::NamedWork;
 

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::files::RefusedLine;
 use super::time_text::parse_utc;
 use mocban_catalog::{NewVerdict, ReviewContext};
-use mocban_config::hint;
+use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis};
 use mocban_lists::manifest::{LineCounter, as_utf8, delimiter};
 

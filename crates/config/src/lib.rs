@@ -12,7 +12,7 @@ mod sources;
 mod tree;
 
 pub use document::{Config, InputLimits, ReviewSettings, RunSettings, StorageSettings};
-pub use error::{ConfigError, Origin, hint, nearest};
+pub use error::{ConfigError, Origin};
 pub use local::{LocalSettings, make_local};
 pub use sources::{BaseLayer, Preset, Sources, explanation};
 pub use tree::{Setting, Tree};

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::error::{ConfigError, Origin, hint, quote};
+use super::error::{ConfigError, Origin, quote};
 use super::tree::Tree;
 use mocban_core::domain::enum_names;
+use mocban_core::domain::spelling::hint;
 use mocban_store::read_file_or_pipe;
 use mocban_system::platform::is_pipe;
 

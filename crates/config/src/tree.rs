@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use toml::{Table, Value};
 
-use super::error::{ConfigError, Origin, hint, quote};
+use super::error::{ConfigError, Origin, quote};
+use mocban_core::domain::spelling::hint;
 
 /// A table with names of the user's choice.
 const ROOTS: &str = "storage.roots";

@@ -26,6 +26,7 @@ mod print_outline;
 mod review_order;
 mod sanitize;
 mod seeded_random;
+pub mod spelling;
 mod stage;
 #[cfg(any(test, feature = "test-helpers"))]
 pub mod test_values;
