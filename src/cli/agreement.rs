@@ -1,7 +1,7 @@
 //! `agreement`: how reliable the reviewers are.
 
 use super::context::Context;
-use super::exit::ExitCode;
+use mocban_project::exit::ExitCode;
 use mocban_report as report;
 
 pub(super) async fn agreement(context: &Context) -> anyhow::Result<ExitCode> {

@@ -7,14 +7,14 @@ use clap::builder::{Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use super::context::shell_quoted;
 use super::examples::{with_examples, without_global_options};
-use super::exit::ExitCode;
 use super::global::Global;
 use super::{
     backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import, man,
     report, restore, retry, review, run, show, status, verdict, view, worker,
 };
+use mocban_project::exit::ExitCode;
+use mocban_project::shell::shell_quoted;
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///

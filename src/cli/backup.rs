@@ -1,24 +1,15 @@
-//! `backup`: copies catalog, verdicts and settings to one file. The copy is consistent even during a run.
+//! `backup`: copies catalog, verdicts and settings to one file.
 
-use std::fs::Metadata;
-use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::busy::Busy;
 use super::context::Context;
-use super::error_text::describe;
-use super::exit::{ExitCode, Refusal};
-use super::files::{self, is_backup, metadata};
 use super::table::count;
-use mocban_catalog::Catalog;
-use mocban_store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, rename_into_place,
-};
-use mocban_system::platform::stat;
+use mocban_project::backup::{self, Backup};
+use mocban_project::exit::ExitCode;
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
@@ -30,26 +21,16 @@ pub(super) struct BackupArgs {
 }
 
 pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
     let file = &args.file;
     let shown = file.display();
-    let failed = || format!("cannot write the backup {shown}");
-    check_target(file, &project)?;
-    files::refuse_missing_folder(file)?;
-    let _lock = TargetLock::acquire(file).with_context(failed)?;
-    let settings = files::small(&project.settings_path())?;
-    let staging = StagingFolder::beside(file).with_context(failed)?;
-    let copy = staging.path().join(CATALOG_FILE);
     let busy = Busy::start(context, "copying the catalog");
-    let copied = catalog.back_up(&copy, settings.as_deref()).await;
-    copied.with_context(failed)?;
-    catalog.close().await;
-    let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
+    let written = backup::backup(file, &context.location).await;
     drop(busy);
-    // Somebody may have created the file in the meantime.
-    check_target(file, &project)?;
-    rename_into_place(&copy, file).with_context(failed)?;
-    let bytes = std::fs::metadata(file).with_context(failed)?.len();
+    let Backup {
+        bytes,
+        pairs,
+        verdicts,
+    } = written?;
     // The verdicts have no file of their own.
     context.print_json(&json!({
         "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
@@ -62,57 +43,4 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         bytes as f64 / 1e6
     ));
     Ok(ExitCode::Done)
-}
-
-/// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
-pub(super) async fn count_rows(dir: &Path) -> anyhow::Result<(u64, u64)> {
-    let count = async {
-        let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;
-        let verdicts = catalog.verdict_log(None).await?.len() as u64;
-        let pairs = catalog.counters().await?.values().sum();
-        catalog.close().await;
-        Ok((pairs, verdicts))
-    };
-    count
-        .await
-        .map_err(|error: anyhow::Error| anyhow::anyhow!(describe(&error, dir)))
-}
-
-/// Refuses a target that exists and is not a backup.
-fn check_target(file: &Path, project: &Project) -> anyhow::Result<()> {
-    let shown = file.display();
-    let refuse = |reason: &str| Err(Refusal::Usage(format!("{shown} {reason}")).into());
-    let failed = || format!("cannot read {shown}");
-    let found = metadata(file).with_context(failed)?;
-    if file.file_name().is_none() || found.as_ref().is_some_and(Metadata::is_dir) {
-        return refuse("is a directory; name a file for the backup");
-    }
-    let is_named = |known: &str| file.file_name().is_some_and(|name| name == known);
-    // The parent of a bare file name is empty.
-    let parent = Path::new(".").join(file.parent().unwrap_or(file));
-    let here = is_same(&parent, project.dir())?;
-    if is_named(CATALOG_FILE) && (here || found.is_some())
-        || is_named(SETTINGS_FILE) && here
-        || is_same(file, &project.catalog_path())?
-    {
-        return refuse("is a file of a project; name another file for the backup");
-    }
-    match found {
-        None => Ok(()),
-        Some(meta) if meta.len() == 0 && meta.is_file() => Ok(()),
-        Some(_) if is_backup(file).with_context(failed)? => Ok(()),
-        Some(_) => refuse("exists and is not a backup; name another file"),
-    }
-}
-
-/// Returns whether two paths name the same existing file or folder.
-fn is_same(one: &Path, other: &Path) -> anyhow::Result<bool> {
-    let identity = |path: &Path| match stat(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        found => found
-            .map(|found| Some(found.id))
-            .with_context(|| format!("cannot read {}", path.display())),
-    };
-    let one = identity(one)?;
-    Ok(one.is_some() && one == identity(other)?)
 }

@@ -6,14 +6,14 @@ use serde_json::json;
 
 use super::busy::Busy;
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
-use super::files::{self, input_file_limits};
 use super::select;
 use super::table::count;
 use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
 use mocban_export::block_view::{BlockView, BlockViewError};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::{self, input_file_limits};
 use mocban_store::Project;
 
 /// What to draw of a block, and where to.

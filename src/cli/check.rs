@@ -9,13 +9,14 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::busy::Busy;
-use super::context::{Context, now};
-use super::error_text;
-use super::exit::ExitCode;
+use super::context::Context;
 use super::screen::{Palette, Tone};
 use super::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_core::domain::one_line;
+use mocban_project::error_text;
+use mocban_project::exit::ExitCode;
+use mocban_project::location::now;
 use mocban_runner::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };

@@ -3,8 +3,8 @@
 use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::exit::ExitCode;
 use super::output;
+use mocban_project::exit::ExitCode;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]

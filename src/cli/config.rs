@@ -4,9 +4,9 @@ use clap::{Args, Subcommand};
 use serde_json::{Map, json};
 
 use super::context::Context;
-use super::exit::ExitCode;
 use super::screen::{Palette, Tone};
 use mocban_config::{Origin, Setting, explanation};
+use mocban_project::exit::ExitCode;
 
 /// Commands on settings.
 #[derive(Debug, Subcommand)]

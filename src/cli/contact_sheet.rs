@@ -8,13 +8,13 @@ use serde_json::json;
 use super::block_sheet::{self, BlockSheetOptions};
 use super::busy::Busy;
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
-use super::files;
 use super::select;
 use super::table::count;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
 use mocban_export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files;
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]

@@ -3,22 +3,22 @@
 use std::ffi::OsString;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use serde::Serialize;
 use serde_json::json;
 
-use super::exit::{ExitCode, Refusal};
 use super::global::Global;
 use super::output;
 use super::screen::{Palette, Screen, Tone};
 use super::table::count;
 use mocban_catalog::{Catalog, SetApart};
-use mocban_config::{BaseLayer, ConfigError, Loaded, Sources, load};
-use mocban_core::domain::{UnixMillis, has_password, is_hidden};
+use mocban_config::Loaded;
+use mocban_project::exit::ExitCode;
+use mocban_project::location::Location;
+use mocban_project::shell::shell_quoted;
 use mocban_runner as runner;
-use mocban_store::{CATALOG_FILE, Project, ProjectStorage, SETTINGS_FILE, StorageOptions};
+use mocban_store::{Project, ProjectStorage};
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
 const MAX_LINE_CHARS: usize = 6000;
@@ -36,8 +36,8 @@ pub(super) struct Context {
     /// Colours of stderr.
     pub(super) stderr: Palette,
     program: String,
-    /// The settings, once they were loaded without an error.
-    settings: OnceLock<Loaded>,
+    /// The project.
+    pub(super) location: Location,
 }
 
 impl Context {
@@ -48,37 +48,46 @@ impl Context {
             stdout: Palette::choose(global.color, std::io::stdout().is_terminal()),
             stderr: Palette::choose(global.color, std::io::stderr().is_terminal()),
             program: program_name(program),
+            location: location(&global),
             global,
-            settings: OnceLock::new(),
         }
     }
 
     /// Returns the same context for another project directory.
     pub(super) fn at(&self, dir: &Path) -> Self {
-        let mut context = self.with_settings_unread();
+        let mut context = self.clone();
         context.global.directory = Some(dir.to_owned());
+        context.location = self.location.at(dir);
         context
     }
 
     /// Returns a copy without `--config` and `--set`, for use after their settings were saved in the project's file.
     pub(super) fn without_setting_flags(&self) -> Self {
-        let mut context = self.with_settings_unread();
+        let mut context = self.clone();
         context.global.config = None;
         context.global.set.clear();
+        context.location = self.location.with_saved_settings();
         context
-    }
-
-    fn with_settings_unread(&self) -> Self {
-        Self {
-            settings: OnceLock::new(),
-            ..self.clone()
-        }
     }
 
     /// Returns the project's directory, which need not exist.
     pub(super) fn dir(&self) -> PathBuf {
-        let dir = self.global.directory.clone();
-        dir.unwrap_or_else(|| PathBuf::from("."))
+        self.location.dir.clone()
+    }
+
+    /// Returns the settings in effect for this project.
+    pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
+        self.location.settings()
+    }
+
+    /// Opens the project and its catalog for reading; works during a run.
+    pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
+        self.location.open_read_only().await
+    }
+
+    /// Opens the project and its catalog for reading and writing.
+    pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
+        self.location.open().await
     }
 
     /// Writes a line to stderr, unless `-q` is given.
@@ -139,36 +148,6 @@ impl Context {
         Ok(())
     }
 
-    /// Opens the project and its catalog for reading; works during a run.
-    pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
-        let (project, url) = self.project()?;
-        let catalog = match url {
-            Some(url) => Catalog::connect_read_only(&url).await?,
-            None => Catalog::open_read_only(&project.catalog_path()).await?,
-        };
-        Ok((project, catalog))
-    }
-
-    /// Opens the project and its catalog for reading and writing.
-    pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
-        let (project, url) = self.project()?;
-        let catalog = match url {
-            Some(url) => Catalog::connect(&url, false).await?,
-            None => Catalog::open(&project.catalog_path()).await?,
-        };
-        Ok((project, catalog))
-    }
-
-    /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
-    fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
-        let (storage, url) = self.data_locations()?;
-        let project = match url {
-            Some(_) => Project::open_directory(&self.dir())?,
-            None => Project::open(&self.dir())?,
-        };
-        Ok((project.with_storage(storage), url))
-    }
-
     /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer. Warns
     /// about roots of inputs that are not there.
     pub(super) async fn open_for_run(&self) -> anyhow::Result<(Project, Catalog)> {
@@ -194,101 +173,6 @@ impl Context {
             self.warn(&root.to_string());
         }
         Ok((project, catalog))
-    }
-
-    /// Returns the named roots with the object store, and the URL of the catalog if that is in PostgreSQL.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::catalog_url`], or if a setting of the storage is invalid.
-    pub(super) fn data_locations(
-        &self,
-    ) -> anyhow::Result<(Option<ProjectStorage>, Option<String>)> {
-        let settings = self.settings();
-        if let Err(error) = &settings
-            && self.may_name_places(error)
-        {
-            return settings.map(|_| (None, None));
-        }
-        let storage = Self::storage(settings.as_ref().ok())?;
-        Ok((storage, self.catalog_of(settings)?))
-    }
-
-    /// Returns the named roots and the object store of the settings. Sends no request. Returns `None` if the settings
-    /// name none, or are invalid.
-    fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
-        let Some(settings) = settings.map(|settings| &settings.config.storage) else {
-            return Ok(None);
-        };
-        let options = StorageOptions {
-            artifacts: settings.artifacts.clone(),
-            roots: settings.roots.clone(),
-            cache: settings.cache.clone(),
-            cache_bytes: settings.cache_gb.saturating_mul(1_000_000_000),
-        };
-        Ok(ProjectStorage::open(&options)?)
-    }
-
-    /// Returns the URL of the catalog in PostgreSQL, or `None` if the catalog is a file in the project.
-    ///
-    /// # Errors
-    /// Returns an error if the URL on the command line has a password, or if the settings are invalid and may name a
-    /// catalog elsewhere, or no catalog file shows where the catalog is.
-    pub(super) fn catalog_url(&self) -> anyhow::Result<Option<String>> {
-        self.catalog_of(self.settings())
-    }
-
-    fn catalog_of(&self, settings: anyhow::Result<Loaded>) -> anyhow::Result<Option<String>> {
-        if let Some(url) = &self.global.catalog {
-            refuse_password(url)?;
-            return Ok(Some(url.clone()).filter(|url| !url.is_empty()));
-        }
-        match settings {
-            Ok(settings) => {
-                let url = settings.config.storage.catalog;
-                Ok(Some(url).filter(|url| !url.is_empty()))
-            }
-            // Commands that need no settings work with invalid ones, but not with a file that cannot be read.
-            Err(error)
-                if self.dir().join(CATALOG_FILE).exists() && !self.may_name_places(&error) =>
-            {
-                Ok(None)
-            }
-            Err(error) => Err(error),
-        }
-    }
-
-    /// Returns the settings in effect for this project. The file is read once, so that all parts of a command have the
-    /// same settings.
-    pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
-        if let Some(settings) = self.settings.get() {
-            return Ok(settings.clone());
-        }
-        let settings = self.load_settings()?;
-        Ok(self.settings.get_or_init(|| settings).clone())
-    }
-
-    fn load_settings(&self) -> anyhow::Result<Loaded> {
-        Ok(load(&self.sources())?)
-    }
-
-    fn sources(&self) -> Sources {
-        let base = match &self.global.config {
-            Some(name) => name
-                .parse()
-                .map_or_else(|_: String| BaseLayer::File(name.into()), BaseLayer::Preset),
-            None => BaseLayer::Project(self.dir().join(SETTINGS_FILE)),
-        };
-        let env = std::env::vars_os()
-            .filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)))
-            .collect();
-        let sets = self.global.set.clone();
-        Sources { base, env, sets }
-    }
-
-    /// Returns whether invalid settings may name a catalog or artifacts elsewhere. Then a command must not use the files in
-    /// the project's folder instead.
-    fn may_name_places(&self, error: &anyhow::Error) -> bool {
-        is_unread(error) || self.sources().may_set("storage")
     }
 
     /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
@@ -341,36 +225,14 @@ impl Context {
     }
 }
 
-/// Returns the settings of the file in a project folder, without those of the environment and of flags.
-///
-/// # Errors
-/// Returns an error if the file cannot be read, or has an invalid setting.
-pub(super) fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
-    load(&Sources {
-        base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
-        ..Sources::default()
-    })
-}
-
-/// Returns whether the settings could not be read.
-fn is_unread(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ConfigError::Read { .. }))
-}
-
-/// Refuses an address of PostgreSQL with a password, which other users of the machine could read.
-pub(super) fn refuse_password(url: &str) -> Result<(), Refusal> {
-    if has_password(url) {
-        let text = "other users of this machine can read a password on the command line; put it into ~/.pgpass or PGPASSWORD";
-        return Err(Refusal::Usage(text.to_owned()));
-    }
-    Ok(())
-}
-
-/// Returns the current time; no other clock reaches the catalog.
-pub(super) fn now() -> UnixMillis {
-    SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map_or(0, |since| since.as_millis() as UnixMillis)
+/// Returns the project that the flags name.
+fn location(global: &Global) -> Location {
+    let dir = global.directory.clone();
+    let mut location = Location::new(dir.unwrap_or_else(|| PathBuf::from(".")));
+    location.catalog.clone_from(&global.catalog);
+    location.config.clone_from(&global.config);
+    location.sets.clone_from(&global.set);
+    location
 }
 
 /// Indents the lines after the first, so that a line break in the name of a file cannot imitate another message. Cuts
@@ -401,46 +263,14 @@ fn program_name(called: Option<&OsString>) -> String {
     }
 }
 
-/// Quotes a word for a POSIX shell if it needs quotes. A word with characters that a terminal does not show is quoted
-/// as `$'..'`, and each byte of such a character is escaped.
-pub(super) fn shell_quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "_-./=:,+@%".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else if word.contains(is_hidden) {
-        let quoted = word.chars().map(|c| match c {
-            '\'' | '\\' => format!("\\{c}"),
-            _ if is_hidden(c) => {
-                let hidden = c.to_string();
-                // Three octal digits end the escape, whatever follows.
-                let bytes = hidden.bytes().map(|byte| format!("\\{byte:03o}"));
-                bytes.collect::<Vec<_>>().concat()
-            }
-            _ => c.to_string(),
-        });
-        format!("$'{}'", quoted.collect::<String>())
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{indented, shell_quoted};
+    use super::indented;
 
     #[test]
     fn a_message_cannot_imitate_the_next_line() {
         assert_eq!(indented("a\nnext: b\n  c"), "a\n  next: b\n  c");
         assert_eq!(indented("a"), "a");
         assert_eq!(indented(&"a".repeat(7000)).len(), super::MAX_LINE_CHARS + 3);
-    }
-
-    #[test]
-    fn words_that_a_shell_would_split_are_quoted() {
-        assert_eq!(shell_quoted("demo/a-b"), "demo/a-b");
-        assert_eq!(shell_quoted("my scans"), "'my scans'");
-        assert_eq!(shell_quoted("it's"), r"'it'\''s'");
-        assert_eq!(shell_quoted(""), "''");
-        assert_eq!(shell_quoted("a\n'\u{1b}5\\"), r"$'a\012\'\0335\\'");
     }
 }

@@ -7,12 +7,13 @@ use clap::Args;
 use serde_json::json;
 
 use super::busy::Busy;
-use super::context::{Context, now, refuse_password, settings_of};
-use super::error_text::ErrorPlace;
-use super::exit::{ExitCode, Refusal};
+use super::context::Context;
 use super::table::{columns, count};
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
 use mocban_core::domain::is_address;
+use mocban_project::error_text::ErrorPlace;
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::location::{now, refuse_password, settings_of};
 use mocban_runner as runner;
 use mocban_store::{Project, SETTINGS_FILE};
 

@@ -4,9 +4,9 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
 use super::output;
 use mocban_catalog::{ROLES, initialize_database, roles_sql};
+use mocban_project::exit::{ExitCode, Refusal};
 
 /// Commands on the database of a catalog.
 #[derive(Debug, Subcommand)]
@@ -30,11 +30,11 @@ pub(super) struct DbInitArgs {
 pub(super) async fn db(command: DbCommand, context: &Context) -> anyhow::Result<ExitCode> {
     let DbCommand::Init(args) = command;
     if args.print_sql {
-        let sql = roles_sql(context.catalog_url()?.as_deref())?;
+        let sql = roles_sql(context.location.catalog_url()?.as_deref())?;
         output::print(sql.trim_end())?;
         return Ok(ExitCode::Done);
     }
-    let Some(url) = context.catalog_url()? else {
+    let Some(url) = context.location.catalog_url()? else {
         let text = "`db init` creates a catalog in PostgreSQL; give its address, such as --catalog postgres://me@db.example/lab";
         return Err(Refusal::Usage(text.to_owned()).into());
     };

@@ -11,21 +11,22 @@ use super::config::{ConfigShowArgs, as_toml};
 use super::contact_sheet::{self, ContactSheetArgs};
 use super::context::Context;
 use super::demo_block;
-use super::demo_folder::{DemoContent, STOPPED, check_directory, replace_data};
-use super::exit::ExitCode;
-use super::files;
-use super::import::{self, ImportArgs};
-use super::import_blocks::{self, BlockSource};
+use super::demo_data::replace_data;
 use super::report;
-use super::restore::require_local;
 use super::run::{self, drive};
 use super::run_text;
 use super::screen::Palette;
 use super::table::count;
+use super::{import, import_blocks};
 use mocban_config::{Origin, Tree};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
+use mocban_project::demo_folder::{DemoContent, STOPPED, check_directory};
+use mocban_project::exit::ExitCode;
+use mocban_project::files;
+use mocban_project::import_blocks::import_blocks;
+use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
@@ -66,8 +67,8 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let context = context.at(&dir);
     // Before settings and data are written there.
     check_directory(&dir, &dir.join("data"), &content)?;
-    require_local(&context, "the demo")?;
-    context.data_locations()?;
+    context.location.require_local("the demo")?;
+    context.location.data_locations()?;
     let context = &save_settings(&dir, &context)?;
     let options = match content {
         DemoContent::Block(options) => return block_demo(&dir, options, &args, context).await,
@@ -77,12 +78,16 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);
     };
-    let manifest = ImportArgs {
-        file: Some(files.manifest),
-        truth: Some(files.truth),
-        ..ImportArgs::default()
+    let source = PairSource::List {
+        file: files.manifest,
+        bytes: None,
     };
-    let outcome = import::import_pairs(&manifest, None, context).await?;
+    let import = PairImport {
+        source,
+        truth: Some(files.truth),
+        allow_missing: false,
+    };
+    let outcome = import_pairs(import, &context.location).await?;
     import::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -119,12 +124,8 @@ async fn block_demo(
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);
     };
-    let import = demo_block::import_args(&files, !args.no_labels);
-    let source = BlockSource::One {
-        args: &import,
-        unit: None,
-    };
-    let outcome = import_blocks::import_blocks(&source, false, context).await?;
+    let source = demo_block::import_source(&files, !args.no_labels);
+    let outcome = import_blocks(&source, false, &context.location).await?;
     import_blocks::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");

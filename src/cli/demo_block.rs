@@ -7,28 +7,31 @@ use serde_json::Value;
 use tokio::sync::mpsc;
 
 use super::busy::Busy;
-use super::context::{Context, now};
-use super::demo_folder::{DemoContent, check_directory, replace_data};
-use super::files;
-use super::import_blocks::BlockArgs;
+use super::context::Context;
+use super::demo_data::replace_data;
 use super::table::count;
 use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 use mocban_demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
+use mocban_project::demo_folder::{DemoContent, check_directory};
+use mocban_project::files;
+use mocban_project::import_blocks::{BlockSource, ImportedBlock};
+use mocban_project::location::now;
 use mocban_runner::{Stop, StopLevel};
 
 /// Id of the block.
 const NAME: &str = "block";
 
-/// Returns the arguments that import a block, with the boxes of its characters if `has_labels` is set.
-pub(super) fn import_args(files: &BlockFiles, has_labels: bool) -> BlockArgs {
-    BlockArgs {
-        block: Some(files.mesh.clone()),
-        page: Some(files.page.clone()),
+/// Returns the block to import, with the boxes of its characters if `has_labels` is set.
+pub(super) fn import_source(files: &BlockFiles, has_labels: bool) -> BlockSource {
+    BlockSource::One(ImportedBlock {
+        mesh: files.mesh.clone(),
+        page: files.page.clone(),
         labels: has_labels.then(|| files.labels.clone()),
+        side: None,
         name: Some(NAME.to_owned()),
-        ..BlockArgs::default()
-    }
+        unit: None,
+    })
 }
 
 /// Stores the true boxes of the block, and the true alignments of the pairs that were cut from it. Returns how many of these

@@ -7,8 +7,8 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
 use crate::documentation::web_files;
+use mocban_project::exit::{ExitCode, Refusal};
 use mocban_store::ReplacementFolder;
 
 /// The first page.

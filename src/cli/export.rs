@@ -9,14 +9,14 @@ use serde_json::json;
 
 use super::busy::Busy;
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
-use super::files::input_file_limits;
 use super::table::count;
 use mocban_core::domain::ThresholdMetric;
 use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::input_file_limits;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]

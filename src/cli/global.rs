@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::builder::{PathBufValueParser, TypedValueParser as _};
 use clap::{ArgAction, Args, ColorChoice, ValueEnum};
 
-use super::input_paths::is_windows_path;
+use mocban_project::input_paths::is_windows_path;
 
 /// Parses the project's directory. Refuses a path of a Windows computer elsewhere: a folder with such a name would be
 /// created in the current one.

@@ -1,37 +1,19 @@
 //! `import`: adds pairs of meshes and prints, or whole blocks, to the project, and creates the project if there is
 //! none.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
-use tokio::sync::mpsc;
 
 use super::busy::Busy;
-use super::context::{Context, now};
-use super::exit::{ExitCode, Refusal};
-use super::files;
-use super::import_blocks::{self, BlockArgs, Imported};
-use super::manifest_file::Listing;
-use super::missing_files::MissingFiles;
-use super::new_project::import_with;
+use super::context::Context;
+use super::import_blocks::{self, BlockArgs};
 use super::table::count;
-use super::truth_file::{self, TruthRow};
-use mocban_catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
-use mocban_core::domain::{LengthUnit, PairName};
-use mocban_lists::manifest::{ManifestRow, RowIds};
-use mocban_store::Project;
-
-/// Maximum number of rows of a chunk that is sent to the catalog, and of the chunks that may wait there.
-const CHUNK_ROWS: usize = 2_000;
-const WAITING_CHUNKS: usize = 2;
-/// A chunk ends with the row that reaches this many bytes of memory.
-const CHUNK_BYTES: usize = 2 << 20;
-
-/// End of the message when the file of true alignments is refused.
-const NOT_IMPORTED: &str = "nothing was imported";
+use mocban_core::domain::LengthUnit;
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::import_blocks::{ListedItems, import_blocks};
+use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -67,28 +49,50 @@ pub(super) struct ImportArgs {
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let list = match Imported::of(args.file.as_deref(), &args.block, args.unit)? {
-        Imported::Blocks(source) => {
-            refuse_truths(&args)?;
-            let busy = Busy::start(context, "importing");
-            let outcome = import_blocks::import_blocks(&source, args.allow_missing, context).await;
+    let items = items(&args)?;
+    if matches!(items, ListedItems::Blocks(_)) {
+        refuse_truths(&args)?;
+    }
+    let busy = Busy::start(context, "importing");
+    match items {
+        ListedItems::Blocks(source) => {
+            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
             drop(busy);
             let outcome = outcome?;
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
-            context.next("run");
-            return Ok(ExitCode::Done);
         }
-        Imported::Pairs(list) => list,
-    };
-    let busy = Busy::start(context, "importing");
-    let outcome = import_pairs(&args, list, context).await;
-    drop(busy);
-    let outcome = outcome?;
-    context.print_json(&as_json(&outcome))?;
-    print_outcome(&outcome, context);
+        ListedItems::Pairs(source) => {
+            let import = PairImport {
+                source,
+                truth: args.truth,
+                allow_missing: args.allow_missing,
+            };
+            let outcome = import_pairs(import, &context.location).await;
+            drop(busy);
+            let outcome = outcome?;
+            context.print_json(&as_json(&outcome))?;
+            print_outcome(&outcome, context);
+        }
+    }
     context.next("run");
     Ok(ExitCode::Done)
+}
+
+/// Returns what the arguments name.
+fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+    if let Some(source) = args.block.source(args.unit) {
+        return Ok(ListedItems::Blocks(source));
+    }
+    match (&args.file, &args.meshes, &args.prints) {
+        (Some(file), ..) => ListedItems::of(file),
+        (None, Some(meshes), Some(prints)) => Ok(ListedItems::Pairs(PairSource::Folders {
+            meshes: meshes.clone(),
+            prints: prints.clone(),
+            unit: args.unit,
+        })),
+        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+    }
 }
 
 /// Refuses true alignments of pairs in an import of blocks.
@@ -98,227 +102,6 @@ fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
     }
     let text = "--truth holds true alignments of pairs, but blocks are imported";
     Err(Refusal::Usage(text.to_owned()).into())
-}
-
-/// What an import changed.
-#[derive(Debug)]
-pub(super) struct ImportOutcome {
-    pub(super) summary: ImportSummary,
-    pub(super) truths: u64,
-    missing: MissingFiles,
-    warnings: Vec<String>,
-}
-
-/// Imports pairs. If the import fails, no pair is imported. `list` is the content of the list, if it was read already.
-///
-/// # Errors
-/// Returns an error if a list is refused, or the catalog or the disk fails.
-pub(super) async fn import_pairs(
-    args: &ImportArgs,
-    list: Option<Vec<u8>>,
-    context: &Context,
-) -> anyhow::Result<ImportOutcome> {
-    let mut listing = listing(args, list)?;
-    let warnings = std::mem::take(&mut listing.warnings);
-    let truths = match &args.truth {
-        Some(file) => read_truths(file, &listing.ids, context).await?,
-        None => Vec::new(),
-    };
-    let (storage, url) = context.data_locations()?;
-    let project = Project::at(&context.dir()).with_storage(storage);
-    let truths = stored_truths(truths, &project)?;
-    let list = Arc::new(ImportList {
-        listing,
-        truths,
-        allow_missing: args.allow_missing,
-    });
-    let check = async || check_rows(&project, &list).await;
-    let import = async |catalog: &Catalog| store_in(catalog, &project, &list).await;
-    let (summary, truths, missing) = import_with(&project, url.as_deref(), check, import).await?;
-    Ok(ImportOutcome {
-        summary,
-        truths,
-        missing,
-        warnings,
-    })
-}
-
-/// What to import.
-struct ImportList {
-    listing: Listing,
-    truths: Vec<(PairName, Value)>,
-    /// Whether files may be missing.
-    allow_missing: bool,
-}
-
-/// The summary of an import, the number of stored true alignments, and the missing files.
-type StoredList = (ImportSummary, u64, MissingFiles);
-
-/// Imports the list into a catalog.
-async fn store_in(
-    catalog: &Catalog,
-    project: &Project,
-    list: &Arc<ImportList>,
-) -> anyhow::Result<StoredList> {
-    let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
-    let (project, shared) = (project.clone(), Arc::clone(list));
-    let sent = tokio::task::spawn_blocking(move || send_rows(&shared, &project, &sender));
-    let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
-    // Return a row's error first, because the catalog then only reports that the list ended early.
-    let missing = sent
-        .await
-        .context("the task that reads the list stopped")??;
-    let (summary, truths) = stored?;
-    Ok((summary, truths, missing))
-}
-
-/// Refuses a list that [`store_in`] would refuse because of a file.
-async fn check_rows(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<()> {
-    // Nobody receives the rows.
-    let (sender, _) = mpsc::channel(1);
-    let (project, list) = (project.clone(), Arc::clone(list));
-    let checked = tokio::task::spawn_blocking(move || send_rows(&list, &project, &sender));
-    checked.await?.map(|_| ())
-}
-
-/// Sends the rows to the catalog in chunks. Returns the missing files.
-///
-/// # Errors
-/// Returns an error if files are missing that must exist, or the path of a file cannot be stored. The catalog then
-/// imports nothing.
-fn send_rows(
-    list: &ImportList,
-    project: &Project,
-    sender: &mpsc::Sender<ImportChunk>,
-) -> anyhow::Result<MissingFiles> {
-    let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
-    let mut outcome = Ok(());
-    list.listing.rows(project, |row, lines| {
-        for line in lines {
-            missing.add(line);
-        }
-        match stored_row(&row, project) {
-            Ok(row) => {
-                bytes += memory(&row);
-                chunk.push(row);
-            }
-            Err(error) if outcome.is_ok() => outcome = Err(error),
-            Err(_) => {}
-        }
-        if chunk.len() == CHUNK_ROWS || bytes >= CHUNK_BYTES {
-            // The catalog stops receiving after an error, which it reports itself.
-            let _ = sender.blocking_send(ImportChunk::Rows(std::mem::take(&mut chunk)));
-            bytes = 0;
-        }
-    });
-    outcome?;
-    if missing.count > 0 && !list.allow_missing {
-        return Err(missing.refusal().into());
-    }
-    for last in [ImportChunk::Rows(chunk), ImportChunk::End] {
-        let _ = sender.blocking_send(last);
-    }
-    Ok(missing)
-}
-
-fn listing(args: &ImportArgs, list: Option<Vec<u8>>) -> anyhow::Result<Listing> {
-    match (&args.file, &args.meshes, &args.prints) {
-        (Some(file), ..) => match list {
-            Some(bytes) => Listing::from_bytes(file, bytes),
-            None => Listing::from_file(file),
-        },
-        (None, Some(meshes), Some(prints)) => Listing::from_folders(meshes, prints, args.unit),
-        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
-    }
-}
-
-/// Reads true alignments. Refuses pairs that are neither in the list nor in the project.
-async fn read_truths(
-    file: &Path,
-    listed: &RowIds,
-    context: &Context,
-) -> anyhow::Result<Vec<TruthRow>> {
-    let text = String::from_utf8(files::read(file)?)
-        .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
-    let truths =
-        truth_file::parse(file, &text).map_err(|error| error.in_file(file, NOT_IMPORTED))?;
-    let names = truths.iter().map(|truth| truth.name.clone());
-    let others: Vec<PairName> = names.filter(|name| !listed.contains(name)).collect();
-    if others.is_empty() {
-        return Ok(truths);
-    }
-    let unknown = match context.open_read_only().await {
-        Ok((_, catalog)) => {
-            let unknown = catalog.unknown_names(&others).await?;
-            catalog.close().await;
-            unknown
-        }
-        Err(_) => others,
-    };
-    match truths.iter().find(|truth| unknown.contains(&truth.name)) {
-        Some(truth) => Err(truth_file::unknown_pair(truth)
-            .in_file(file, NOT_IMPORTED)
-            .into()),
-        None => Ok(truths),
-    }
-}
-
-/// Converts true alignments to their stored form. A `tops_mask` below the project's directory is stored relative to it,
-/// like the paths of inputs.
-fn stored_truths(
-    truths: Vec<TruthRow>,
-    project: &Project,
-) -> anyhow::Result<Vec<(PairName, Value)>> {
-    truths
-        .into_iter()
-        .map(|mut truth| {
-            if let Some(mask) = &truth.tops_mask {
-                truth.value["tops_mask"] = json!(project.stored_path(mask)?);
-            }
-            Ok((truth.name, truth.value))
-        })
-        .collect()
-}
-
-fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow> {
-    Ok(ImportRow {
-        name: row.name.clone(),
-        mesh_path: project.stored_path(&row.mesh)?,
-        print_path: project.stored_path(&row.print)?,
-        unit: row.unit,
-        scanned_face_down: row.scanned_face_down,
-        character: row.character.clone(),
-        block: row.block.clone(),
-        meta: row.meta.clone().into_iter().collect(),
-        prior: None,
-    })
-}
-
-/// Returns roughly the memory that a row needs, in bytes.
-fn memory(row: &ImportRow) -> usize {
-    let cells = [&row.character, &row.block].into_iter().flatten();
-    let meta = row.meta.iter();
-    size_of::<ImportRow>()
-        + row.mesh_path.len()
-        + row.print_path.len()
-        + cells.map(String::len).sum::<usize>()
-        + meta
-            .map(|(key, value)| key.len() + value_memory(value))
-            .sum::<usize>()
-}
-
-/// Returns roughly the memory that a JSON value needs, in bytes. A number of one digit needs much more than its text.
-fn value_memory(value: &Value) -> usize {
-    size_of::<Value>()
-        + match value {
-            Value::Null | Value::Bool(_) | Value::Number(_) => 0,
-            Value::String(text) => text.len(),
-            Value::Array(values) => values.iter().map(value_memory).sum(),
-            Value::Object(entries) => entries
-                .iter()
-                .map(|(key, value)| size_of::<String>() + key.len() + value_memory(value))
-                .sum(),
-        }
 }
 
 /// Prints what an import changed, after its warnings.

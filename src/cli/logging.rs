@@ -8,11 +8,11 @@ use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
-use super::exit::Refusal;
-use super::files::refuse_project_file;
 use super::global::{Global, LogFormat};
 use super::screen::{Palette, Screen};
 use mocban_lists::manifest::is_named_like_input;
+use mocban_project::exit::Refusal;
+use mocban_project::files::refuse_project_file;
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::{Args, Command};
 
-use super::context::{Context, shell_quoted};
-use super::exit::{ExitCode, Refusal};
-use super::files;
+use super::context::Context;
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files;
+use mocban_project::shell::shell_quoted;
 use mocban_store::{StagingFolder, rename_into_place};
 
 /// Arguments of `man`.

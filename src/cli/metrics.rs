@@ -11,8 +11,8 @@ use tokio::net::TcpListener;
 use tokio::task::AbortHandle;
 
 use super::context::Context;
-use super::exit::Refusal;
 use mocban_pages::local_server::{ConnectionLimits, ServedNames, listen, serve};
+use mocban_project::exit::Refusal;
 use mocban_runner::RunMetrics;
 use mocban_system::platform::host_name;
 

@@ -18,26 +18,19 @@ mod copy;
 mod db;
 mod demo;
 mod demo_block;
-mod demo_folder;
+mod demo_data;
 mod docs;
-mod error_text;
 mod examples;
-mod exit;
 mod export;
 mod failures;
-mod files;
 mod global;
 mod import;
 mod import_blocks;
-mod input_paths;
 mod logging;
 mod man;
-mod manifest_file;
 mod metrics;
-mod missing_files;
 mod missing_results;
 mod nearby_projects;
-mod new_project;
 mod output;
 mod panics;
 mod progress;
@@ -57,10 +50,7 @@ mod signals;
 mod status;
 mod status_hosts;
 mod table;
-mod time_text;
-mod truth_file;
 mod verdict;
-mod verdict_file;
 mod view;
 mod worker;
 mod worker_totals;
@@ -71,10 +61,11 @@ use tokio::runtime::{Builder, Runtime};
 
 use args::Command;
 use context::Context;
-pub use exit::ExitCode;
+pub use mocban_project::exit::ExitCode;
 use screen::Screen;
 
 use mocban_core::domain::is_hidden;
+use mocban_project::error_text;
 
 /// Parses the command line, executes the command and returns the exit code. Prints each error once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {

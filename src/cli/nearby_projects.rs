@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::input_paths::plain_letters;
 use mocban_core::domain::spelling::nearest;
+use mocban_project::input_paths::plain_letters;
 use mocban_store::CATALOG_FILE;
 
 /// Largest number of entries of a folder that are read.

@@ -3,7 +3,7 @@
 use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use super::exit::ExitCode;
+use mocban_project::exit::ExitCode;
 
 /// Sends the message and backtrace of a panic to the log (`-v`, `--log-file`) instead of the terminal.
 pub(super) fn log_only() {

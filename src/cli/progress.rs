@@ -10,8 +10,8 @@ use super::global::ProgressMode;
 use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
-use super::time_text::duration;
 use mocban_core::domain::one_line;
+use mocban_project::time_text::duration;
 use mocban_runner::{RunEvent, StopLevel};
 
 /// Shows one run.

@@ -7,13 +7,15 @@ use serde_json::json;
 
 use super::busy::Busy;
 use super::compare::side_by_side;
-use super::context::{Context, now};
-use super::exit::{ExitCode, Refusal};
-use super::time_text::day;
-use super::{files, output};
+use super::context::Context;
+use super::output;
 use mocban_catalog::Catalog;
 use mocban_config::{self as config, Sources};
 use mocban_export::{GallerySelection, draw_gallery};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files;
+use mocban_project::location::now;
+use mocban_project::time_text::day;
 use mocban_report::{
     Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
     summary,

@@ -4,11 +4,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::context::Context;
-use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::pairs_and_blocks;
 use mocban_catalog::{BlockRetry, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
+use mocban_project::exit::{ExitCode, Refusal};
 use mocban_runner::NamedWork;
 
 /// Arguments of `retry`.

@@ -6,9 +6,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::browser::open;
-use super::context::{Context, now, shell_quoted};
-use super::exit::{ExitCode, Refusal};
-use super::files::input_file_limits;
+use super::context::Context;
 use super::output;
 use super::signals;
 use super::table::count;
@@ -19,6 +17,10 @@ use mocban_core::page_vec;
 use mocban_pages::review::{
     self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
 };
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::input_file_limits;
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
 use mocban_runner::{Stop, StopLevel};
 
 /// Arguments of `review`.

@@ -5,8 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::context::{Context, now};
-use super::exit::ExitCode;
+use super::context::Context;
 use super::failures::Failures;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::progress::ProgressReporter;
@@ -15,6 +14,8 @@ use super::{missing_results, select, signals};
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_config::Config;
 use mocban_core::domain::Stage;
+use mocban_project::exit::ExitCode;
+use mocban_project::location::now;
 use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use mocban_store::Project;
 

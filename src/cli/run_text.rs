@@ -1,12 +1,13 @@
 //! Text about a run: how it ended, what to do next, and what would run.
 
-use super::context::{Context, shell_quoted};
+use super::context::Context;
 use super::failures::Failures;
 use super::review::review_step;
 use super::table::{columns, count, pairs_and_blocks};
-use super::time_text::duration;
 use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::duration;
 use mocban_runner::{BlockSummary, RunSummary};
 
 /// Prints how a run ended and which pairs failed.

@@ -1,9 +1,9 @@
 //! Pairs and blocks named on the command line.
 
-use super::exit::Refusal;
 use mocban_catalog::Catalog;
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName};
+use mocban_project::exit::Refusal;
 use mocban_runner::NamedWork;
 
 /// Largest number of similar ids in a message.

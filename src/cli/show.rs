@@ -5,20 +5,21 @@ use std::collections::BTreeSet;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::context::{Context, shell_quoted};
-use super::exit::{ExitCode, Refusal};
+use super::context::Context;
 use super::failures::may_succeed_unchanged;
 use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::show_block::show_block;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
-use super::time_text::local;
 use super::verdict;
 use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::local;
 use mocban_report::ManualCorrection;
 use mocban_runner::{self as runner, NamedWork};
 use mocban_store::Project;

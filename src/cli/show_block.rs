@@ -4,14 +4,15 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::context::{Context, shell_quoted};
-use super::exit::ExitCode;
+use super::context::Context;
 use super::screen::{Palette, Tone};
 use super::show_text::state_name;
 use super::table::{columns, count};
-use super::time_text::{duration, local};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_project::exit::ExitCode;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::{duration, local};
 use mocban_store::Project;
 
 /// Number of characters that are listed of each kind.

@@ -4,12 +4,12 @@ use serde::Serialize;
 
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use super::time_text::{duration, local};
 use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,
 };
+use mocban_project::time_text::{duration, local};
 use mocban_report::ManualCorrection;
 use mocban_store::Project;
 

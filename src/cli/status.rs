@@ -6,8 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::context::{Context, now, shell_quoted};
-use super::exit::ExitCode;
+use super::context::Context;
 use super::failures::Failures;
 use super::missing_results;
 use super::output;
@@ -17,6 +16,9 @@ use super::status_hosts;
 use super::table::{columns, count};
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_project::exit::ExitCode;
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
 use mocban_runner as runner;
 use mocban_store::Project;
 

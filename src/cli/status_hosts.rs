@@ -6,10 +6,10 @@ use serde_json::{Value, json};
 
 use super::screen::{Palette, Tone};
 use super::table::{columns, count};
-use super::time_text::rough_duration;
 use super::worker_totals::{WorkerTotals, is_present};
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_core::domain::UnixMillis;
+use mocban_project::time_text::rough_duration;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
 const SHOWN_MS: i64 = 24 * 3_600_000;

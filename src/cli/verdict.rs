@@ -5,20 +5,22 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::context::{Context, now, shell_quoted};
-use super::exit::{ExitCode, Refusal};
-use super::files::{self, RefusedLine};
+use super::context::Context;
 use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::table::{columns, count};
-use super::time_text::{duration, local};
-use super::verdict_file::{self, VerdictRow};
 use mocban_catalog::{
     Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
     check_reviewer,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::{self, RefusedLine};
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::{duration, local};
+use mocban_project::verdict_file::{self, VerdictRow};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]

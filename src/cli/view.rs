@@ -8,8 +8,7 @@ use serde_json::json;
 use super::block_points::BlockPoints;
 use super::block_sheet;
 use super::browser::open;
-use super::context::{Context, shell_quoted};
-use super::exit::{ExitCode, Refusal};
+use super::context::Context;
 use super::output;
 use super::select;
 use super::signals;
@@ -19,6 +18,8 @@ use mocban_core::page_vec;
 use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::view::{self, ViewServer};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::shell::shell_quoted;
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::Project;
 

@@ -4,13 +4,13 @@ use clap::Args;
 use serde_json::json;
 
 use super::context::Context;
-use super::exit::ExitCode;
 use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use super::signals;
 use super::table::pairs_and_blocks;
 use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
+use mocban_project::exit::ExitCode;
 use mocban_runner::{self as runner, RunPart, Stop};
 
 /// Arguments of `plan`.

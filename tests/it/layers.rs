@@ -6,11 +6,11 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
-    ("anyhow", &["mocban"]),
+    ("anyhow", &["mocban", "project"]),
     ("clap", &["mocban"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
-    ("toml", &["mocban"]),
+    ("toml", &["mocban", "config"]),
     ("tracing-subscriber", &["mocban"]),
     ("object_store", &["store"]),
     ("pulp", &["core"]),

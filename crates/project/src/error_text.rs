@@ -13,7 +13,7 @@ use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 use mocban_system::platform;
 
 /// Returns the exit code of an error.
-pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
+pub fn exit_code(error: &anyhow::Error) -> ExitCode {
     let code = error.chain().find_map(code_of_cause);
     code.unwrap_or(ExitCode::Error)
 }
@@ -81,14 +81,14 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
 
 /// Context of an error that names the project folder of its catalog, if that is not the folder of the command.
 #[derive(Debug)]
-pub(super) struct ErrorPlace {
+pub struct ErrorPlace {
     dir: PathBuf,
     text: String,
 }
 
 impl ErrorPlace {
     /// Makes the context of an error of a catalog in a folder. The text precedes errors without an explanation.
-    pub(super) fn new(dir: impl Into<PathBuf>, text: String) -> Self {
+    pub fn new(dir: impl Into<PathBuf>, text: String) -> Self {
         let dir = dir.into();
         Self { dir, text }
     }
@@ -101,7 +101,7 @@ impl std::fmt::Display for ErrorPlace {
 }
 
 /// Returns the message for an error: the explanation of a catalog error, or otherwise the chain of causes.
-pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
+pub fn describe(error: &anyhow::Error, project: &Path) -> String {
     if is_out_of_files(error) {
         return format!(
             "this process may open only {} files at a time; raise the limit with `ulimit -n 256` and try again",
@@ -123,7 +123,7 @@ pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
 }
 
 /// Removes the numbers that the standard library adds to the system's messages, such as `(os error 2)`.
-pub(super) fn without_error_numbers(text: &str) -> String {
+pub fn without_error_numbers(text: &str) -> String {
     const START: &str = " (os error ";
     let mut parts = text.split(START);
     let mut plain = parts.next().unwrap_or_default().to_owned();
@@ -184,7 +184,7 @@ fn join_causes(error: &anyhow::Error) -> String {
 }
 
 /// Returns whether the reader of the output closed it, as in `mocban report | head`. This is not a failure.
-pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
+pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause
             .downcast_ref::<std::io::Error>()
@@ -193,18 +193,18 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
 }
 
 /// Returns whether another process runs the project.
-pub(super) fn is_run_in_use(error: &anyhow::Error) -> bool {
+pub fn is_run_in_use(error: &anyhow::Error) -> bool {
     let is_target = <dyn Error>::is::<TargetLockError>;
     exit_code(error) == ExitCode::InUse && !error.chain().any(is_target)
 }
 
 /// Returns the first error of the catalog in a chain of causes.
-pub(super) fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
+pub fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
     error.chain().find_map(|cause| cause.downcast_ref())
 }
 
 /// Returns whether the catalog's content is damaged, empty or not a catalog.
-pub(super) fn is_damage(error: &CatalogError) -> bool {
+pub fn is_damage(error: &CatalogError) -> bool {
     use CatalogError::{Corrupt, Empty, Foreign, ForeignSchema, Json};
     matches!(
         error,
@@ -213,7 +213,7 @@ pub(super) fn is_damage(error: &CatalogError) -> bool {
 }
 
 /// Returns whether the pages of the catalog's file are inconsistent.
-pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
+pub fn is_damaged_file(error: &CatalogError) -> bool {
     matches!(error, CatalogError::Damaged(_))
         || matches!(
             error.kind(),
@@ -222,13 +222,13 @@ pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
 }
 
 /// Returns the path of the catalog's file as messages show it.
-pub(super) fn catalog_path(project: &Path) -> String {
+pub fn catalog_path(project: &Path) -> String {
     project.join(CATALOG_FILE).display().to_string()
 }
 
 /// Explains a catalog error: names the file and what the user can do. Returns `None` if the error's own message already
 /// explains it.
-pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
+pub fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
     let path = if error.is_of_server() {
         "the catalog in PostgreSQL".to_owned()
     } else {

@@ -19,7 +19,7 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 ///
 /// # Errors
 /// Returns the error of `check` or `import`, or an error if the catalog or the disk fails.
-pub(super) async fn import_with<T>(
+pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
     check: impl AsyncFnOnce() -> anyhow::Result<()>,

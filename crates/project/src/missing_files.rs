@@ -6,21 +6,21 @@ use super::exit::Refusal;
 const MAX_MISSING: usize = 1000;
 
 /// Ends the message of a missing file whose path is one of Windows.
-pub(super) const WINDOWS_HINT: &str =
+pub const WINDOWS_HINT: &str =
     "; it is a path of a Windows computer: write paths relative to the list";
 
 /// Files of a list that do not exist.
 #[derive(Debug, Default)]
-pub(super) struct MissingFiles {
+pub struct MissingFiles {
     /// Messages of the first [`MAX_MISSING`] files.
-    pub(super) lines: Vec<String>,
+    pub lines: Vec<String>,
     /// Number of all missing files.
-    pub(super) count: usize,
+    pub count: usize,
 }
 
 impl MissingFiles {
     /// Adds the message of a file. Only the first hint on paths of Windows is kept.
-    pub(super) fn add(&mut self, mut line: String) {
+    pub fn add(&mut self, mut line: String) {
         self.count += 1;
         if let Some(end) = line.strip_suffix(WINDOWS_HINT).map(str::len)
             && self.lines.iter().any(|line| line.ends_with(WINDOWS_HINT))
@@ -33,7 +33,7 @@ impl MissingFiles {
     }
 
     /// Returns why a list with missing files is refused.
-    pub(super) fn refusal(&self) -> Refusal {
+    pub fn refusal(&self) -> Refusal {
         const MAX_SHOWN: usize = 10;
         let shown = &self.lines[..self.lines.len().min(MAX_SHOWN)];
         let more = match self.count - shown.len() {

@@ -12,7 +12,7 @@ use unicode_normalization::char::is_combining_mark;
 ///
 /// # Errors
 /// Returns an error if this cannot be found out, such as for a folder that cannot be entered.
-pub(super) fn find_on_disk(path: &mut PathBuf) -> io::Result<bool> {
+pub fn find_on_disk(path: &mut PathBuf) -> io::Result<bool> {
     if path.try_exists()? {
         return Ok(true);
     }
@@ -52,7 +52,7 @@ const MAX_ENTRIES: usize = 10_000;
 
 /// Returns the name of a file in the folder of a missing file that differs from it only in accents or in upper and lower
 /// case.
-pub(super) fn similar_file(missing: &Path) -> Option<String> {
+pub fn similar_file(missing: &Path) -> Option<String> {
     let wanted = plain_letters(missing.file_name()?.to_str()?);
     // The parent of a bare file name is empty.
     let folder = Path::new(".").join(missing.parent()?);
@@ -63,7 +63,7 @@ pub(super) fn similar_file(missing: &Path) -> Option<String> {
 }
 
 /// Returns a name in lower case and without accents, so that `Khoi-4` is similar to `khối-4`.
-pub(super) fn plain_letters(name: &str) -> String {
+pub fn plain_letters(name: &str) -> String {
     let letters = name.nfd().filter(|c| !is_combining_mark(*c));
     let letters = letters.map(|c| match c {
         'đ' | 'Đ' => 'd',
@@ -74,7 +74,7 @@ pub(super) fn plain_letters(name: &str) -> String {
 
 /// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
 /// The path of a list's folder may stand before it.
-pub(super) fn is_windows_path(path: &Path) -> bool {
+pub fn is_windows_path(path: &Path) -> bool {
     let mut parts = path
         .components()
         .map(|part| part.as_os_str().as_encoded_bytes());

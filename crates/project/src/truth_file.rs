@@ -14,20 +14,22 @@ const MAX_LINE_BYTES: usize = 16 << 20;
 
 /// One true alignment and its line number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct TruthRow {
-    pub(super) line: usize,
-    pub(super) name: PairName,
+pub struct TruthRow {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// The pair.
+    pub name: PairName,
     /// The object as given.
-    pub(super) value: Value,
+    pub value: Value,
     /// Its mask of stroke tops, relative to the working directory.
-    pub(super) tops_mask: Option<PathBuf>,
+    pub tops_mask: Option<PathBuf>,
 }
 
 /// Parses all lines. A `tops_mask` path in the file is relative to the file's directory.
 ///
 /// # Errors
 /// Returns an error for the first line that is not a true alignment or repeats a pair.
-pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
+pub fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
     let mut rows = Vec::new();
@@ -60,7 +62,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLin
 }
 
 /// Refuses a row whose pair does not exist.
-pub(super) fn unknown_pair(row: &TruthRow) -> RefusedLine {
+pub fn unknown_pair(row: &TruthRow) -> RefusedLine {
     RefusedLine::new(row.line, &format!("there is no pair {}", row.name))
 }
 

@@ -7,7 +7,7 @@ use jiff::tz::TimeZone;
 use mocban_core::domain::UnixMillis;
 
 /// Formats a time in the time zone of the computer, with its offset from UTC: `2026-11-21 11:10:03 +07:00`.
-pub(super) fn local(at: UnixMillis) -> String {
+pub fn local(at: UnixMillis) -> String {
     in_zone(at, TimeZone::system())
 }
 
@@ -17,7 +17,7 @@ fn in_zone(at: UnixMillis, zone: TimeZone) -> String {
 }
 
 /// Formats a day in UTC: `2026-11-21`.
-pub(super) fn day(at: UnixMillis) -> String {
+pub fn day(at: UnixMillis) -> String {
     TimeZone::UTC.to_datetime(timestamp(at)).date().to_string()
 }
 
@@ -27,7 +27,7 @@ fn timestamp(at: UnixMillis) -> Timestamp {
 }
 
 /// Parses a time: `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`. A time without an offset is in UTC.
-pub(super) fn parse_utc(text: &str) -> Option<UnixMillis> {
+pub fn parse_utc(text: &str) -> Option<UnixMillis> {
     let time = text.parse::<Timestamp>().or_else(|_| {
         let local: DateTime = text.parse()?;
         TimeZone::UTC.to_timestamp(local)
@@ -36,7 +36,7 @@ pub(super) fn parse_utc(text: &str) -> Option<UnixMillis> {
 }
 
 /// Formats a duration in the unit that fits: `480 ms`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
-pub(super) fn duration(ms: u64) -> String {
+pub fn duration(ms: u64) -> String {
     let seconds = ms / 1000;
     match seconds {
         0 => format!("{ms} ms"),
@@ -47,7 +47,7 @@ pub(super) fn duration(ms: u64) -> String {
 }
 
 /// Formats an estimated duration, without fractions of a second.
-pub(super) fn rough_duration(ms: u64) -> String {
+pub fn rough_duration(ms: u64) -> String {
     match ms.div_ceil(1000) {
         seconds @ 0..60 => format!("{seconds} s"),
         _ => duration(ms),

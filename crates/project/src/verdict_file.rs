@@ -20,18 +20,20 @@ const REQUIRED: usize = 3;
 
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct VerdictRow {
-    pub(super) line: usize,
-    pub(super) verdict: NewVerdict,
+pub struct VerdictRow {
+    /// Number of the line, from 1.
+    pub line: usize,
+    /// The verdict.
+    pub verdict: NewVerdict,
     /// The judged result, if the file names it.
-    pub(super) judged: Option<ContentHash>,
+    pub judged: Option<ContentHash>,
 }
 
 /// Parses a CSV file. Detects its separator and encoding.
 ///
 /// # Errors
 /// Returns an error for the first invalid line.
-pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+pub fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
     let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
@@ -53,7 +55,7 @@ pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
 ///
 /// # Errors
 /// At the first such row.
-pub(super) fn check_values(rows: &[VerdictRow], now: UnixMillis) -> Result<(), RefusedLine> {
+pub fn check_values(rows: &[VerdictRow], now: UnixMillis) -> Result<(), RefusedLine> {
     rows.iter().try_for_each(|row| {
         let checked = row.verdict.check(now);
         checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
@@ -64,7 +66,7 @@ pub(super) fn check_values(rows: &[VerdictRow], now: UnixMillis) -> Result<(), R
 ///
 /// # Errors
 /// At the first such row.
-pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Result<(), RefusedLine> {
+pub fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Result<(), RefusedLine> {
     match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
         Some(row) => Err(RefusedLine::new(
             row.line,
@@ -166,7 +168,7 @@ struct VerdictLine {
 ///
 /// # Errors
 /// Returns an error for the first invalid line.
-pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
     let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
     let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());

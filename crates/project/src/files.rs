@@ -19,13 +19,19 @@ use mocban_store::{
 const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
+///
+/// # Errors
+/// Returns an error if there is no such file, it cannot be read, or it is too long.
+pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
-pub(super) fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
+///
+/// # Errors
+/// Returns the error of the system, unless the file does not exist.
+pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
         found => found.map(Some),
@@ -36,7 +42,10 @@ pub(super) fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>
 const MAX_SMALL: u64 = 1 << 20;
 
 /// Reads a small file, such as settings. Returns `None` if it does not exist.
-pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+///
+/// # Errors
+/// Returns an error if the file cannot be read or is longer than 1 MiB.
+pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
     // A link to a missing file exists, and cannot be read.
@@ -57,7 +66,10 @@ pub(super) fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
 }
 
 /// Refuses to write into a folder that does not exist.
-pub(super) fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
+///
+/// # Errors
+/// Returns an error if the folder does not exist.
+pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty());
@@ -72,7 +84,10 @@ pub(super) fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
-pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
+///
+/// # Errors
+/// Returns an error if the path is one of these files.
+pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     refuse_missing_folder(path)?;
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = real.file_name().unwrap_or_default().to_string_lossy();
@@ -94,7 +109,10 @@ pub(super) fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
-pub(super) async fn refuse_used_file(
+///
+/// # Errors
+/// Returns an error if the path is one of these files, or the catalog cannot be read.
+pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
     catalog: &Catalog,
@@ -126,7 +144,10 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
-pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
+///
+/// # Errors
+/// Returns an error if the file cannot be read.
+pub fn is_backup(file: &Path) -> std::io::Result<bool> {
     if !std::fs::metadata(file)?.is_file() {
         return Ok(false);
     }
@@ -141,7 +162,10 @@ pub(super) fn is_backup(file: &Path) -> std::io::Result<bool> {
 
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
 /// complete.
-pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+///
+/// # Errors
+/// Returns an error if an incomplete output would replace a file, or the file cannot be written.
+pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {
@@ -154,7 +178,10 @@ pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyh
 }
 
 /// Lists the files of a directory, without its subdirectories and links to directories.
-pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
+///
+/// # Errors
+/// Returns an error if there is no such directory, or it cannot be listed.
+pub fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| match error.kind() {
         ErrorKind::NotADirectory => Refusal::Usage(format!("{} is not a directory", dir.display())),
         _ => refusal(dir, &error, "there is no directory", "cannot list"),
@@ -176,7 +203,7 @@ pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
 }
 
 /// Returns whether a file holds JSON Lines. If its extension is unknown, the first character decides.
-pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
+pub fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let extension = file.extension().and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
         Some("jsonl" | "ndjson" | "json") => true,
@@ -191,13 +218,14 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
 /// What is wrong with a line of a file that is refused as a whole.
 #[derive(Debug, thiserror::Error)]
 #[error("line {line}: {reason}")]
-pub(super) struct RefusedLine {
+pub struct RefusedLine {
     line: usize,
     reason: String,
 }
 
 impl RefusedLine {
-    pub(super) fn new(line: usize, reason: &str) -> Self {
+    /// Names a line and what is wrong with it.
+    pub fn new(line: usize, reason: &str) -> Self {
         Self {
             line,
             reason: sanitize(reason, 300),
@@ -205,7 +233,7 @@ impl RefusedLine {
     }
 
     /// Refuses the file; `outcome` says that nothing was changed.
-    pub(super) fn in_file(&self, file: &Path, outcome: &str) -> Refusal {
+    pub fn in_file(&self, file: &Path, outcome: &str) -> Refusal {
         Refusal::Usage(format!("{}: {self}; {outcome}", file.display()))
     }
 }
@@ -220,7 +248,7 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
 }
 
 /// Returns the limits of input files in the settings.
-pub(super) const fn input_file_limits(config: &Config) -> InputFileLimits {
+pub const fn input_file_limits(config: &Config) -> InputFileLimits {
     InputFileLimits {
         mesh: config.limits.mesh,
         image: config.limits.image,

@@ -15,12 +15,12 @@ use mocban_store::Project;
 
 /// Valid pairs to import. A manifest file is kept as text, and its rows are parsed again when they are needed.
 #[derive(Debug)]
-pub(super) struct Listing {
+pub struct Listing {
     source: ListingSource,
     /// The ids of all pairs.
-    pub(super) ids: RowIds,
+    pub ids: RowIds,
     /// Warnings, one line each.
-    pub(super) warnings: Vec<String>,
+    pub warnings: Vec<String>,
     /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
@@ -42,7 +42,7 @@ enum ListingSource {
 type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
 
 /// Refuses a manifest as a whole.
-pub(super) fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
+pub fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
     let problems = problems.to_string().replace('\n', "\n  ");
     let from = from.display();
     Refusal::Usage(format!(
@@ -52,7 +52,10 @@ pub(super) fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
 
 impl Listing {
     /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
-    pub(super) fn from_file(file: &Path) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// Returns an error if the list cannot be read or is refused.
+    pub fn from_file(file: &Path) -> anyhow::Result<Self> {
         let shown = file.display();
         if file.is_dir() {
             let text =
@@ -63,7 +66,10 @@ impl Listing {
     }
 
     /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
-    pub(super) fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// Returns an error if the list is refused.
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
             read_jsonl
@@ -96,7 +102,7 @@ impl Listing {
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
-    pub(super) fn from_folders(
+    pub fn from_folders(
         meshes: &Path,
         prints: &Path,
         unit: Option<LengthUnit>,
@@ -125,7 +131,7 @@ impl Listing {
 
     /// Calls `each` for every row, with a message for each missing file. Paths start with the manifest's directory.
     /// Paths below a named root of `project` stay as they are.
-    pub(super) fn rows(&self, project: &Project, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+    pub fn rows(&self, project: &Project, mut each: impl FnMut(ManifestRow, Vec<String>)) {
         let is_below_root = |path: &Path| {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
@@ -212,7 +218,7 @@ const MAX_PATH_CHARS: usize = 300;
 
 /// Replaces the path of a row's file by its path on disk. Describes a file that does not exist or cannot be read, at a
 /// row with a label and a number; returns `None` if it exists.
-pub(super) fn locate_file(
+pub fn locate_file(
     (label, line): (&str, usize),
     kind: &str,
     path: &mut PathBuf,

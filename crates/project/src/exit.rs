@@ -48,7 +48,7 @@ const MEANINGS: [(ExitCode, &str); 11] = [
 
 impl ExitCode {
     /// Returns the table of codes for `--help`.
-    pub(super) fn table() -> String {
+    pub fn table() -> String {
         let line = |(code, meaning): (Self, &str)| format!("\n  {:>3}  {meaning}", code as u8);
         format!("Exit codes:{}", MEANINGS.map(line).concat())
     }
@@ -62,7 +62,7 @@ impl From<ExitCode> for std::process::ExitCode {
 
 /// A command that cannot be carried out as given, with its own exit code.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum Refusal {
+pub enum Refusal {
     /// An unknown pair, or a selection without pairs.
     #[error("{0}")]
     NothingSelected(String),
@@ -76,7 +76,7 @@ pub(super) enum Refusal {
 
 impl Refusal {
     /// Returns the exit code.
-    pub(super) const fn code(&self) -> ExitCode {
+    pub const fn code(&self) -> ExitCode {
         match self {
             Self::NothingSelected(_) => ExitCode::NothingSelected,
             Self::Usage(_) => ExitCode::Usage,

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use anyhow::Context as _;
 
-use super::context::{Context, shell_quoted};
-use super::exit::Refusal;
-use super::{files, signals};
+use crate::exit::Refusal;
+use crate::files;
+use crate::shell::shell_quoted;
 use mocban_demo::block::{BlockOptions, block_options};
 use mocban_demo::{DatasetError, DemoOptions};
 use mocban_runner::Stop;
@@ -17,12 +17,14 @@ const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their
 alignments.\nCreated by `mocban demo`, which creates it again if it is incomplete; do not put your own files here.\n";
 
 /// Message if a signal stopped the writing.
-pub(super) const STOPPED: &str = "stopped while the files were being written; nothing was imported, and the same command starts again";
+pub const STOPPED: &str = "stopped while the files were being written; nothing was imported, and the same command starts again";
 
 /// What a demo contains.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum DemoContent {
+pub enum DemoContent {
+    /// Pairs.
     Pairs(DemoOptions),
+    /// A whole block.
     Block(BlockOptions),
 }
 
@@ -56,7 +58,7 @@ impl DemoContent {
 ///
 /// # Errors
 /// Returns an error if the directory is refused or cannot be read.
-pub(super) fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> anyhow::Result<()> {
+pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> anyhow::Result<()> {
     let refuse = |reason: &str| {
         let shown = dir.display();
         let text = format!("{shown} {reason}; name another directory for this demo");
@@ -108,36 +110,31 @@ fn has_note(data: &Path) -> anyhow::Result<bool> {
 }
 
 /// Writes the data of a demo next to `data` and then replaces `data`, so that a project never sees half of them. Calls
-/// `write` on another thread and watches for signals. The paths that `write` returns lie in a folder that was moved
-/// since. Returns `None` if a signal stopped the writing.
+/// `write` on another thread. The paths that it returns lie in a folder that was moved since. Returns `None` if `write`
+/// was stopped, and otherwise a warning if the earlier data could not be removed.
 ///
 /// # Errors
 /// Returns an error if the files cannot be written.
-pub(super) async fn replace_data<T: Send + 'static>(
+pub async fn replace_data<T: Send + 'static>(
     data: &Path,
-    context: &Context,
+    stop: &Stop,
     write: impl FnOnce(&Path, &Stop) -> Result<T, DatasetError> + Send + 'static,
-) -> anyhow::Result<Option<T>> {
+) -> anyhow::Result<Option<(T, Option<String>)>> {
     let folder = ReplacementFolder::begin(data)?;
     let note = folder.path().join(NOTE);
     std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
-    let stop = Stop::default();
-    let signals = signals::watch(&stop)?;
-    let target = folder.path().to_owned();
-    let writing = tokio::task::spawn_blocking(move || write(&target, &stop));
-    let written = writing.await?;
-    signals.abort();
-    let written = match written {
+    let (target, stop) = (folder.path().to_owned(), stop.clone());
+    let written = match tokio::task::spawn_blocking(move || write(&target, &stop)).await? {
         Err(DatasetError::Stopped) => return Ok(None),
         written => written?,
     };
-    if let Some((path, error)) = folder.finish()? {
-        context.warn(&format!(
+    let warning = folder.finish()?.map(|(path, error)| {
+        format!(
             "the earlier data could not be removed from {}: {error}; the next demo that writes data removes them",
             path.display()
-        ));
-    }
-    Ok(Some(written))
+        )
+    });
+    Ok(Some((written, warning)))
 }
 
 #[cfg(test)]

@@ -1,0 +1,192 @@
+//! Imports whole blocks with their pages into a project, which is created if there is none.
+
+use std::path::{Path, PathBuf};
+
+use crate::exit::Refusal;
+use crate::files;
+use crate::import_pairs::PairSource;
+use crate::location::{Location, now};
+use crate::manifest_file::{locate_file, refuse};
+use crate::missing_files::MissingFiles;
+use crate::new_project::import_with;
+use mocban_catalog::{BlockAttributes, BlockImportSummary};
+use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
+use mocban_lists::manifest::{BlockRow, is_block_list, parse_blocks};
+use mocban_store::Project;
+
+/// What an import of blocks changed.
+#[derive(Debug)]
+pub struct BlockImportOutcome {
+    /// Blocks by what happened to them.
+    pub summary: BlockImportSummary,
+    /// Files that do not exist.
+    pub missing: MissingFiles,
+}
+
+/// Blocks to import.
+struct BlockListing {
+    rows: Vec<BlockRow>,
+    /// Label of row numbers in messages: `blocks.csv: line`, or `block` for a single one.
+    label: String,
+}
+
+/// Where the blocks of an import are named.
+#[derive(Debug)]
+pub enum BlockSource {
+    /// By its files.
+    One(ImportedBlock),
+    /// In a list.
+    List {
+        /// Its path.
+        file: PathBuf,
+        /// Its content. It is read once, because it may be a pipe.
+        bytes: Vec<u8>,
+    },
+}
+
+/// The files of one block.
+#[derive(Debug, Clone)]
+pub struct ImportedBlock {
+    /// The scan.
+    pub mesh: PathBuf,
+    /// The image of the printed page.
+    pub page: PathBuf,
+    /// Boxes of the characters on the page; a run finds them otherwise.
+    pub labels: Option<PathBuf>,
+    /// The side of the block that the page shows; a run finds it otherwise.
+    pub side: Option<BlockSide>,
+    /// Id of the block; by default the file name of the mesh without extension.
+    pub name: Option<String>,
+    /// Unit of the mesh.
+    pub unit: Option<LengthUnit>,
+}
+
+/// What a list names.
+#[derive(Debug)]
+pub enum ListedItems {
+    /// Whole blocks.
+    Blocks(BlockSource),
+    /// Pairs.
+    Pairs(PairSource),
+}
+
+impl ListedItems {
+    /// Reads a list and decides from its header what it names.
+    ///
+    /// # Errors
+    /// Returns an error if the list cannot be read.
+    pub fn of(file: &Path) -> anyhow::Result<Self> {
+        let pairs = |bytes| PairSource::List {
+            file: file.to_owned(),
+            bytes,
+        };
+        if file.is_dir() {
+            return Ok(Self::Pairs(pairs(None)));
+        }
+        let bytes = files::read(file)?;
+        let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
+        Ok(if is_list {
+            Self::Blocks(BlockSource::List {
+                file: file.to_owned(),
+                bytes,
+            })
+        } else {
+            Self::Pairs(pairs(Some(bytes)))
+        })
+    }
+}
+
+/// Imports blocks. If the import fails, no block is imported.
+///
+/// # Errors
+/// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
+pub async fn import_blocks(
+    source: &BlockSource,
+    allow_missing: bool,
+    location: &Location,
+) -> anyhow::Result<BlockImportOutcome> {
+    let mut listing = listing(source)?;
+    let (storage, url) = location.data_locations()?;
+    let project = Project::at(&location.dir).with_storage(storage);
+    let mut missing = MissingFiles::default();
+    for row in &mut listing.rows {
+        locate(row, &listing.label, &project, &mut missing);
+    }
+    if missing.count > 0 && !allow_missing {
+        return Err(missing.refusal().into());
+    }
+    let rows = listing.rows.iter().map(|row| stored_row(row, &project));
+    let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
+    let checked = async || Ok(());
+    let summary = import_with(&project, url.as_deref(), checked, async |catalog| {
+        Ok(catalog.import_blocks(rows.clone(), now()).await?)
+    });
+    Ok(BlockImportOutcome {
+        summary: summary.await?,
+        missing,
+    })
+}
+
+fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
+    let (file, bytes) = match source {
+        BlockSource::List { file, bytes } => (file, bytes),
+        BlockSource::One(files) => {
+            return Ok(BlockListing {
+                rows: vec![BlockRow {
+                    line: 1,
+                    name: name(files.name.as_deref(), &files.mesh)?,
+                    mesh: files.mesh.clone(),
+                    page: files.page.clone(),
+                    labels: files.labels.clone(),
+                    unit: files.unit,
+                    side: files.side,
+                }],
+                label: "block".to_owned(),
+            });
+        }
+    };
+    let mut rows = parse_blocks(bytes).map_err(|problems| refuse(file, &problems))?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    for row in &mut rows {
+        let paths = [&mut row.mesh, &mut row.page].into_iter();
+        for path in paths.chain(row.labels.as_mut()) {
+            *path = folder.join(&*path);
+        }
+    }
+    Ok(BlockListing {
+        rows,
+        label: format!("{}: line", file.display()),
+    })
+}
+
+/// Returns the given name, or the name of the mesh file without its extension.
+fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
+    let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
+    BlockName::new(given.unwrap_or(&stem)).map_err(|error| {
+        let text = format!("{}: {error}; give another one with --name", mesh.display());
+        Refusal::Usage(text).into()
+    })
+}
+
+/// Replaces the paths of a row by those on disk, and records missing files.
+fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut MissingFiles) {
+    let (line, name) = (row.line, row.name.clone());
+    let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();
+    for (kind, path) in required.chain(row.labels.as_mut().map(|path| ("labels", path))) {
+        if let Some(line) = locate_file((label, line), kind, path, &name, project) {
+            missing.add(line);
+        }
+    }
+}
+
+fn stored_row(row: &BlockRow, project: &Project) -> anyhow::Result<BlockAttributes> {
+    let stored = |path: &PathBuf| project.stored_path(path);
+    Ok(BlockAttributes {
+        name: row.name.clone(),
+        mesh_path: stored(&row.mesh)?,
+        page_path: stored(&row.page)?,
+        labels_path: row.labels.as_ref().map(stored).transpose()?,
+        unit: row.unit,
+        side: row.side,
+    })
+}

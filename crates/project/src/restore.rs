@@ -1,0 +1,222 @@
+//! Makes a project of a backup.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use anyhow::Context as _;
+
+use crate::backup::count_rows;
+use crate::error_text::describe;
+use crate::exit::Refusal;
+use crate::files::{self, is_backup, metadata};
+use crate::location::Location;
+use mocban_catalog::Catalog;
+use mocban_config::{LocalSettings, make_local};
+use mocban_store::{
+    CATALOG_FILE, Project, SETTINGS_FILE, StagingFolder, TargetLock, place_new_file, write_synced,
+};
+
+/// A backup to restore.
+#[derive(Debug)]
+pub struct RestoreRequest {
+    /// The backup.
+    pub backup: PathBuf,
+    /// The project folder to create; it may hold meshes and prints already.
+    pub dir: PathBuf,
+    /// A folder where meshes and prints are looked for that are no longer at their old places.
+    pub inputs: Option<PathBuf>,
+}
+
+/// What a restored project holds.
+#[derive(Debug)]
+pub struct Restored {
+    /// Number of pairs.
+    pub pairs: u64,
+    /// Number of verdicts.
+    pub verdicts: u64,
+    /// Settings of the backup, made local.
+    pub settings: Option<LocalSettings>,
+    /// Paths of meshes and prints that `--inputs` did not find.
+    pub missing: Vec<String>,
+}
+
+/// Makes a project of a backup. Everything that can refuse it is checked before anything is written. `location` has the
+/// settings of the environment and of flags, which must not lead the new project to a server.
+///
+/// # Errors
+/// Returns an error if the backup, the folders or the settings are refused, or the disk fails. Then there is no project.
+pub async fn restore(request: &RestoreRequest, location: &Location) -> anyhow::Result<Restored> {
+    let RestoreRequest {
+        backup,
+        dir,
+        inputs,
+    } = request;
+    check_backup(backup)?;
+    if let Some(inputs) = inputs {
+        check_inputs(inputs)?;
+    }
+    check_directory(&Project::at(dir))?;
+    location.at(dir).require_local("the restored project")?;
+    let existed = dir.exists();
+    let restored = restore_into(backup, dir, inputs.as_deref()).await;
+    if restored.is_err() && !existed {
+        // Fails unless the directory is empty.
+        let _ = std::fs::remove_dir(dir);
+    }
+    restored
+}
+
+/// Creates the project. The catalog comes last: a directory without a catalog is no project.
+async fn restore_into(
+    backup: &Path,
+    dir: &Path,
+    inputs: Option<&Path>,
+) -> anyhow::Result<Restored> {
+    let failed = || format!("cannot restore {} to {}", backup.display(), dir.display());
+    let project = Project::create(dir).with_context(failed)?;
+    let catalog = project.catalog_path();
+    let _lock = TargetLock::acquire(&catalog).with_context(failed)?;
+    let staging = StagingFolder::beside(&catalog).with_context(failed)?;
+    let new = staging.path().join(CATALOG_FILE);
+    let settings = Catalog::restore_backup(backup, &new)
+        .await
+        .with_context(failed)?;
+    let missing = match inputs {
+        None => Vec::new(),
+        Some(inputs) => {
+            let located = locate_inputs(&project, &new, inputs).await;
+            located.map_err(|error| anyhow::anyhow!(describe(&error, staging.path())))?
+        }
+    };
+    let (pairs, verdicts) = count_rows(staging.path()).await.with_context(failed)?;
+    check_directory(&project)?;
+    let settings = settings.as_deref().map(make_local);
+    let wrote_settings = match &settings {
+        Some(settings) => {
+            write_settings(&project, &settings.text, staging.path()).with_context(failed)?
+        }
+        None => false,
+    };
+    if !place_new_file(&new, &catalog).with_context(failed)? {
+        // Another process created a project in the meantime, which has no settings of its own.
+        if wrote_settings {
+            let _ = std::fs::remove_file(project.settings_path());
+        }
+        return Err(is_project_already(&project));
+    }
+    Ok(Restored {
+        pairs,
+        verdicts,
+        settings,
+        missing,
+    })
+}
+
+/// Changes the paths of meshes and prints that exist below `inputs` and not at their old places. Returns the paths of
+/// missing meshes and prints. A file that cannot be looked up is an error, because it may not be missing.
+async fn locate_inputs(
+    project: &Project,
+    new: &Path,
+    inputs: &Path,
+) -> anyhow::Result<Vec<String>> {
+    let catalog = Catalog::open(new).await?;
+    let (project, inputs) = (project.clone(), inputs.to_owned());
+    let unreadable = Arc::new(OnceLock::new());
+    let first_unreadable = Arc::clone(&unreadable);
+    let replaced = catalog.replace_input_paths(move |stored| {
+        if project.input(stored).exists() {
+            return Some(stored.to_owned());
+        }
+        project.find_input(stored, &inputs).unwrap_or_else(|error| {
+            let _ = first_unreadable.set(error);
+            None
+        })
+    });
+    let missing = replaced.await;
+    catalog.close().await;
+    if let Some(error) = unreadable.get() {
+        anyhow::bail!("cannot look for a mesh or print: {error}");
+    }
+    // Changes that are still in the write-ahead log would be lost when the file is renamed.
+    let log = metadata(&new.with_file_name(format!("{CATALOG_FILE}-wal")))?;
+    anyhow::ensure!(
+        log.is_none_or(|log| log.len() == 0),
+        "the disk is full or reported an error"
+    );
+    Ok(missing?)
+}
+
+/// Writes the settings file of a project. An equal file may exist: a restore that was killed has written it. Returns
+/// whether the file was written.
+fn write_settings(project: &Project, text: &str, staging: &Path) -> anyhow::Result<bool> {
+    let path = project.settings_path();
+    let new = staging.join(SETTINGS_FILE);
+    write_synced(&new, text.as_bytes())?;
+    if place_new_file(&new, &path)? {
+        return Ok(true);
+    }
+    if files::small(&path)?.is_some_and(|found| found == text.as_bytes()) {
+        return Ok(false);
+    }
+    let text = format!(
+        "{} exists and differs from the settings that the backup would write there; rename it",
+        path.display()
+    );
+    Err(Refusal::Usage(text).into())
+}
+
+/// Refuses inputs that are not a directory.
+fn check_inputs(inputs: &Path) -> anyhow::Result<()> {
+    let shown = inputs.display();
+    let found = metadata(inputs).with_context(|| format!("cannot read {shown}"))?;
+    if found.is_some_and(|found| found.is_dir()) {
+        // Otherwise every file would look missing.
+        std::fs::read_dir(inputs).with_context(|| format!("cannot read {shown}"))?;
+        return Ok(());
+    }
+    Err(Refusal::Usage(format!("there is no directory {shown}")).into())
+}
+
+/// Refuses a file that is not a backup.
+fn check_backup(backup: &Path) -> anyhow::Result<()> {
+    let shown = backup.display();
+    let failed = || format!("cannot read {shown}");
+    let refuse = |text: String| Err(Refusal::Usage(text).into());
+    if metadata(backup).with_context(failed)?.is_none() {
+        return refuse(format!("there is no file {shown}"));
+    }
+    if !is_backup(backup).with_context(failed)? {
+        return refuse(format!("{shown} is not a backup"));
+    }
+    // The log of a catalog in use holds changes that the file lacks.
+    let mut log = backup.as_os_str().to_owned();
+    log.push("-wal");
+    let log = metadata(Path::new(&log)).with_context(failed)?;
+    if log.is_some_and(|log| log.len() > 0) {
+        return refuse(format!(
+            "{shown} is the catalog of a project in use; `backup` copies it"
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a directory that is a project.
+fn check_directory(project: &Project) -> anyhow::Result<()> {
+    let shown = project.dir().display();
+    let catalog = metadata(&project.catalog_path());
+    if catalog
+        .with_context(|| format!("cannot read {shown}"))?
+        .is_some()
+    {
+        return Err(is_project_already(project));
+    }
+    Ok(())
+}
+
+fn is_project_already(project: &Project) -> anyhow::Error {
+    let shown = project.dir().display();
+    Refusal::Usage(format!(
+        "{shown} is a project already; name another directory"
+    ))
+    .into()
+}

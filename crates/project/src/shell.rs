@@ -1,0 +1,40 @@
+//! Words of a command that can be copied into a shell.
+
+use mocban_core::domain::is_hidden;
+
+/// Quotes a word for a POSIX shell if it needs quotes. A word with characters that a terminal does not show is quoted
+/// as `$'..'`, and each byte of such a character is escaped.
+pub fn shell_quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "_-./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else if word.contains(is_hidden) {
+        let quoted = word.chars().map(|c| match c {
+            '\'' | '\\' => format!("\\{c}"),
+            _ if is_hidden(c) => {
+                let hidden = c.to_string();
+                // Three octal digits end the escape, whatever follows.
+                let bytes = hidden.bytes().map(|byte| format!("\\{byte:03o}"));
+                bytes.collect::<Vec<_>>().concat()
+            }
+            _ => c.to_string(),
+        });
+        format!("$'{}'", quoted.collect::<String>())
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shell_quoted;
+
+    #[test]
+    fn words_that_a_shell_would_split_are_quoted() {
+        assert_eq!(shell_quoted("demo/a-b"), "demo/a-b");
+        assert_eq!(shell_quoted("my scans"), "'my scans'");
+        assert_eq!(shell_quoted("it's"), r"'it'\''s'");
+        assert_eq!(shell_quoted(""), "''");
+        assert_eq!(shell_quoted("a\n'\u{1b}5\\"), r"$'a\012\'\0335\\'");
+    }
+}
