@@ -43,7 +43,7 @@ impl DepthParams {
     /// Returns the largest number of pixels of a map of a scan that is at most `longest_mm` long.
     ///
     /// ```
-    /// use mocban::stages::depth::{DepthParams, ResolutionBy};
+    /// use mocban_align::stages::depth::{DepthParams, ResolutionBy};
     ///
     /// let by_side = DepthParams { resolution_by: ResolutionBy::LongestSide, longest_px: 512, px_per_mm: 10.0 };
     /// assert_eq!(by_side.max_pixels(40.0), 512 * 512);

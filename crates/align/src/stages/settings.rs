@@ -67,10 +67,9 @@ impl Settings {
     ///
     /// # Examples
     /// ```
-    /// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"));
     /// use mocban_core::domain::Stage;
     ///
-    /// let before = default_settings()?;
+    /// let before = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"))?;
     /// let mut after = before.clone();
     /// after.register.smoothing_px = 2.0;
     /// assert_eq!(before.fingerprint_fields(Stage::Fit), after.fingerprint_fields(Stage::Fit));

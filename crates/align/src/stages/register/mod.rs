@@ -66,10 +66,9 @@ const TOPS_AT_RIM: f64 = 0.6;
 ///
 /// # Examples
 /// ```
-/// # include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"));
 /// # use mocban_core::raster;
 /// # use mocban_demo as demo;
-/// # let settings = default_settings()?;
+/// # let settings = include!(concat!(env!("CARGO_MANIFEST_DIR"), "/doc/default_settings.in"))?;
 /// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
 /// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
 /// use mocban_align::stages::{Print, Scan, depth, fit, normalize, register};
