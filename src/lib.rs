@@ -44,14 +44,14 @@
 //!     `comparison_tables.rs` and `risk_coverage_tables.rs`; `csv.rs` has its own columns, and JSON is the serialized
 //!     `Report`
 //!
-//! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
-//! (checks the values of a row), `cli/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
+//! Smaller files on the way: `cli/commands/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
+//! (checks the values of a row), `cli/commands/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
 //! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns
 //! the write connection), `db/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
 //! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
 //! `runner/run_metrics.rs` (counts and times, which heartbeats store for `status --hosts`),
 //! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
-//! rows that no run can compute again), `cli/report.rs`, `report/headline.rs` (the answer in three
+//! rows that no run can compute again), `cli/commands/report.rs`, `report/headline.rs` (the answer in three
 //! sentences), `report/provenance.rs` (settings and hashes), `report/render/table.rs` and `report/number_format.rs` (the
 //! text of a cell).
 //! `crates/system/src/failpoint.rs` lists the points of this path at which tests kill the process.
@@ -130,7 +130,7 @@
 //! recovers the job because the worker's last heartbeat is more than a minute past the stage's deadline
 //! (`crates/runner/src/worker_session.rs`; the times are in `Timing` in `crates/runner/src/policy.rs`). The start of a run
 //! (`crates/runner/src/run.rs`) recovers the jobs of all other workers if it holds the lock `run.members` alone, because these
-//! workers are then dead. A repair (`src/cli/check.rs`, `crates/runner/src/check/mod.rs`) must hold the same lock. It resets only the
+//! workers are then dead. A repair (`src/cli/commands/check.rs`, `crates/runner/src/check/mod.rs`) must hold the same lock. It resets only the
 //! jobs of damaged pairs, which ends their leases. After a refused heartbeat, a process recovers the jobs of its own
 //! old id (`register_again`). The statements are in `crates/catalog/src/queue/recovery.rs` and `crates/catalog/src/audit/repair.rs`.
 //! Each of them increases the job's fencing token.
@@ -188,7 +188,7 @@
 //! Outside unit tests and comments, these files in `src/` name a variant of [`domain::ThresholdMetric`]; all others
 //! iterate over its `ALL` or `PAPER`, or take a metric as an argument:
 //!
-//! - `src/cli/show.rs`: the metric that is compared with manual alignments; no change needed
+//! - `src/cli/commands/show.rs`: the metric that is compared with manual alignments; no change needed
 //! - `crates/core/src/domain/metric.rs`: the variant with its definition, name and title; tables use this order
 //! - `crates/report/src/comparison.rs`: which metrics are compared with each other
 //! - `crates/align/src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
@@ -196,7 +196,7 @@
 //! - `crates/align/src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
 //!
 //! Also touched: the weights in `crates/align/src/stages/register/confidence.rs`, `REVISION` in `crates/align/src/stages/register/mod.rs`, the
-//! help text of `--metric` in `src/cli/contact_sheet.rs` and `src/cli/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
+//! help text of `--metric` in `src/cli/commands/contact_sheet.rs` and `src/cli/commands/verdict.rs`, the `CHECK` lists of three tables and `user_version` in
 //! `migrations/`, `SCHEMA_VERSION` in `crates/catalog/src/db/open.rs`, `README.md`, `docs/reference/report.md`, and tests and snapshots.
 //! `CONTRIBUTING.md` lists them in the order of work.
 //!

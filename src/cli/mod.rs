@@ -1,68 +1,26 @@
 //! The command line: one thin file per command.
+//!
+//! `commands` has the commands, `output` what they print and the context that all have, `input` what users name.
 
-mod agreement;
 mod args;
-mod backup;
-mod block_points;
-mod block_sheet;
-mod block_status;
-mod browser;
-mod busy;
-mod check;
-mod compare;
-mod completions;
-mod config;
-mod contact_sheet;
-mod context;
-mod copy;
-mod db;
-mod demo;
-mod demo_block;
-mod demo_data;
-mod docs;
-mod examples;
-mod export;
-mod failures;
-mod global;
-mod import;
-mod import_blocks;
-mod logging;
-mod man;
-mod metrics;
-mod missing_results;
-mod nearby_projects;
+mod commands;
+mod input;
 mod output;
-mod panics;
-mod progress;
-mod report;
-mod restore;
-mod retry;
-mod review;
-mod run;
-mod run_progress;
-mod run_text;
-mod screen;
-mod select;
-mod show;
-mod show_block;
-mod show_text;
-mod signals;
-mod status;
-mod status_hosts;
-mod table;
-mod verdict;
-mod view;
-mod worker;
-mod worker_totals;
 
 use std::ffi::OsString;
 
 use tokio::runtime::{Builder, Runtime};
 
 use args::Command;
-use context::Context;
+use commands::{
+    agreement, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export,
+    import, man, report, restore, retry, review, run, show, status, verdict, view, worker,
+};
+use input::nearby_projects;
 pub use mocban_project::exit::ExitCode;
-use screen::Screen;
+use output::context::Context;
+use output::screen::Screen;
+use output::{logging, panics};
 
 use mocban_core::domain::is_hidden;
 use mocban_project::error_text;

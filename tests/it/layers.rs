@@ -86,9 +86,9 @@ fn only_progress_and_screen_draw() {
         assert!(
             !draws
                 || [
-                    "src/cli/busy.rs",
-                    "src/cli/progress.rs",
-                    "src/cli/screen.rs"
+                    "src/cli/output/busy.rs",
+                    "src/cli/output/progress.rs",
+                    "src/cli/output/screen.rs"
                 ]
                 .contains(&file.name.as_str()),
             "{}",

@@ -1,0 +1,46 @@
+//! `backup`: copies catalog, verdicts and settings to one file.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::cli::output::busy::Busy;
+use crate::cli::output::context::Context;
+use crate::cli::output::table::count;
+use mocban_project::backup::{self, Backup};
+use mocban_project::exit::ExitCode;
+
+/// Arguments of `backup`.
+#[derive(Debug, Args)]
+pub(crate) struct BackupArgs {
+    /// The file to write, such as blocks.sqlite; an existing backup is replaced only when the new one is complete. The
+    /// file holds pairs, results, verdicts and the project's settings, but neither scans and prints nor depth maps and
+    /// masks; `restore` makes a project of it
+    pub(crate) file: PathBuf,
+}
+
+pub(crate) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let file = &args.file;
+    let shown = file.display();
+    let busy = Busy::start(context, "copying the catalog");
+    let written = backup::backup(file, &context.location).await;
+    drop(busy);
+    let Backup {
+        bytes,
+        pairs,
+        verdicts,
+    } = written?;
+    // The verdicts have no file of their own.
+    context.print_json(&json!({
+        "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
+        "verdicts_file": Value::Null,
+    }))?;
+    context.info(&format!(
+        "{} and {} saved to {shown}, {:.1} MB; your scans and prints are not in it, and neither are depth maps and masks, which `run` computes again from them",
+        count(pairs, "pair"),
+        count(verdicts, "verdict"),
+        bytes as f64 / 1e6
+    ));
+    Ok(ExitCode::Done)
+}

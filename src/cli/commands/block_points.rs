@@ -1,0 +1,96 @@
+//! Reads a block for its correction, and stores its control points in the catalog.
+
+use tokio::runtime::Handle;
+
+use crate::cli::output::context::Context;
+use mocban_catalog::{Catalog, ControlPointsChange};
+use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
+use mocban_export::block_view::{BlockCorrection, replaced_file};
+use mocban_pages::view::{CorrectionStore, PointsSaved};
+use mocban_store::Project;
+
+/// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
+/// open does not hold it.
+#[derive(Clone)]
+pub(crate) struct BlockPoints {
+    context: Context,
+    block: BlockName,
+}
+
+impl BlockPoints {
+    /// Creates the access to the control points of a block.
+    pub(crate) fn new(context: &Context, block: &BlockName) -> Self {
+        Self {
+            context: context.clone(),
+            block: block.clone(),
+        }
+    }
+
+    async fn read_block(&self) -> anyhow::Result<BlockCorrection> {
+        let (project, catalog) = self.context.open_read_only().await?;
+        let limits = self.context.settings()?.config.limits.image;
+        let read = BlockCorrection::read(&catalog, &project, &self.block, limits).await;
+        catalog.close().await;
+        Ok(read?)
+    }
+
+    async fn store(
+        &self,
+        read: Option<ContentHash>,
+        points: Option<&ControlPoints>,
+    ) -> anyhow::Result<PointsSaved> {
+        let (project, catalog) = self.context.open().await?;
+        let stored = self.store_in(&catalog, &project, read, points).await;
+        catalog.close().await;
+        stored
+    }
+
+    async fn store_in(
+        &self,
+        catalog: &Catalog,
+        project: &Project,
+        read: Option<ContentHash>,
+        points: Option<&ControlPoints>,
+    ) -> anyhow::Result<PointsSaved> {
+        let block = &self.block;
+        if let Some(points) = points
+            && let Some(path) = replaced_file(catalog, project, block, points).await?
+        {
+            return Ok(PointsSaved::FileReplaced(path));
+        }
+        match catalog.set_control_points(block, read, points).await? {
+            ControlPointsChange::Stored => Ok(PointsSaved::Saved),
+            ControlPointsChange::Outdated => Ok(PointsSaved::OthersSaved),
+            ControlPointsChange::NoBlock => anyhow::bail!("block {block} was removed meanwhile"),
+        }
+    }
+}
+
+impl CorrectionStore for BlockPoints {
+    async fn read(&self) -> Result<BlockCorrection, String> {
+        let own = self.clone();
+        on_thread(move || Handle::current().block_on(own.read_block())).await
+    }
+
+    async fn save(
+        &self,
+        read: Option<ContentHash>,
+        points: Option<ControlPoints>,
+    ) -> Result<PointsSaved, String> {
+        let own = self.clone();
+        on_thread(move || Handle::current().block_on(own.store(read, points.as_ref()))).await
+    }
+
+    fn next_command(&self) -> String {
+        self.context.command("run")
+    }
+}
+
+/// Runs work on a thread for long work, and returns the sentence of an error. Futures that open a catalog are not `Send`.
+async fn on_thread<T: Send + 'static>(
+    work: impl FnOnce() -> anyhow::Result<T> + Send + 'static,
+) -> Result<T, String> {
+    let done = tokio::task::spawn_blocking(work).await;
+    let done = done.map_err(anyhow::Error::from).flatten();
+    done.map_err(|error| format!("{error:#}"))
+}

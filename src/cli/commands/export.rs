@@ -1,0 +1,312 @@
+//! `export`: writes the aligned pairs for other tools.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use serde_json::json;
+
+use crate::cli::output::busy::Busy;
+use crate::cli::output::context::Context;
+use crate::cli::output::table::count;
+use mocban_core::domain::ThresholdMetric;
+use mocban_export::{
+    ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
+    SplitShares,
+};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::input_file_limits;
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// Formats, separated by commas. One format is written to DIR itself, several each to DIR/FORMAT
+    #[arg(
+        long,
+        value_name = "FORMAT",
+        default_value = "jsonl",
+        value_delimiter = ',',
+        value_parser = one_of::<ExportFormat>(ExportFormat::ALL.map(described))
+    )]
+    pub(crate) to: Vec<ExportFormat>,
+    /// The directory to write; an earlier export there is replaced as a whole
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Export only these metrics, separated by commas
+    #[arg(
+        long,
+        value_name = "METRIC",
+        value_delimiter = ',',
+        value_parser = one_of::<ThresholdMetric>(ThresholdMetric::ALL.map(ThresholdMetric::name))
+    )]
+    pub(crate) metric: Vec<ThresholdMetric>,
+    /// Export only results that the reviewers passed, or whose confidence is not low
+    #[arg(
+        long,
+        value_name = "WHICH",
+        default_value = "all",
+        value_parser = one_of::<ResultFilter>(ResultFilter::ALL.map(ResultFilter::name))
+    )]
+    pub(crate) only: ResultFilter,
+    /// Export only results with at least this confidence, from 0 to 1
+    #[arg(long, value_name = "P", value_parser = share)]
+    pub(crate) min_confidence: Option<f64>,
+    /// Warp the print and all aligned pictures to a square of PX pixels with the ink centred
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(16..=4096))]
+    pub(crate) canvas: Option<u32>,
+    /// Divide the pairs: percent of train, validation and test, such as 80/10/10
+    #[arg(long, value_name = "PERCENT")]
+    pub(crate) split: Option<SplitShares>,
+    /// What keeps pairs in one part of the split
+    #[arg(
+        long,
+        value_name = "GROUP",
+        requires = "split",
+        default_value = "block",
+        value_parser = one_of::<SplitBy>(SplitBy::ALL.map(SplitBy::name))
+    )]
+    pub(crate) by: SplitBy,
+    /// Seed of the split
+    #[arg(long, value_name = "N", requires = "split", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Begin CSV files with a byte order mark, so that Excel reads them as UTF-8
+    #[arg(long)]
+    pub(crate) csv_bom: bool,
+    /// Include pictures in Parquet tables
+    #[arg(long)]
+    pub(crate) images: bool,
+    /// Size in MiB at which the next shard of webdataset or huggingface begins; 256 by default
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=16384))]
+    pub(crate) shard_mib: Option<u64>,
+    /// Licence of the data in the dataset card, such as cc-by-4.0
+    #[arg(long, value_name = "LICENCE")]
+    pub(crate) license: Option<String>,
+    /// Include computing times; the output then differs from run to run
+    #[arg(long)]
+    pub(crate) with_times: bool,
+}
+
+/// Returns the name of a format with its purpose, for help and completion.
+fn described(format: ExportFormat) -> PossibleValue {
+    PossibleValue::new(format.name()).help(format.summary())
+}
+
+/// Returns a parser of names, which lists them in help, in errors and for completion.
+fn one_of<T: FromStr<Err = String> + Clone + Send + Sync + 'static>(
+    names: impl IntoIterator<Item = impl Into<PossibleValue>>,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+/// Parses a number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| format!("{text:?} is not a number from 0 to 1"))
+}
+
+impl ExportArgs {
+    /// Returns the formats, each once, in the order given.
+    fn formats(&self) -> Vec<ExportFormat> {
+        let mut formats = Vec::new();
+        for format in &self.to {
+            if !formats.contains(format) {
+                formats.push(*format);
+            }
+        }
+        formats
+    }
+}
+
+pub(crate) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.open_read_only().await?;
+    let loaded = context.settings()?;
+    let (config, formats) = (&loaded.config, args.formats());
+    let computed = config.stages.pipeline.method.metrics();
+    let unknown = args.metric.iter().find(|metric| !computed.contains(metric));
+    if let Some(metric) = unknown {
+        let names: Vec<&str> = computed.iter().map(|metric| metric.name()).collect();
+        let text = format!(
+            "the settings compute no {metric}; choose from {}",
+            names.join(", ")
+        );
+        return Err(Refusal::Usage(text).into());
+    }
+    let selected =
+        |metric: &&ThresholdMetric| args.metric.is_empty() || args.metric.contains(*metric);
+    let options = ExportOptions {
+        metrics: computed.iter().filter(selected).copied().collect(),
+        only: args.only,
+        min_confidence: args.min_confidence,
+        canvas_px: args.canvas,
+        split: args.split.map(|shares| SplitSettings {
+            shares,
+            by: args.by,
+            seed: args.seed,
+        }),
+        with_times: args.with_times,
+        csv_bom: args.csv_bom,
+        images: args.images,
+        shard_mib: args.shard_mib,
+        license: args.license.clone(),
+        settings: config.that_change_results()?,
+        limits: input_file_limits(config),
+    };
+    if let Err(unused) = options.check(&formats) {
+        return Err(Refusal::Usage(unused.to_string()).into());
+    }
+    context.warn_about_stale(&catalog).await?;
+    let busy = Busy::start(context, "exporting");
+    let summary = mocban_export::export(&catalog, &project, &args.output, &formats, options).await;
+    drop(busy);
+    let summary = summary?;
+    catalog.close().await;
+    if summary.is_nothing_selected {
+        let text = format!(
+            "no result is selected by --only or --min-confidence; nothing was written to {}",
+            args.output.display()
+        );
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    print_summary(&summary, &args, context)?;
+    Ok(if summary.is_complete() {
+        ExitCode::Done
+    } else {
+        ExitCode::SomeFailed
+    })
+}
+
+fn print_summary(
+    summary: &ExportSummary,
+    args: &ExportArgs,
+    context: &Context,
+) -> anyhow::Result<()> {
+    let unreadable = summary.unreadable.iter();
+    let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
+    let blocks = summary.unreadable_blocks.iter();
+    let blocks = blocks.map(|(block, why)| json!({"block": block, "error": why}));
+    context.warn_about_set_apart(&summary.set_apart);
+    context.print_json(&json!({
+        "schema": 1,
+        "set_apart": summary.set_apart,
+        "done": summary.pairs.done,
+        "without_result": summary.pairs.without_result,
+        "left_out": summary.pairs.left_out,
+        "split": summary.split.map(|SplitCounts { pairs: [train, validation, test], .. }| {
+            json!({"train": train, "validation": validation, "test": test})
+        }),
+        "unreadable": unreadable.collect::<Vec<_>>(),
+        "unreadable_blocks": blocks.collect::<Vec<_>>(),
+        "kept_earlier": summary.kept_earlier,
+    }))?;
+    for (block, why) in &summary.unreadable_blocks {
+        context.warn(&format!("the export lacks files of block {block}: {why}"));
+    }
+    for (pair, why) in &summary.unreadable {
+        context.warn(&format!("the export has no files of {pair}: {why}"));
+    }
+    let shown = args.output.display();
+    if summary.kept_earlier {
+        let lost = lost_files(summary);
+        context.info(&format!(
+            "the earlier export in {shown} was kept, because the new one would lack the files of {lost}; repair them, or export to a new directory"
+        ));
+    } else {
+        print_done(summary, args, context);
+    }
+    if let Some((path, why)) = &summary.leftover {
+        context.warn(&format!(
+            "the earlier export was replaced but could not be removed from {}: {why}; the next export removes it",
+            path.display()
+        ));
+    }
+    if !summary.is_complete() {
+        // A run trusts the catalog, so the check must come first. If most files are missing, it says what to do.
+        if summary.unreadable.len() as u64 > summary.pairs.done {
+            context.next("check");
+        } else {
+            context.next("check --repair");
+            context.next("run");
+        }
+    }
+    Ok(())
+}
+
+/// Returns how many pairs and blocks have files that cannot be read.
+fn lost_files(summary: &ExportSummary) -> String {
+    let numbers = [
+        (summary.unreadable.len(), "pair"),
+        (summary.unreadable_blocks.len(), "block"),
+    ];
+    let lost = numbers.into_iter().filter(|(number, _)| *number > 0);
+    let lost: Vec<String> = lost
+        .map(|(number, what)| count(number as u64, what))
+        .collect();
+    lost.join(" and ")
+}
+
+/// Returns where the files are explained, and what is unusual about tables.
+fn explanation(args: &ExportArgs) -> String {
+    let formats = args.formats();
+    let readme = match formats.len() {
+        1 => format!(
+            "{} explains the files",
+            args.output.join("README.md").display()
+        ),
+        _ => "README.md in each directory explains its files".to_owned(),
+    };
+    let is_table = |format: &ExportFormat| {
+        matches!(
+            format,
+            ExportFormat::Jsonl | ExportFormat::Csv | ExportFormat::Parquet
+        )
+    };
+    let tables = if formats.iter().any(is_table) {
+        "; a row of a table is one pair and metric"
+    } else {
+        ""
+    };
+    let excel = if formats.contains(&ExportFormat::Csv) && !args.csv_bom {
+        "; for Excel, add --csv-bom"
+    } else {
+        ""
+    };
+    readme + tables + excel
+}
+
+fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
+    let unreadable = match summary.unreadable.len() {
+        0 => String::new(),
+        lost => format!(", {lost} with missing or changed files"),
+    };
+    let left_out = match summary.pairs.left_out {
+        0 => String::new(),
+        left_out => format!(", {left_out} left out"),
+    };
+    context.info(&format!(
+        "{} exported to {}, {} without a result{left_out}{unreadable}",
+        count(summary.pairs.done, "pair"),
+        args.output.display(),
+        summary.pairs.without_result
+    ));
+    context.info(&explanation(args));
+    if summary.pairs.done == 0 && summary.pairs.without_result > 0 {
+        context.next("status");
+    }
+    if let Some(counts) = &summary.split {
+        let [train, validation, test] = counts.pairs;
+        context.info(&format!(
+            "split: {train} train, {validation} validation, {test} test"
+        ));
+        if counts.is_uneven() {
+            let why = match args.by {
+                SplitBy::Pair => "there are too few pairs".to_owned(),
+                by => format!("the pairs of a {by} stay together, and there are too few {by}s"),
+            };
+            context.warn(&format!("the split differs from its percentages: {why}"));
+        }
+    }
+}

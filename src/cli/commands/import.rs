@@ -1,0 +1,154 @@
+//! `import`: adds pairs of meshes and prints, or whole blocks, to the project, and creates the project if there is
+//! none.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::import_blocks::{self, BlockArgs};
+use crate::cli::output::busy::Busy;
+use crate::cli::output::context::Context;
+use crate::cli::output::table::count;
+use mocban_core::domain::LengthUnit;
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::import_blocks::{ListedItems, import_blocks};
+use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
+
+/// The three ways to name what is imported.
+const USAGE: &str = "mocban import [OPTIONS] FILE
+       mocban import [OPTIONS] --meshes DIR --prints DIR
+       mocban import [OPTIONS] --block MESH --page IMAGE";
+
+/// Arguments of `import`.
+#[derive(Debug, Default, Args)]
+#[command(override_usage = USAGE)]
+pub(crate) struct ImportArgs {
+    /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
+    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels,
+    /// unit, side; paths are relative to the file
+    #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
+    pub(crate) file: Option<PathBuf>,
+    /// A directory of meshes, paired with --prints by file stem
+    #[arg(long, value_name = "DIR", requires = "prints")]
+    pub(crate) meshes: Option<PathBuf>,
+    /// A directory of prints
+    #[arg(long, value_name = "DIR", requires = "meshes")]
+    pub(crate) prints: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) block: BlockArgs,
+    /// Unit of the meshes in --meshes or of --block: mm, cm, m or in
+    #[arg(long, conflicts_with = "file")]
+    pub(crate) unit: Option<LengthUnit>,
+    /// True alignments, one JSON object per line; the report then gives the errors against them
+    #[arg(long, value_name = "FILE")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Import pairs whose files do not exist yet; they fail if they are run before
+    #[arg(long)]
+    pub(crate) allow_missing: bool,
+}
+
+pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let items = items(&args)?;
+    if matches!(items, ListedItems::Blocks(_)) {
+        refuse_truths(&args)?;
+    }
+    let busy = Busy::start(context, "importing");
+    match items {
+        ListedItems::Blocks(source) => {
+            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
+            drop(busy);
+            let outcome = outcome?;
+            context.print_json(&import_blocks::as_json(&outcome))?;
+            import_blocks::print_outcome(&outcome, context);
+        }
+        ListedItems::Pairs(source) => {
+            let import = PairImport {
+                source,
+                truth: args.truth,
+                allow_missing: args.allow_missing,
+            };
+            let outcome = import_pairs(import, &context.location).await;
+            drop(busy);
+            let outcome = outcome?;
+            context.print_json(&as_json(&outcome))?;
+            print_outcome(&outcome, context);
+        }
+    }
+    context.next("run");
+    Ok(ExitCode::Done)
+}
+
+/// Returns what the arguments name.
+fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+    if let Some(source) = args.block.source(args.unit) {
+        return Ok(ListedItems::Blocks(source));
+    }
+    match (&args.file, &args.meshes, &args.prints) {
+        (Some(file), ..) => ListedItems::of(file),
+        (None, Some(meshes), Some(prints)) => Ok(ListedItems::Pairs(PairSource::Folders {
+            meshes: meshes.clone(),
+            prints: prints.clone(),
+            unit: args.unit,
+        })),
+        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+    }
+}
+
+/// Refuses true alignments of pairs in an import of blocks.
+fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
+    if args.truth.is_none() {
+        return Ok(());
+    }
+    let text = "--truth holds true alignments of pairs, but blocks are imported";
+    Err(Refusal::Usage(text.to_owned()).into())
+}
+
+/// Prints what an import changed, after its warnings.
+pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
+    const MAX_WARNINGS: usize = 20;
+    const MAX_CHANGES: usize = 10;
+    for line in outcome.missing.lines.iter().take(MAX_WARNINGS) {
+        context.warn(line);
+    }
+    if let Some(more) = outcome.missing.count.checked_sub(MAX_WARNINGS + 1) {
+        context.warn(&format!("{} more files do not exist", more + 1));
+    }
+    for line in &outcome.warnings {
+        context.warn(line);
+    }
+    let summary = &outcome.summary;
+    let truths = match outcome.truths {
+        0 => String::new(),
+        truths => format!("; {} stored", count(truths, "true alignment")),
+    };
+    context.info(&format!(
+        "{} added, {} changed, {} unchanged{truths}",
+        count(summary.added, "pair"),
+        summary.changed.len(),
+        summary.unchanged
+    ));
+    for change in summary.changed.iter().take(MAX_CHANGES) {
+        let fields = change.fields.join(", ");
+        context.info(&format!("  {}: {fields} changed", change.name));
+    }
+    if let Some(more) = summary.changed.len().checked_sub(MAX_CHANGES + 1) {
+        context.info(&format!("  and {} more", more + 1));
+    }
+}
+
+fn as_json(outcome: &ImportOutcome) -> Value {
+    let summary = &outcome.summary;
+    let changed = summary.changed.iter();
+    let changed = changed.map(|change| json!({"id": change.name, "fields": change.fields}));
+    json!({
+        "schema": 1,
+        "added": summary.added,
+        "changed": changed.collect::<Value>(),
+        "unchanged": summary.unchanged,
+        "truths": outcome.truths,
+        "missing_files": outcome.missing.lines,
+        "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),
+        "warnings": outcome.warnings,
+    })
+}

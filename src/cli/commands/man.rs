@@ -1,0 +1,74 @@
+//! `man DIR`: writes the manual pages, one per command.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::{Args, Command};
+
+use crate::cli::output::context::Context;
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files;
+use mocban_project::shell::shell_quoted;
+use mocban_store::{StagingFolder, rename_into_place};
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub(crate) struct ManArgs {
+    /// The directory for the pages; created if it does not exist
+    pub(crate) dir: PathBuf,
+}
+
+pub(crate) fn man(args: &ManArgs, command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+    let dir = args.dir.display();
+    std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot create {dir}"))?;
+    let failed = || format!("cannot write manual pages to {dir}");
+    let staging = StagingFolder::beside(&args.dir.join("mocban.1")).with_context(failed)?;
+    let pages = write_pages(command, staging.path()).with_context(failed)?;
+    for page in &pages {
+        refuse_foreign(page, &args.dir)?;
+    }
+    for page in &pages {
+        let target = args.dir.join(page.file_name().unwrap_or_default());
+        rename_into_place(page, &target).with_context(failed)?;
+    }
+    drop(staging);
+    context.info(&format!("the manual pages are in {dir}"));
+    let page = args.dir.join("mocban.1");
+    let page = shell_quoted(&page.to_string_lossy());
+    context.next_command(&format!("man -l {page}"));
+    Ok(ExitCode::Done)
+}
+
+/// Writes the pages to a staging folder first, so that each page is replaced as a whole. Returns their paths.
+fn write_pages(command: Command, staging: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let folder = staging.join("pages");
+    std::fs::create_dir(&folder)?;
+    clap_mangen::generate_to(command, &folder)?;
+    let pages = std::fs::read_dir(&folder)?;
+    let pages: std::io::Result<Vec<_>> = pages.map(|page| Ok(page?.path())).collect();
+    Ok(pages?)
+}
+
+/// Refuses to replace a file that is not an earlier version of a page.
+fn refuse_foreign(page: &Path, dir: &Path) -> anyhow::Result<()> {
+    let there = dir.join(page.file_name().unwrap_or_default());
+    let Some(earlier) = files::small(&there)? else {
+        return Ok(());
+    };
+    let new = files::small(page)?.unwrap_or_default();
+    if title(&new).is_some_and(|name| title(&earlier) == Some(name)) {
+        return Ok(());
+    }
+    Err(Refusal::Usage(format!(
+        "{} exists and is not a manual page of this program; rename it or name another directory",
+        there.display()
+    ))
+    .into())
+}
+
+/// Returns the name in the title line of a manual page (`man(7)`), or `None` if the file has no such line.
+fn title(page: &[u8]) -> Option<&[u8]> {
+    let mut lines = page.split(|byte| *byte == b'\n');
+    let title = lines.find_map(|line| line.strip_prefix(b".TH "))?;
+    title.split(u8::is_ascii_whitespace).next()
+}

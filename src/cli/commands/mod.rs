@@ -1,0 +1,35 @@
+//! The commands, one per file.
+
+pub(crate) mod agreement;
+pub(crate) mod backup;
+pub(crate) mod block_points;
+pub(crate) mod block_sheet;
+pub(crate) mod check;
+pub(crate) mod compare;
+pub(crate) mod completions;
+pub(crate) mod config;
+pub(crate) mod contact_sheet;
+pub(crate) mod copy;
+pub(crate) mod db;
+pub(crate) mod demo;
+pub(crate) mod demo_block;
+pub(crate) mod demo_data;
+pub(crate) mod docs;
+pub(crate) mod export;
+pub(crate) mod import;
+pub(crate) mod import_blocks;
+pub(crate) mod man;
+pub(crate) mod metrics;
+pub(crate) mod report;
+pub(crate) mod restore;
+pub(crate) mod retry;
+pub(crate) mod review;
+pub(crate) mod run;
+pub(crate) mod run_text;
+pub(crate) mod show;
+pub(crate) mod show_block;
+pub(crate) mod status;
+pub(crate) mod status_hosts;
+pub(crate) mod verdict;
+pub(crate) mod view;
+pub(crate) mod worker;

@@ -1,0 +1,75 @@
+//! `restore`: makes a project of a backup.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use crate::cli::output::busy::Busy;
+use crate::cli::output::context::Context;
+use crate::cli::output::table::count;
+use mocban_project::exit::ExitCode;
+use mocban_project::restore::{self, RestoreRequest};
+use mocban_store::SETTINGS_FILE;
+
+/// Arguments of `restore`.
+#[derive(Debug, Args)]
+pub(crate) struct RestoreArgs {
+    /// The backup
+    pub(crate) backup: PathBuf,
+    /// The project directory to create; it may hold meshes and prints already
+    pub(crate) dir: PathBuf,
+    /// A directory where meshes and prints are looked for that are no longer at their old places
+    #[arg(long, value_name = "DIR")]
+    pub(crate) inputs: Option<PathBuf>,
+}
+
+pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let request = RestoreRequest {
+        backup: args.backup,
+        dir: args.dir,
+        inputs: args.inputs,
+    };
+    let busy = Busy::start(context, "restoring the project");
+    let restored = restore::restore(&request, &context.location).await;
+    drop(busy);
+    let restored = restored?;
+    let RestoreRequest { dir, inputs, .. } = request;
+    let (pairs, verdicts) = (restored.pairs, restored.verdicts);
+    context.print_json(&json!({
+        "schema": 1, "project": dir, "pairs": pairs, "verdicts": verdicts,
+        "settings": restored.settings.is_some(), "inputs_missing": restored.missing.len(),
+        "settings_removed": restored.settings.as_ref().map_or(&[][..], |settings| &settings.removed),
+    }))?;
+    let places = match &inputs {
+        None => "their old places".to_owned(),
+        Some(inputs) => format!("their old places or in {}", inputs.display()),
+    };
+    context.info(&format!(
+        "{} and {} restored to {}; a backup has no scans, prints, depth maps and masks: put scans and prints at {places}, \
+         and the next two commands compute the rest again",
+        count(pairs, "pair"),
+        count(verdicts, "verdict"),
+        dir.display(),
+    ));
+    if let (Some(first), Some(inputs)) = (restored.missing.first(), &inputs) {
+        context.warn(&format!(
+            "{} neither at the old place nor in {}, first {first}; put meshes and prints there before `check --repair --accept-missing`",
+            count(restored.missing.len() as u64, "path"),
+            inputs.display()
+        ));
+    }
+    if let Some(removed) = restored.settings.map(|settings| settings.removed)
+        && !removed.is_empty()
+    {
+        context.warn(&format!(
+            "the restored project uses only its own folder: in {}, `restore` commented out {}; that file says how to use a server again",
+            dir.join(SETTINGS_FILE).display(),
+            removed.join(", ")
+        ));
+    }
+    let context = context.at(&dir);
+    context.next("check --repair --accept-missing");
+    context.next("run");
+    Ok(ExitCode::Done)
+}

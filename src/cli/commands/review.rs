@@ -1,0 +1,311 @@
+//! `review`: serves the review page on this machine.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+
+use clap::Args;
+use serde_json::json;
+
+use super::verdict::reviewer_name;
+use crate::cli::input::browser::open;
+use crate::cli::input::signals;
+use crate::cli::output::context::Context;
+use crate::cli::output::streams;
+use crate::cli::output::table::count;
+use mocban_catalog::{SetApart, StatusCounts};
+use mocban_core::domain::{ReviewOrder, ThresholdMetric};
+use mocban_core::page_vec;
+use mocban_pages::review::{
+    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
+};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::input_file_limits;
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
+use mocban_runner::{Stop, StopLevel};
+
+/// Arguments of `review`.
+#[derive(Debug, Args)]
+pub(crate) struct ReviewArgs {
+    /// Name of the reviewer; a label for the verdicts, not a login, unless the catalog in PostgreSQL has roles
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    reviewer: String,
+    /// Order of the results: random gives an unbiased estimate of the accuracy; least-confident finds failures sooner
+    #[arg(long, default_value = "random", value_parser = order)]
+    order: ReviewOrder,
+    /// Only results on which two other reviewers disagree
+    #[arg(long, conflicts_with = "order")]
+    adjudicate: bool,
+    /// Only results of this metric; may be repeated [default: all]
+    #[arg(long)]
+    metric: Vec<ThresholdMetric>,
+    /// Seed of the random order
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+    /// Review only the first N results; attention checks and duplicates are added to them
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    sample: Option<u32>,
+    /// Planted errors per hundred results, at least 5 if there are any, to measure how many the reviewer catches
+    #[arg(long, value_name = "PERCENT", default_value = "4", value_parser = percent)]
+    attention_checks: f64,
+    /// Results per hundred that are shown twice, to measure how consistent the reviewer is
+    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = percent)]
+    duplicates: f64,
+    /// Shortest time in milliseconds that an image is shown before a verdict is accepted
+    #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
+    min_view_ms: u64,
+    /// Do not open the guide, with examples and a practice round, when a reviewer starts for the first time
+    #[arg(long)]
+    no_guide: bool,
+    /// Port on this machine; 0 chooses the same port each time for a project and reviewer, or any free port
+    #[arg(long, value_name = "N", default_value = "0")]
+    port: u16,
+    /// Listen on this address instead of 127.0.0.1; anyone who can reach it sees that the page exists
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<IpAddr>,
+    /// Language of the page, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
+    #[arg(long)]
+    lang: Option<Language>,
+    /// Print the address without opening a browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+/// Parses an order; adjudication has its own flag.
+fn order(text: &str) -> Result<ReviewOrder, String> {
+    match text.replace('-', "_").parse() {
+        Ok(order @ (ReviewOrder::Random | ReviewOrder::LeastConfident)) => Ok(order),
+        Ok(ReviewOrder::Adjudicate) | Err(_) => {
+            Err("the order is random or least-confident".to_owned())
+        }
+    }
+}
+
+/// Parses a percentage and returns the share.
+fn percent(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('%').parse::<f64>() {
+        Ok(percent) if (0.0..=100.0).contains(&percent) => Ok(percent / 100.0),
+        Ok(_) | Err(_) => Err("a percentage is a number from 0 to 100".to_owned()),
+    }
+}
+
+pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    page_vec::keep_few_pages();
+    let settings = context.settings()?;
+    let keys = review::key_map(&settings.config.review.keys);
+    let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
+    if args.listen.is_some_and(|address| address.is_unspecified()) {
+        // The page accepts only requests for one address, but 0.0.0.0 stands for all addresses of the machine.
+        let text = "--listen needs the address of this machine at which the page will be opened";
+        return Err(Refusal::Usage(text.to_owned()).into());
+    }
+    let (project, catalog) = context.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_review(Some(&args.reviewer))?;
+    let (catalog, damaged) = catalog.without_faulty_rows().await?;
+    context.warn_about_set_apart(&SetApart::of(&damaged));
+    let language = args.lang.or_else(language_of_system);
+    let options = ReviewOptions {
+        listen: SocketAddr::new(
+            args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
+            args.port,
+        ),
+        command: context
+            .without_setting_flags()
+            .command("")
+            .trim_end()
+            .to_owned(),
+        language,
+        keys,
+        min_view_ms: args.min_view_ms,
+        opens_guide: !args.no_guide,
+        limits: input_file_limits(&settings.config),
+        now,
+        queue: queue_options(&args),
+    };
+    let page = review::bind(catalog.clone(), project, options).await?;
+    if page.counts().items == 0 {
+        drop(page);
+        catalog.close().await;
+        if args.adjudicate {
+            return no_conflict(&args, context);
+        }
+        let command = context.command("run");
+        let text = format!("there is no result to judge yet; first: {command}");
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let _file = announce(&page, &args, context)?;
+    let drain = stop.clone();
+    let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
+    let cut_off = tokio::select! {
+        cut_off = served => cut_off,
+        // After a second signal, do not wait for open connections. Acknowledged answers are already stored.
+        () = stop.reached(StopLevel::Now) => 1,
+    };
+    signals.abort();
+    catalog.close().await;
+    context.info(closing_line(cut_off == 0));
+    context.next("report");
+    Ok(ExitCode::Done)
+}
+
+/// Returns the command's last message. The browser keeps unacknowledged answers and sends them again.
+const fn closing_line(is_complete: bool) -> &'static str {
+    if is_complete {
+        "the page is closed; every answer is stored"
+    } else {
+        "the page is closed; every acknowledged answer is stored, and the browser keeps the rest for the next start"
+    }
+}
+
+fn queue_options(args: &ReviewArgs) -> QueueOptions {
+    QueueOptions {
+        reviewer: args.reviewer.clone(),
+        metrics: args.metric.clone(),
+        order: if args.adjudicate {
+            ReviewOrder::Adjudicate
+        } else {
+            args.order
+        },
+        seed: args.seed,
+        sample: args.sample.map(|sample| sample as usize),
+        rates: CheckRates {
+            faults: args.attention_checks,
+            duplicates: args.duplicates,
+        },
+    }
+}
+
+/// Reports that there is nothing to adjudicate.
+fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    if context.global.json {
+        streams::print_json_text(&json!({"schema": 1, "url": null}).to_string())?;
+    }
+    let reviewer = &args.reviewer;
+    context.info(&format!(
+        "there is nothing to adjudicate for {reviewer}: no two other reviewers disagree on an open result"
+    ));
+    context.next("agreement");
+    Ok(ExitCode::Done)
+}
+
+/// Returns a reviewer's progress: `lan has answered 0 of 54 images: 50 results and 4 attention checks or duplicates`.
+fn progress(reviewer: &str, counts: QueueCounts) -> String {
+    let images = count(counts.items as u64, "image");
+    let results = count(counts.results as u64, "result");
+    let text = format!("{reviewer} has answered {} of {images}", counts.answered);
+    match counts.items - counts.results {
+        0 => text,
+        checks => format!("{text}: {results} and {checks} attention checks or duplicates"),
+    }
+}
+
+/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page. The
+/// file must exist until the browser has read it.
+fn announce(
+    page: &ReviewServer,
+    args: &ReviewArgs,
+    context: &Context,
+) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+    let (url, address) = (page.url(), page.address());
+    if context.global.json {
+        streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
+    } else {
+        streams::print(&url)?;
+    }
+    context.info(&format!(
+        "{}; press Ctrl-C to end",
+        progress(&args.reviewer, page.counts())
+    ));
+    context.info("the address works once; if you close the page, press Ctrl-C and start this command again: nothing is lost");
+    if address.ip().is_loopback() {
+        let port = address.port();
+        context.info(&format!(
+            "if this machine is remote, first run: ssh -L {port}:127.0.0.1:{port} MACHINE"
+        ));
+    } else {
+        context.warn(&format!(
+            "the page listens on {address}, which other machines can reach, and its traffic is not encrypted"
+        ));
+    }
+    let is_for_script = args.no_open || context.global.json || context.global.quiet;
+    Ok(if is_for_script { None } else { open(&url) })
+}
+
+/// Returns the `review` command as a next step, or `None` if there are verdicts.
+pub(crate) fn review_step(counts: &StatusCounts) -> Option<String> {
+    let is_unjudged = counts.verdicts.values().all(|number| *number == 0);
+    is_unjudged.then(|| review_command(user_name().as_deref()))
+}
+
+/// Returns the `review` command with the user's name as the reviewer.
+fn review_command(user: Option<&str>) -> String {
+    let name = user.and_then(|user| reviewer_name(user).ok());
+    let name = name.unwrap_or_else(|| "me".to_owned());
+    format!("review --reviewer {}", shell_quoted(&name))
+}
+
+/// Returns the name of the user, as Unix or Windows gives it.
+fn user_name() -> Option<String> {
+    let mut names = ["USER", "USERNAME"].into_iter();
+    names.find_map(|name| std::env::var(name).ok())
+}
+
+/// Returns Vietnamese if the locale is Vietnamese. Otherwise, the browser decides.
+fn language_of_system() -> Option<Language> {
+    let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
+    let set = names.iter().filter_map(|name| std::env::var(name).ok());
+    let mut set = set.filter(|value| !value.is_empty());
+    let locale = set.next()?;
+    locale.starts_with("vi").then_some(Language::Vietnamese)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{QueueCounts, order, percent, progress, review_command};
+    use mocban_config::{Sources, load};
+    use mocban_core::domain::ReviewOrder;
+    use mocban_pages::review::key_map;
+
+    #[test]
+    fn default_settings_give_every_action_its_own_key() {
+        let settings = load(&Sources::default()).expect("the defaults");
+        let keys = &settings.config.review.keys;
+        let map = key_map(keys).expect("the default keys");
+        assert_eq!((map.len(), keys.len()), (42, 42));
+        assert_eq!(map["KeyP"], "pass");
+    }
+
+    #[test]
+    fn attention_checks_and_duplicates_are_counted_separately() {
+        let counts = |items, results| QueueCounts {
+            items,
+            results,
+            answered: 7,
+        };
+        assert_eq!(
+            progress("lan", counts(54, 50)),
+            "lan has answered 7 of 54 images: 50 results and 4 attention checks or duplicates"
+        );
+        assert_eq!(
+            progress("lan", counts(50, 50)),
+            "lan has answered 7 of 50 images"
+        );
+    }
+
+    #[test]
+    fn percentages_and_orders_are_parsed() {
+        assert_eq!(percent("4"), Ok(0.04));
+        assert_eq!(percent("12.5%"), Ok(0.125));
+        assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
+        assert_eq!(order("least-confident"), Ok(ReviewOrder::LeastConfident));
+        assert!(order("adjudicate").is_err());
+    }
+
+    #[test]
+    fn the_suggested_reviewer_is_the_user() {
+        assert_eq!(review_command(Some("lê văn")), "review --reviewer 'lê văn'");
+        assert_eq!(review_command(None), "review --reviewer me");
+    }
+}

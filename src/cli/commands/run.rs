@@ -1,0 +1,256 @@
+//! `run`: aligns the pairs that are not aligned yet and reports the outcome.
+
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::metrics::{MetricsArgs, MetricsServer};
+use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
+use crate::cli::input::select;
+use crate::cli::input::signals;
+use crate::cli::output::context::Context;
+use crate::cli::output::failures::Failures;
+use crate::cli::output::missing_results;
+use crate::cli::output::progress::ProgressReporter;
+use mocban_catalog::{Catalog, RerunPolicy};
+use mocban_config::Config;
+use mocban_core::domain::Stage;
+use mocban_project::exit::ExitCode;
+use mocban_project::location::now;
+use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
+use mocban_store::Project;
+
+/// Arguments of `run`.
+#[derive(Debug, Default, Args)]
+pub(crate) struct RunArgs {
+    /// Only these pairs, and these blocks with their pairs [default: all]
+    #[arg(value_name = "NAME")]
+    pub(crate) names: Vec<String>,
+    /// Number of pairs to process at the same time [default: one per core]
+    #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) jobs: Option<u16>,
+    /// Memory for the pairs and the block processed at the same time, such as 4G or 512M, estimated from the file sizes
+    /// of meshes and the image sizes of prints and pages; one that needs more runs alone [default: most of the free
+    /// memory]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub(crate) memory: Option<u64>,
+    /// Print what would run and why, without running it
+    #[arg(short = 'n', long, conflicts_with = "metrics")]
+    pub(crate) dry_run: bool,
+    /// Join a run in another process as additional workers
+    #[arg(long)]
+    pub(crate) join: bool,
+    /// Stop after this many pairs and blocks have failed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) max_failures: Option<u64>,
+    /// Also run these pairs again: failed, stale (settings or files changed, which every run includes) or all
+    #[arg(long, value_name = "WHICH", value_parser = rerun)]
+    pub(crate) rerun: Option<RerunPolicy>,
+    /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
+    #[arg(long, value_name = "STAGE")]
+    pub(crate) stage: Option<Stage>,
+    #[command(flatten)]
+    pub(crate) metrics: MetricsArgs,
+}
+
+/// Parses which pairs to run again.
+pub(crate) fn rerun(text: &str) -> Result<RerunPolicy, String> {
+    match text {
+        "failed" => Ok(RerunPolicy::Failed),
+        "stale" => Ok(RerunPolicy::Changed),
+        "all" => Ok(RerunPolicy::All(Stage::Fit)),
+        _ => Err("the pairs to run again are failed, stale or all".to_owned()),
+    }
+}
+
+pub(crate) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    execute(args, RunPart::All, context).await
+}
+
+/// Runs one part of a run or all.
+pub(crate) async fn execute(
+    args: RunArgs,
+    part: RunPart,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    let server = MetricsServer::bind(&args.metrics).await?;
+    let config = context.settings()?.config;
+    let (project, catalog) = context.open_for_run().await?;
+    let options = options(&args, &config, &catalog, part).await?;
+    if args.dry_run {
+        let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
+        let running = runner::is_running(&project, &catalog, now()).await?;
+        catalog.close().await;
+        return print_plan(&plan, running, context);
+    }
+    let serving = server.map(|server| server.serve(options.metrics.clone(), context));
+    let driven = drive(&project, catalog, &config, &options, context).await;
+    drop(serving);
+    let (summary, failures) = driven?;
+    context.print_json(&as_json(&summary))?;
+    print_outcome(&summary, &failures, context);
+    let are_results_missing = missing_results::are_missing(&project, &summary.status.jobs);
+    if are_results_missing {
+        context.warn(missing_results::TEXT);
+        context.next(missing_results::NEXT);
+    }
+    for command in next_steps(&summary, &failures, are_results_missing) {
+        let command = match (part, command.as_str()) {
+            (RunPart::Work, "run") => "worker",
+            (_, command) => command,
+        };
+        context.next(command);
+    }
+    Ok(code(&summary))
+}
+
+/// Parses a number of bytes with an optional unit: 4G, 512M, 900K.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let units = [('K', 10), ('M', 20), ('G', 30), ('T', 40)];
+    let split = |(unit, shift): (char, u32)| {
+        let number = text.strip_suffix([unit, unit.to_ascii_lowercase()])?;
+        Some((number, shift))
+    };
+    let (number, shift) = units.into_iter().find_map(split).unwrap_or((text, 0));
+    let number: Option<u64> = number.parse().ok();
+    number
+        .and_then(|number| number.checked_mul(1 << shift))
+        .filter(|bytes| *bytes > 0)
+        .ok_or_else(|| "a size is a whole number with K, M, G or T, such as 4G".to_owned())
+}
+
+pub(crate) async fn options(
+    args: &RunArgs,
+    config: &Config,
+    catalog: &Catalog,
+    part: RunPart,
+) -> anyhow::Result<RunOptions> {
+    let only = match args.names.as_slice() {
+        [] => None,
+        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
+    };
+    let plain = from_config(config);
+    Ok(RunOptions {
+        workers: args.jobs.map_or(plain.workers, usize::from),
+        memory: args.memory.or(plain.memory),
+        part,
+        join: args.join,
+        max_failures: args.max_failures,
+        only,
+        rerun: match (args.rerun, args.stage) {
+            (Some(RerunPolicy::All(_)), Some(stage)) => RerunPolicy::All(stage),
+            (rerun, _) => rerun.unwrap_or(plain.rerun),
+        },
+        until: args.stage.unwrap_or(plain.until),
+        ..plain
+    })
+}
+
+/// Returns the options of a run of all pairs, from the settings alone.
+pub(crate) fn from_config(config: &Config) -> RunOptions {
+    let plain = RunOptions::default();
+    RunOptions {
+        workers: match config.run.workers {
+            0 => plain.workers,
+            workers => workers,
+        },
+        memory: match config.run.memory_mib {
+            0 => runner::default_memory_limit(),
+            mib => Some(mib << 20),
+        },
+        stage_timeout: Duration::from_secs(config.run.stage_timeout_s),
+        mesh_limits: config.limits.mesh,
+        image_limits: config.limits.image,
+        ..plain
+    }
+}
+
+/// Runs the pairs, shows the progress on stderr and handles signals. Finally closes the catalog.
+pub(crate) async fn drive(
+    project: &Project,
+    catalog: Catalog,
+    config: &Config,
+    options: &RunOptions,
+    context: &Context,
+) -> anyhow::Result<(RunSummary, Failures)> {
+    let stop = Stop::new();
+    let watch = signals::watch(&stop)?;
+    let global = &context.global;
+    let (screen, palette) = (&context.screen, context.stderr);
+    let mut progress = ProgressReporter::new(global.progress, global.quiet, screen, palette);
+    let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
+        progress.event(&event);
+    })
+    .await;
+    progress.end();
+    watch.abort();
+    // After an error, the catalog may not reply any more.
+    let ended = match ended {
+        Ok(summary) => {
+            let failures = Failures::read(&catalog, false).await;
+            failures.map(|failures| (summary, failures))
+        }
+        Err(error) => Err(error.into()),
+    };
+    catalog.close().await;
+    ended
+}
+
+/// Returns the exit code of a run.
+pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
+    if summary.stopped {
+        ExitCode::Stopped
+    } else if summary.failed_in_all > 0
+        || summary.blocks.failed_in_all > 0
+        || summary.too_many_failures
+    {
+        ExitCode::SomeFailed
+    } else {
+        ExitCode::Done
+    }
+}
+
+fn as_json(summary: &RunSummary) -> Value {
+    json!({
+        "schema": 1,
+        "done": summary.done,
+        "failed": summary.failed,
+        "failed_in_all": summary.failed_in_all,
+        "left": summary.left,
+        "blocks": summary.blocks,
+        "stages": summary.stages,
+        "stopped": summary.stopped,
+        "too_many_failures": summary.too_many_failures,
+        "elapsed_ms": summary.elapsed_ms,
+        "status": summary.status,
+    })
+}
+
+fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+    let (blocks, plan) = (&plan.blocks, &plan.pairs);
+    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
+    context.print(&json, || {
+        plan_text(plan, running) + &block_plan_text(blocks)
+    })?;
+    if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
+        context.next("run");
+    }
+    Ok(ExitCode::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bytes;
+
+    #[test]
+    fn sizes_may_have_a_unit() {
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("512m"), Ok(512 << 20));
+        assert_eq!(bytes("1000"), Ok(1000));
+        for wrong in ["", "G", "0", "-1G", "1.5G", "99999999999T", "4Gé"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+}

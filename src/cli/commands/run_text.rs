@@ -1,0 +1,169 @@
+//! Text about a run: how it ended, what to do next, and what would run.
+
+use super::review::review_step;
+use crate::cli::output::context::Context;
+use crate::cli::output::failures::Failures;
+use crate::cli::output::table::{columns, count, pairs_and_blocks};
+use mocban_catalog::{BlockPlanEntry, Plan};
+use mocban_core::domain::JobStatus;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::duration;
+use mocban_runner::{BlockSummary, RunSummary};
+
+/// Prints how a run ended and which pairs failed.
+pub(crate) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {
+    context.info(&headline(summary));
+    if summary.failed_in_all > 0 {
+        let number = count(summary.failed_in_all, "pair");
+        context.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
+    }
+    if summary.blocks.failed_in_all > 0 {
+        let number = count(summary.blocks.failed_in_all, "block");
+        let text = failures.blocks.failures_text();
+        context.info(&format!("{number} failed:\n{}", text.trim_end()));
+    }
+}
+
+fn headline(summary: &RunSummary) -> String {
+    let pairs = pair_headline(summary);
+    let BlockSummary {
+        done, failed, left, ..
+    } = summary.blocks;
+    if done + failed + left == 0 {
+        return pairs;
+    }
+    let blocks = count(done, "block");
+    format!("{blocks} done, {failed} failed, {left} left; {pairs}")
+}
+
+fn pair_headline(summary: &RunSummary) -> String {
+    let (took, left) = (duration(summary.elapsed_ms), summary.left);
+    let done = count(summary.done, "pair");
+    if summary.stopped {
+        return format!("stopped after {took}: {done} done, {left} left; the state is safe");
+    }
+    if summary.too_many_failures {
+        let failed = pairs_and_blocks(summary.failed, summary.blocks.failed);
+        return format!(
+            "stopped after {took} because {failed} failed in this run: {done} done, {left} left"
+        );
+    }
+    if summary.stages == 0 && summary.failed == 0 {
+        return match summary.status.pairs {
+            0 => "nothing to do: the project has no pairs".to_owned(),
+            pairs => format!(
+                "nothing left to do: {} in the project",
+                count(pairs, "pair")
+            ),
+        };
+    }
+    format!(
+        "{done} done, {} failed, {left} left in {took}",
+        summary.failed
+    )
+}
+
+/// Returns the commands that make sense after a run.
+pub(crate) fn next_steps(
+    summary: &RunSummary,
+    failures: &Failures,
+    are_results_missing: bool,
+) -> Vec<String> {
+    let mut steps = Vec::new();
+    if summary.status.pairs == 0 && failures.blocks.is_empty() {
+        steps.push("import pairs.csv".to_owned());
+    }
+    let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
+    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) + summary.blocks.left > 0
+        || are_results_missing
+    {
+        steps.push("run".to_owned());
+    }
+    if let Some(first) = failures.blocks.first_failed() {
+        steps.push(format!("show {}", shell_quoted(&first)));
+    }
+    if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
+        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
+        if failures.may_succeed_unchanged() {
+            steps.push("retry".to_owned());
+        }
+    }
+    if jobs(JobStatus::Done) > 0 && !summary.stopped {
+        if !are_results_missing {
+            steps.extend(review_step(&summary.status));
+        }
+        steps.push("report".to_owned());
+    }
+    steps
+}
+
+/// Returns the numbers of pairs that would run, and a line for each reason.
+pub(crate) fn plan_text(plan: &Plan, running: bool) -> String {
+    let leased = if running {
+        "running in another process"
+    } else {
+        "interrupted (they would continue)"
+    };
+    let mut parts = vec![format!("{} would run", count(plan.pairs(), "pair"))];
+    for (number, what) in [
+        (plan.done, "done"),
+        (plan.quarantined, "failed"),
+        (plan.leased, leased),
+    ] {
+        if number > 0 {
+            parts.push(format!("{number} {what}"));
+        }
+    }
+    let rows = plan.entries.iter().map(|entry| {
+        let (pairs, from) = (format!("  {}", entry.pairs), format!("from {}", entry.from));
+        vec![pairs, from, entry.to_string()]
+    });
+    format!("{}\n{}", parts.join(", "), columns(rows, "><<"))
+}
+
+/// Returns a line for each block that would run.
+pub(crate) fn block_plan_text(blocks: &[BlockPlanEntry]) -> String {
+    if blocks.is_empty() {
+        return String::new();
+    }
+    let rows = blocks.iter().map(|entry| {
+        let (block, from) = (format!("  {}", entry.block), format!("from {}", entry.from));
+        vec![block, from, entry.why.to_string()]
+    });
+    let number = count(blocks.len() as u64, "block");
+    format!(
+        "{number} would run, which may add pairs\n{}",
+        columns(rows, "<<<")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Plan, plan_text};
+    use mocban_catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
+    use mocban_core::domain::Stage;
+
+    #[test]
+    fn plan_names_the_setting_that_changed() {
+        let plan = Plan {
+            entries: vec![PlanEntry {
+                from: Stage::Register,
+                why: StaleReason::Settings {
+                    stage: Stage::Register,
+                    old: FingerprintId(1),
+                },
+                changes: Some(vec![FieldChange {
+                    field: "register.max_scale".into(),
+                    old: Some(1.2.into()),
+                    new: Some(1.3.into()),
+                }]),
+                pairs: 24,
+            }],
+            done: 2,
+            quarantined: 1,
+            leased: 3,
+        };
+        insta::assert_snapshot!(plan_text(&plan, false));
+        insta::assert_snapshot!("during_a_run", plan_text(&plan, true));
+    }
+}

@@ -1,0 +1,237 @@
+//! `show BLOCK`: prints files, stages, characters and failures of a whole block.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+
+use crate::cli::output::context::Context;
+use crate::cli::output::screen::{Palette, Tone};
+use crate::cli::output::show_text::state_name;
+use crate::cli::output::table::{columns, count};
+use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
+use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_project::exit::ExitCode;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::{duration, local};
+use mocban_store::Project;
+
+/// Number of characters that are listed of each kind.
+const MAX_CHARACTERS: usize = 20;
+
+/// Shows a block.
+///
+/// # Errors
+/// Returns an error if a database operation fails or the block is gone.
+pub(crate) async fn show_block(
+    name: &BlockName,
+    project: &Project,
+    catalog: Catalog,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    let Some(detail) = catalog.block(name).await? else {
+        anyhow::bail!("block {name} was removed while it was read");
+    };
+    let characters = catalog.block_characters(name).await?;
+    catalog.close().await;
+    let json = as_json(&detail, &characters, project)?;
+    context.print(&json, || text(&detail, &characters, context.stdout))?;
+    let quoted = shell_quoted(name.as_str());
+    let failure = detail.state.failure.as_ref();
+    match detail.state.status {
+        // Control points may help.
+        JobStatus::Quarantined if failure.is_some_and(|one| one.stage == BlockStage::Align) => {
+            context.next(&format!("view {quoted}"));
+        }
+        JobStatus::Quarantined => context.next(&format!("retry {quoted}")),
+        JobStatus::Leased => context.next("status --watch"),
+        JobStatus::Ready | JobStatus::Backoff => context.next("run"),
+        JobStatus::Done => {}
+    }
+    Ok(ExitCode::Done)
+}
+
+fn as_json(
+    detail: &BlockDetail,
+    characters: &[StoredCharacter],
+    project: &Project,
+) -> anyhow::Result<Value> {
+    let mut value = serde_json::to_value(detail)?;
+    value["schema"] = json!(1);
+    value["character_list"] = serde_json::to_value(characters)?;
+    value["artifacts_dir"] = json!(project.artifacts_dir().to_string_lossy());
+    Ok(value)
+}
+
+fn text(detail: &BlockDetail, characters: &[StoredCharacter], palette: Palette) -> String {
+    let state = &detail.state;
+    let attributes = &state.attributes;
+    let tone = match state.status {
+        JobStatus::Done => Tone::Good,
+        JobStatus::Quarantined => Tone::Bad,
+        JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => Tone::Warn,
+    };
+    let title = format!("block {}", attributes.name);
+    let mut parts = vec![format!(
+        "{}  {}\n",
+        palette.paint(Tone::Strong, title),
+        palette.paint(tone, state_name(state.status))
+    )];
+    let optional = |value: Option<String>, otherwise: &str| value.unwrap_or(otherwise.to_owned());
+    let rows = [
+        ("mesh", attributes.mesh_path.clone()),
+        ("page", attributes.page_path.clone()),
+        (
+            "labels",
+            optional(attributes.labels_path.clone(), "none: boxes are found"),
+        ),
+        (
+            "unit",
+            optional(
+                attributes.unit.map(|unit| unit.to_string()),
+                "found from the size",
+            ),
+        ),
+        (
+            "side",
+            optional(attributes.side.map(|side| side.to_string()), "found"),
+        ),
+    ];
+    let points = state.control_points.as_ref().map(|chosen| {
+        let points = count(chosen.points.len() as u64, "point");
+        ("control points", format!("{points} on the {}", chosen.side))
+    });
+    let rows = rows.into_iter().chain(points);
+    let rows = rows.map(|(word, value)| vec![format!("  {word}"), one_line(&value).into_owned()]);
+    parts.push(columns(rows, "<<"));
+    if let Some(failure) = &state.failure {
+        let message = one_line(&failure.failure.message).into_owned();
+        let word = palette.paint(Tone::Bad, "failed");
+        let (stage, class) = (failure.stage, failure.failure.class);
+        parts.push(format!("{word} at {stage}: {message} ({class})\n"));
+    }
+    parts.push(stages_text(detail, palette));
+    parts.push(characters_text(detail, characters, palette));
+    parts.push(history_text(detail, palette));
+    parts.concat()
+}
+
+/// Lists the stages with their times and the numbers of their outcomes.
+fn stages_text(detail: &BlockDetail, palette: Palette) -> String {
+    if detail.stages.is_empty() {
+        return String::new();
+    }
+    let rows = detail.stages.iter().map(|stage| {
+        vec![
+            format!("  {}", stage.stage),
+            duration(stage.ms),
+            numbers(&stage.outcome),
+        ]
+    });
+    let head = palette.paint(Tone::Strong, "stages");
+    format!("{head}\n{}", columns(rows, "<><"))
+}
+
+/// Formats the numbers and short texts of an outcome on its first level: `agreement 0.93, side front`.
+fn numbers(outcome: &Value) -> String {
+    const MAX_TEXT: usize = 60;
+    let entries = outcome.as_object().into_iter().flatten();
+    let shown = entries.filter_map(|(name, value)| {
+        let name = name.replace('_', " ");
+        match value {
+            Value::Number(number) => Some(match number.as_f64() {
+                Some(real) if !number.is_u64() && !number.is_i64() => format!("{name} {real:.3}"),
+                _ => format!("{name} {number}"),
+            }),
+            Value::Bool(flag) => Some(format!("{name} {flag}")),
+            Value::String(text) if text.len() <= MAX_TEXT => {
+                Some(format!("{name} {}", one_line(text)))
+            }
+            _ => None,
+        }
+    });
+    shown.collect::<Vec<_>>().join(", ")
+}
+
+fn characters_text(
+    detail: &BlockDetail,
+    characters: &[StoredCharacter],
+    palette: Palette,
+) -> String {
+    let state = &detail.state;
+    if characters.is_empty() {
+        return String::new();
+    }
+    let head = palette.paint(Tone::Strong, "characters");
+    let mut text = format!("{head}  {} cut", state.characters);
+    for (number, what) in [
+        (state.low_confidence, "with low confidence"),
+        (state.left_out, "left out"),
+        (state.retired, "retired"),
+    ] {
+        if number > 0 {
+            // Formatting into memory does not fail.
+            let _ = write!(text, " · {number} {what}");
+        }
+    }
+    text.push('\n');
+    let low = Catalog::LOW_CHARACTER_CONFIDENCE;
+    let is_low = |one: &&StoredCharacter| {
+        one.state == BlockCharacterState::Cut && one.confidence.is_some_and(|value| value < low)
+    };
+    let is_left = |one: &&StoredCharacter| one.state == BlockCharacterState::Left;
+    let uncertain = characters.iter().filter(is_low).take(MAX_CHARACTERS);
+    let left = characters.iter().filter(is_left).take(MAX_CHARACTERS);
+    let rows = uncertain.chain(left).map(|one| {
+        let confidence = one.confidence.map(|value| format!("{value:.2}"));
+        vec![
+            format!("  {}", one_line(&one.label)),
+            confidence.unwrap_or_default(),
+            one.reason.as_deref().map_or_else(
+                || "low confidence".to_owned(),
+                |reason| format!("left out: {}", one_line(reason)),
+            ),
+        ]
+    });
+    text + &columns(rows, "<><")
+}
+
+/// Lists failed attempts, the latest last.
+fn history_text(detail: &BlockDetail, palette: Palette) -> String {
+    const MAX_ATTEMPTS: usize = 5;
+    let failed: Vec<_> = detail
+        .attempts
+        .iter()
+        .filter_map(|attempt| Some((attempt, attempt.failure.as_ref()?)))
+        .collect();
+    if failed.is_empty() {
+        return String::new();
+    }
+    let skipped = failed.len().saturating_sub(MAX_ATTEMPTS);
+    let rows = failed[skipped..].iter().map(|(attempt, failure)| {
+        vec![
+            format!("  {}", local(attempt.at)),
+            attempt.stage.to_string(),
+            format!("{} ({})", one_line(&failure.message), failure.class),
+        ]
+    });
+    let number = count(failed.len() as u64, "failed attempt");
+    let head = palette.paint(Tone::Strong, number);
+    format!("{head}\n{}", columns(rows, "<<<"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::numbers;
+
+    #[test]
+    fn numbers_of_an_outcome_are_on_one_line() {
+        let outcome =
+            json!({ "agreement": 0.93456, "windows": 120, "grid": [1, 2], "side": "front" });
+        assert_eq!(
+            numbers(&outcome),
+            "agreement 0.935, side front, windows 120"
+        );
+    }
+}

@@ -1,0 +1,404 @@
+//! `status`: shows the state of the project on one screen.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::Value;
+
+use super::review::review_step;
+use super::status_hosts;
+use crate::cli::output::context::Context;
+use crate::cli::output::failures::Failures;
+use crate::cli::output::missing_results;
+use crate::cli::output::screen::{Palette, Tone, clear_code};
+use crate::cli::output::streams;
+use crate::cli::output::table::{columns, count};
+use mocban_catalog::{Catalog, StageCounts, StatusCounts};
+use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_project::exit::ExitCode;
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
+use mocban_runner as runner;
+use mocban_store::Project;
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+pub(crate) struct StatusArgs {
+    /// Refresh every two seconds until Ctrl-C
+    #[arg(short, long)]
+    pub(crate) watch: bool,
+    /// List every failed pair with its error, not only the first ones of each class
+    #[arg(long)]
+    pub(crate) failed: bool,
+    /// Show the workers of each machine instead: what they have done, how long each stage takes, and what they wait for
+    #[arg(long, conflicts_with = "failed")]
+    pub(crate) hosts: bool,
+}
+
+const WATCH_INTERVAL: Duration = Duration::from_secs(2);
+
+pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.open_read_only().await?;
+    loop {
+        if args.hosts {
+            let workers = status_hosts::read(&catalog, now()).await?;
+            print_refreshed(
+                &args,
+                context,
+                &workers.json(),
+                workers.text(context.stdout),
+            )?;
+        } else {
+            print_status(
+                &read(&project, &catalog, &args, context).await?,
+                &args,
+                context,
+            )?;
+        }
+        if !args.watch {
+            break;
+        }
+        tokio::select! {
+            () = tokio::time::sleep(WATCH_INTERVAL) => {}
+            _ = tokio::signal::ctrl_c() => break,
+        }
+    }
+    catalog.close().await;
+    Ok(ExitCode::Done)
+}
+
+async fn read(
+    project: &Project,
+    catalog: &Catalog,
+    args: &StatusArgs,
+    context: &Context,
+) -> anyhow::Result<ProjectStatus> {
+    let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
+    // Read before the counts: a run that ends in between leaves no leases.
+    let running = runner::is_running(project, catalog, now()).await?;
+    let failures = Failures::read(catalog, args.failed).await?;
+    let counts = catalog.status(&fingerprints).await?;
+    Ok(ProjectStatus {
+        are_results_missing: missing_results::are_missing(project, &counts.jobs),
+        counts,
+        running,
+        failures,
+    })
+}
+
+/// The state that the screen shows.
+struct ProjectStatus {
+    counts: StatusCounts,
+    /// Whether a process works on the project. If not, leased pairs count as interrupted, not as running.
+    running: bool,
+    failures: Failures,
+    /// Whether there are results, but none of their files.
+    are_results_missing: bool,
+}
+
+impl ProjectStatus {
+    fn jobs(&self, status: JobStatus) -> u64 {
+        self.counts.jobs.get(&status).copied().unwrap_or(0)
+    }
+
+    fn waiting(&self) -> u64 {
+        self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
+    }
+
+    /// Returns the number of pairs that a process is working on.
+    fn in_process(&self) -> u64 {
+        self.jobs(JobStatus::Leased) - self.interrupted()
+    }
+
+    /// Returns the number of leased pairs whose process died. The next run continues these pairs.
+    fn interrupted(&self) -> u64 {
+        u64::from(!self.running) * self.jobs(JobStatus::Leased)
+    }
+
+    fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
+        let mut json = serde_json::to_value(&self.counts)?;
+        json["running"] = Value::from(self.running);
+        if !self.failures.blocks.is_empty() {
+            json["blocks"] = self.failures.blocks.json();
+        }
+        if with_failures {
+            json["failures"] = self.failures.json();
+        }
+        Ok(json)
+    }
+
+    fn failed(&self) -> u64 {
+        self.jobs(JobStatus::Quarantined)
+    }
+}
+
+fn print_status(
+    status: &ProjectStatus,
+    args: &StatusArgs,
+    context: &Context,
+) -> anyhow::Result<()> {
+    let dir = context.dir().display().to_string();
+    let text = screen(status, &dir, context.stdout);
+    print_refreshed(args, context, &status.json(args.failed)?, text)?;
+    if !context.global.json {
+        for command in next_steps(status) {
+            context.next(&command);
+        }
+    }
+    Ok(())
+}
+
+/// Prints JSON or text. With `--watch`, a JSON document is one line, and a text replaces the last one on the terminal.
+fn print_refreshed(
+    args: &StatusArgs,
+    context: &Context,
+    json: &Value,
+    mut text: String,
+) -> anyhow::Result<()> {
+    if context.global.json {
+        if args.watch {
+            streams::print_json_text(&json.to_string())?;
+        } else {
+            streams::print_json(json)?;
+        }
+        return Ok(());
+    }
+    if args.watch && std::io::stdout().is_terminal() {
+        text.insert_str(0, &clear_code());
+    }
+    Ok(streams::print(&text)?)
+}
+
+fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
+    let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
+    let mut parts = vec![line("project", &headline(status, dir, palette))];
+    if !status.failures.blocks.is_empty() {
+        parts.push(line(
+            "blocks",
+            &status.failures.blocks.line(status.running, palette),
+        ));
+        parts.push(status.failures.blocks.failures_text());
+    }
+    parts.push(stage_table(&status.counts, palette));
+    if status.failed() > 0 {
+        parts.push(format!("{}\n", palette.paint(Tone::Strong, "failed")));
+        parts.push(status.failures.text());
+    }
+    if status.interrupted() > 0 {
+        let text = "their process died; the next run continues them";
+        parts.push(line("interrupted", text));
+    }
+    if status.counts.stale > 0 {
+        let pairs = count(status.counts.stale, "pair");
+        let text = format!("{pairs} computed with other settings or files than the current ones");
+        parts.push(line("stale", &text));
+    }
+    if status.are_results_missing {
+        parts.push(line("files", missing_results::TEXT));
+    }
+    parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
+    parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
+    parts.concat()
+}
+
+fn label(word: &str, palette: Palette) -> String {
+    palette.paint(Tone::Strong, format!("{word:<11}"))
+}
+
+/// Returns `demo · 24 pairs · 22 done · 1 failed · 1 waiting · 91.7 %`
+fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
+    let done = status.jobs(JobStatus::Done);
+    let pairs = status.counts.pairs;
+    let mut parts = vec![
+        one_line(dir).into_owned(),
+        count(pairs, "pair"),
+        palette.paint(Tone::Good, format!("{done} done")),
+    ];
+    for (number, word, tone) in [
+        (status.failed(), "failed", Tone::Bad),
+        (status.in_process(), "running", Tone::Strong),
+        (status.interrupted(), "interrupted", Tone::Warn),
+        (status.waiting(), "waiting", Tone::Warn),
+    ] {
+        if number > 0 {
+            parts.push(palette.paint(tone, format!("{number} {word}")));
+        }
+    }
+    if pairs > 0 {
+        parts.push(format!("{:.1} %", done as f64 * 100.0 / pairs as f64));
+    }
+    parts.join(" · ")
+}
+
+fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
+    let of = |stage: Stage| counts.stages.get(&stage).copied().unwrap_or_default();
+    let head = Stage::ALL.map(|stage| palette.paint(Tone::Strong, stage));
+    let row = |name: &str, cell: &dyn Fn(StageCounts) -> String| {
+        let cells = Stage::ALL.map(|stage| cell(of(stage)));
+        [vec![label(name, palette)], cells.to_vec()].concat()
+    };
+    let failed = |stage: StageCounts| {
+        let tone = if stage.failed == 0 {
+            Tone::Faint
+        } else {
+            Tone::Bad
+        };
+        palette.paint(tone, stage.failed)
+    };
+    let rows = [
+        [vec![label("stages", palette)], head.to_vec()].concat(),
+        row("  done", &|stage| stage.done.to_string()),
+        row("  pending", &|stage| stage.pending.to_string()),
+        row("  failed", &failed),
+    ];
+    columns(rows, "<>>>>")
+}
+
+fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
+    (counts.low_confidence > 0).then(|| {
+        let pairs = count(counts.low_confidence, "done pair");
+        let metric = ThresholdMetric::DEFAULT;
+        format!("{pairs} below {} ({metric})", MetricOutcome::LOW_CONFIDENCE)
+    })
+}
+
+fn verdict_line(counts: &StatusCounts) -> Option<String> {
+    let of = |verdict: Verdict| counts.verdicts.get(&verdict).copied().unwrap_or(0);
+    let total: u64 = Verdict::ALL.into_iter().map(of).sum();
+    let parts = Verdict::ALL.map(|verdict| format!("{} {verdict}", of(verdict)));
+    (total > 0).then(|| parts.join(" · "))
+}
+
+fn next_steps(status: &ProjectStatus) -> Vec<String> {
+    let mut steps = Vec::new();
+    if status.counts.pairs == 0 && status.failures.blocks.is_empty() {
+        steps.push("import pairs.csv".to_owned());
+    }
+    if status.are_results_missing {
+        steps.push(missing_results::NEXT.to_owned());
+    }
+    let leased = status.failures.blocks.leased();
+    let running = status.in_process() > 0 || (status.running && leased > 0);
+    let waiting = status.waiting() + status.failures.blocks.waiting();
+    let interrupted = status.interrupted() + if status.running { 0 } else { leased };
+    let has_work = waiting + interrupted + status.counts.stale > 0;
+    if !running && (has_work || status.are_results_missing) {
+        steps.push("run".to_owned());
+    }
+    if let Some(first) = status.failures.blocks.first_failed() {
+        steps.push(format!("show {}", shell_quoted(&first)));
+    }
+    if let Some(first) = status.failures.first() {
+        steps.push(format!("show {}", shell_quoted(first.name.as_str())));
+    }
+    if status.counts.low_confidence > 0 {
+        steps.push("contact-sheet --order confidence".to_owned());
+    }
+    if status.jobs(JobStatus::Done) > 0 && !running {
+        if !status.are_results_missing {
+            steps.extend(review_step(&status.counts));
+        }
+        steps.push("report".to_owned());
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
+        screen,
+    };
+
+    fn status(done: u64, ready: u64) -> ProjectStatus {
+        let stage = StageCounts {
+            done,
+            pending: ready,
+            failed: 0,
+        };
+        ProjectStatus {
+            counts: StatusCounts {
+                schema: 1,
+                pairs: done + ready,
+                jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
+                stages: Stage::ALL.map(|name| (name, stage)).into(),
+                stale: 0,
+                low_confidence: 0,
+                verdicts: std::collections::BTreeMap::new(),
+            },
+            running: true,
+            failures: super::Failures::default(),
+            are_results_missing: false,
+        }
+    }
+
+    #[test]
+    fn pairs_of_a_dead_process_are_interrupted() {
+        let mut status = status(3, 0);
+        status.counts.jobs.insert(JobStatus::Leased, 2);
+        let headline = |status: &ProjectStatus| {
+            let text = screen(status, "demo", Palette::PLAIN);
+            text.lines().next().map(str::to_owned)
+        };
+        let expected = |word: &str| {
+            Some(format!(
+                "project      demo · 3 pairs · 3 done · 2 {word} · 100.0 %"
+            ))
+        };
+        assert_eq!(headline(&status), expected("running"));
+        assert!(next_steps(&status).is_empty());
+        status.running = false;
+        assert_eq!(headline(&status), expected("interrupted"));
+        let steps = next_steps(&status);
+        assert_eq!([&steps[0], &steps[steps.len() - 1]], ["run", "report"]);
+        assert_eq!(status.json(false).expect("JSON")["running"], false);
+    }
+
+    #[test]
+    fn screens_of_all_states() {
+        let mut all = status(3, 1);
+        all.counts.jobs.insert(JobStatus::Leased, 2);
+        insta::assert_snapshot!("running", screen(&all, "demo", Palette::PLAIN));
+        all.running = false;
+        all.counts.stale = 1;
+        all.counts.low_confidence = 2;
+        all.counts.verdicts = [(Verdict::Pass, 4), (Verdict::Unsure, 1)].into();
+        insta::assert_snapshot!("interrupted", screen(&all, "demo", Palette::PLAIN));
+        insta::assert_snapshot!("next_steps", next_steps(&all).join("\n"));
+    }
+
+    #[test]
+    fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
+        let mut status = status(3, 0);
+        assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
+        status.counts.low_confidence = 1;
+        let text = screen(&status, "demo", Palette::PLAIN);
+        let line = "confidence   1 done pair below 0.5 (ensemble)\n";
+        assert!(text.ends_with(line), "{text}");
+        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
+    }
+
+    #[test]
+    fn next_step_follows_from_the_counts() {
+        assert_eq!(next_steps(&status(0, 0)), ["import pairs.csv"]);
+        assert_eq!(next_steps(&status(0, 2)), ["run"]);
+        let mut done = status(2, 0);
+        let steps = next_steps(&done);
+        assert!(steps[0].starts_with("review --reviewer "), "{steps:?}");
+        assert_eq!(steps[1..], ["report"]);
+        done.counts.verdicts.insert(Verdict::Pass, 1);
+        assert_eq!(next_steps(&done), ["report"]);
+        done.are_results_missing = true;
+        done.running = false;
+        assert_eq!(
+            next_steps(&done),
+            [super::missing_results::NEXT, "run", "report"]
+        );
+        let text = screen(&done, "demo", Palette::PLAIN);
+        assert!(
+            text.contains("files        the depth maps and masks"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,325 @@
+//! `verdict`: people's verdicts on the results, in an append-only log.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use crate::cli::input::select;
+use crate::cli::output::context::Context;
+use crate::cli::output::screen::{Palette, Tone};
+use crate::cli::output::streams;
+use crate::cli::output::table::{columns, count};
+use mocban_catalog::{
+    Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
+    check_reviewer,
+};
+use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::files::{self, RefusedLine};
+use mocban_project::location::now;
+use mocban_project::shell::shell_quoted;
+use mocban_project::time_text::{duration, local};
+use mocban_project::verdict_file::{self, VerdictRow};
+
+/// Commands on verdicts.
+#[derive(Debug, Subcommand)]
+pub(crate) enum VerdictCommand {
+    /// Record one verdict on the current result of a pair
+    Set(VerdictSetArgs),
+    /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
+    /// of the verdicts.jsonl of an export
+    Import(VerdictImportArgs),
+    /// Print the log, oldest first
+    Log(VerdictLogArgs),
+    /// Undo the newest verdict; the log keeps it, marked as undone
+    Undo(VerdictUndoArgs),
+}
+
+/// Arguments of `verdict set`.
+#[derive(Debug, Args)]
+pub(crate) struct VerdictSetArgs {
+    /// The pair
+    pub(crate) pair: String,
+    /// The verdict: pass, fail or unsure
+    pub(crate) verdict: Verdict,
+    /// Name of the reviewer
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    pub(crate) reviewer: String,
+    /// Only the result of this metric: `nl_ssim`, density, ensemble or relief [default: all]
+    #[arg(long)]
+    pub(crate) metric: Option<ThresholdMetric>,
+    /// Reason of a failure: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
+    #[arg(long)]
+    pub(crate) reason: Option<Reason>,
+    /// Free text
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) note: Option<String>,
+    /// Remaining rotation of the relief to match the print, degrees clockwise
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
+    pub(crate) angle: Option<f64>,
+}
+
+/// Arguments of `verdict import`.
+#[derive(Debug, Args)]
+pub(crate) struct VerdictImportArgs {
+    /// The file
+    pub(crate) file: PathBuf,
+}
+
+/// Arguments of `verdict log`.
+#[derive(Debug, Args)]
+pub(crate) struct VerdictLogArgs {
+    /// Only this pair
+    pub(crate) pair: Option<String>,
+}
+
+/// Arguments of `verdict undo`.
+#[derive(Debug, Args)]
+pub(crate) struct VerdictUndoArgs {
+    /// Only verdicts of this reviewer [default: of anyone]
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    pub(crate) reviewer: Option<String>,
+}
+
+/// Parses a reviewer's name, which is one line of text.
+pub(crate) fn reviewer_name(text: &str) -> Result<String, InvalidVerdict> {
+    let name = text.trim();
+    check_reviewer(name)?;
+    Ok(name.to_owned())
+}
+
+/// Parses an angle from -180 to 180 degrees.
+fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if angle.abs() <= 180.0 => Ok(angle),
+        Ok(_) | Err(_) => Err("an angle is a number from -180 to 180".to_owned()),
+    }
+}
+
+pub(crate) async fn verdict(
+    command: VerdictCommand,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    match command {
+        VerdictCommand::Set(args) => set(args, context).await,
+        VerdictCommand::Import(args) => import(args, context).await,
+        VerdictCommand::Log(args) => log(args, context).await,
+        VerdictCommand::Undo(args) => undo(args, context).await,
+    }
+}
+
+async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open().await?;
+    let rights = catalog.review_rights().await?;
+    rights.require_verdicts(&args.reviewer)?;
+    let new = NewVerdict {
+        pair: select::pair(&catalog, &args.pair).await?,
+        metric: args.metric,
+        verdict: args.verdict,
+        reviewer: args.reviewer,
+        reason: args.reason,
+        note: args.note,
+        look: ReviewContext {
+            angle_read_deg: args.angle,
+            ..ReviewContext::default()
+        },
+        at: None,
+    };
+    new.check(now())
+        .map_err(|error| Refusal::Usage(error.to_string()))?;
+    let (text, known) = (set_text(&new), known_text(&new));
+    let stored = catalog.verdict_set(vec![new], now()).await?;
+    catalog.close().await;
+    context.info(if stored == 0 { &known } else { &text });
+    Ok(ExitCode::Done)
+}
+
+/// Returns what `verdict set` recorded, and how to record less or to take it back.
+fn set_text(new: &NewVerdict) -> String {
+    let undo = format!("`verdict undo --reviewer {}`", shell_quoted(&new.reviewer));
+    let one_only = match new.metric {
+        Some(_) => "",
+        None => ", and --metric judges the result of one metric only",
+    };
+    format!("{}; {undo} takes it back{one_only}", verdict_text(new))
+}
+
+/// Returns that a verdict was recorded before.
+fn known_text(new: &NewVerdict) -> String {
+    format!("{} is already recorded", verdict_text(new))
+}
+
+/// Returns `b01-0117, density: pass`.
+fn verdict_text(new: &NewVerdict) -> String {
+    let metric = new.metric.map_or("all metrics", ThresholdMetric::name);
+    format!("{}, {metric}: {}", new.pair, new.verdict)
+}
+
+async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let bytes = files::read(&args.file)?;
+    let (_project, catalog) = context.open().await?;
+    let parse = if files::is_jsonl(&args.file, &bytes) {
+        verdict_file::parse_jsonl
+    } else {
+        verdict_file::parse_csv
+    };
+    let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
+    let rows = parse(&bytes).map_err(refused)?;
+    verdict_file::check_values(&rows, now()).map_err(refused)?;
+    let rights = catalog.review_rights().await?;
+    for row in &rows {
+        rights.require_verdicts(&row.verdict.reviewer)?;
+    }
+    let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    verdict_file::refuse_unknown(&rows, &unknown).map_err(refused)?;
+    let all = rows.len() as u64;
+    let rows = on_current_results(&catalog, rows).await?;
+    let current = rows.len() as u64;
+    let verdicts = rows.into_iter().map(|row| row.verdict).collect();
+    let number = catalog.verdict_set(verdicts, now()).await?;
+    catalog.close().await;
+    let (left_out, known) = (all - current, current - number);
+    context.print_json(
+        &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
+    )?;
+    if left_out > 0 {
+        let left_out = count(left_out, "verdict");
+        context.warn(&format!(
+            "{left_out} left out: the judged result is not the current one of the pair"
+        ));
+    }
+    if known > 0 {
+        context.info(&format!("{} already recorded", count(known, "verdict")));
+    }
+    context.info(&format!("{} recorded", count(number, "verdict")));
+    context.next("report");
+    Ok(ExitCode::Done)
+}
+
+/// Keeps rows that name the current result of their pair, and rows that name no result.
+async fn on_current_results(
+    catalog: &Catalog,
+    rows: Vec<VerdictRow>,
+) -> anyhow::Result<Vec<VerdictRow>> {
+    let mut current = Vec::with_capacity(rows.len());
+    for row in rows {
+        let Some(judged) = row.judged else {
+            current.push(row);
+            continue;
+        };
+        let detail = catalog.pair(&row.verdict.pair).await?;
+        let metrics = detail.map_or_else(Vec::new, |detail| detail.results.metrics);
+        let is_current = metrics.iter().any(|metric| {
+            let named = row.verdict.metric;
+            metric.result_hash == judged && named.is_none_or(|named| named == metric.outcome.metric)
+        });
+        if is_current {
+            current.push(row);
+        }
+    }
+    Ok(current)
+}
+
+async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open_read_only().await?;
+    let pair = match &args.pair {
+        Some(typed) => Some(select::pair(&catalog, typed).await?),
+        None => None,
+    };
+    let (sound, mut damaged) = catalog.without_faulty_rows().await?;
+    let events = sound.verdict_log(pair.as_ref()).await?;
+    catalog.close().await;
+    if let Some(pair) = &pair {
+        damaged.retain(|row| row.pair.as_deref() == Some(pair.as_str()));
+    }
+    damaged.retain(|row| row.table.is_of_verdicts());
+    context.warn_about_set_apart(&SetApart::of(&damaged));
+    if context.global.json {
+        for event in &events {
+            streams::print_json_text(&serde_json::to_string(event)?)?;
+        }
+        for row in &damaged {
+            let row = json!({"set_apart": {
+                "table": row.table.name(), "row": row.row, "pair": row.pair, "fault": row.fault.name(), "values": row.values,
+            }});
+            streams::print_json_text(&row.to_string())?;
+        }
+    } else if events.is_empty() && damaged.is_empty() {
+        context.info("no verdicts yet");
+    } else {
+        streams::print(&log_text(&events, context.stdout))?;
+        if !damaged.is_empty() {
+            streams::print(&damaged_text(&damaged, context.stdout))?;
+        }
+    }
+    Ok(ExitCode::Done)
+}
+
+/// Formats damaged rows of the log with all their values, one line each.
+fn damaged_text(rows: &[FaultyRow], palette: Palette) -> String {
+    let line = |row: &FaultyRow| {
+        let values = row.values.iter();
+        let values = values.map(|(name, value)| format!("{name}={value}"));
+        let text = format!("{row}: {}", values.collect::<Vec<_>>().join(" "));
+        let head = palette.paint(Tone::Bad, "set apart");
+        format!("{head}  {}\n", one_line(&text))
+    };
+    rows.iter().map(line).collect()
+}
+
+async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open().await?;
+    let rights = catalog.review_rights().await?;
+    let reviewer = args.reviewer.as_deref().or(rights.only_reviewer());
+    rights.require_review(reviewer)?;
+    let undone = catalog.verdict_undo(reviewer, now()).await?;
+    catalog.close().await;
+    context.print_json(&json!({"schema": 1, "undone": undone}))?;
+    for event in &undone {
+        context.info(&format!(
+            "undone: {} for {} {} by {}",
+            event.verdict, event.pair, event.metric, event.reviewer
+        ));
+    }
+    Ok(ExitCode::Done)
+}
+
+/// Formats the log, one line per event.
+pub(crate) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
+    let rows = events.iter().map(|event| log_row(event, palette));
+    columns(rows, "<<<<<<<<<")
+}
+
+fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
+    let tone = match event.verdict {
+        Verdict::Pass => Tone::Good,
+        Verdict::Fail => Tone::Bad,
+        Verdict::Unsure => Tone::Warn,
+    };
+    let state = match (event.undone_at, event.current) {
+        (Some(at), _) => format!("undone {}", local(at)),
+        (None, true) => String::new(),
+        (None, false) => "on an older result".to_owned(),
+    };
+    vec![
+        local(event.at),
+        event.pair.to_string(),
+        event.metric.to_string(),
+        palette.paint(tone, event.verdict),
+        event.reviewer.clone(),
+        event.reason.map_or("", Reason::name).to_owned(),
+        view_text(&event.look),
+        event.note.clone().unwrap_or_default(),
+        state,
+    ]
+}
+
+/// Formats how long the result was shown, and by how many degrees the reviewer would still rotate the relief.
+fn view_text(look: &ReviewContext) -> String {
+    let shown = look.shown_ms.map(duration);
+    let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
+    let parts: Vec<String> = shown.into_iter().chain(angle).collect();
+    parts.join(" ")
+}

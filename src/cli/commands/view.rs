@@ -1,0 +1,144 @@
+//! `view PAIR` shows a scan on its print in the browser, `view BLOCK` a whole page.
+
+use std::net::{Ipv4Addr, SocketAddr};
+
+use clap::Args;
+use serde_json::json;
+
+use super::block_points::BlockPoints;
+use super::block_sheet;
+use crate::cli::input::browser::open;
+use crate::cli::input::select;
+use crate::cli::input::signals;
+use crate::cli::output::context::Context;
+use crate::cli::output::streams;
+use mocban_catalog::Catalog;
+use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
+use mocban_core::page_vec;
+use mocban_export::InputFileLimits;
+use mocban_export::scan_view::ScanView;
+use mocban_pages::view::{self, ViewServer};
+use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::shell::shell_quoted;
+use mocban_runner::{Stop, StopLevel};
+use mocban_store::Project;
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// The pair, or a block
+    pair: String,
+    /// The metric whose result is shown [default: ensemble, or else the first that the pair has]
+    #[arg(long)]
+    metric: Option<ThresholdMetric>,
+    /// Port on this machine; 0 chooses the same port each time for a name, or any free port
+    #[arg(long, value_name = "N", default_value = "0")]
+    port: u16,
+    /// Print the address without opening a browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+pub(crate) async fn view(args: ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    page_vec::keep_few_pages();
+    let (project, catalog) = context.open_read_only().await?;
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
+    if select::block(&catalog, &args.pair).await?.is_some() {
+        let page = block_page(address, &args, &project, &catalog, context).await;
+        catalog.close().await;
+        return serve(page?, &args, context).await;
+    }
+    let limits = context.settings()?.config.limits;
+    let limits = InputFileLimits {
+        mesh: limits.mesh,
+        image: limits.image,
+    };
+    let name = select::pair(&catalog, &args.pair).await?;
+    let detail = catalog.pair(&name).await?;
+    catalog.close().await;
+    let Some(pair) = detail.map(|detail| detail.results) else {
+        anyhow::bail!("pair {name} was removed while it was read");
+    };
+    let default = pair.metric(ThresholdMetric::DEFAULT);
+    let default = default.or_else(|| pair.metrics.first());
+    let metric = args.metric.or(default.map(|record| record.outcome.metric));
+    let read = move |metric| ScanView::read(&project, &pair, metric, limits);
+    let scan = match metric {
+        None => None,
+        Some(metric) => tokio::task::spawn_blocking(move || read(metric)).await??,
+    };
+    let Some(scan) = scan else {
+        let of = args
+            .metric
+            .map_or_else(String::new, |metric| format!(" of {metric}"));
+        let command = context.command(&format!("show {}", shell_quoted(name.as_str())));
+        let text = format!("pair {name} has no result{of} to show; see: {command}");
+        return Err(Refusal::NothingSelected(text).into());
+    };
+    let page = view::bind(address, name.as_str(), &scan).await?;
+    serve(page, &args, context).await
+}
+
+/// Binds the page of a block. If its page was refused, only its correction is shown.
+async fn block_page(
+    address: SocketAddr,
+    args: &ViewArgs,
+    project: &Project,
+    catalog: &Catalog,
+    context: &Context,
+) -> anyhow::Result<ViewServer> {
+    let name = select::existing_block(catalog, &args.pair).await?;
+    let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
+        Ok(view) => Some(view),
+        Err(error) => {
+            let Some(why) = refusal(catalog, &name).await? else {
+                return Err(error);
+            };
+            context.warn(&format!("block {name} is not aligned: {why}"));
+            context.info("choose the same places on the relief and on the page to align them");
+            None
+        }
+    };
+    let store = BlockPoints::new(context, &name);
+    Ok(view::bind_block(address, &name, view, store).await?)
+}
+
+/// Returns why the page of a block was refused, if it was.
+async fn refusal(catalog: &Catalog, name: &BlockName) -> anyhow::Result<Option<String>> {
+    let detail = catalog.block(name).await?;
+    let failure = detail.and_then(|detail| detail.state.failure);
+    let refused = failure.filter(|stored| {
+        stored.stage == BlockStage::Align && stored.failure.class == FailureClass::NoSolution
+    });
+    Ok(refused.map(|stored| stored.failure.message))
+}
+
+/// Announces a page and serves it until the user ends it.
+async fn serve(page: ViewServer, args: &ViewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let _file = announce(&page.url(), args, context)?;
+    let drain = stop.clone();
+    tokio::select! {
+        () = page.serve(async move { drain.reached(StopLevel::Drain).await }) => {}
+        () = stop.reached(StopLevel::Now) => {}
+    }
+    signals.abort();
+    Ok(ExitCode::Done)
+}
+
+/// Prints the page's address and opens the page in a browser. Returns a temporary file that redirects to the page.
+fn announce(
+    url: &str,
+    args: &ViewArgs,
+    context: &Context,
+) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+    if context.global.json {
+        streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;
+    } else {
+        streams::print(url)?;
+    }
+    context.info("the address works once, in one browser; press Ctrl-C to end");
+    let is_for_script = args.no_open || context.global.json || context.global.quiet;
+    Ok(if is_for_script { None } else { open(url) })
+}

@@ -1,0 +1,8 @@
+//! What users name: flags, pairs, folders, signals.
+
+pub(crate) mod browser;
+pub(crate) mod examples;
+pub(crate) mod global;
+pub(crate) mod nearby_projects;
+pub(crate) mod select;
+pub(crate) mod signals;

@@ -1,0 +1,257 @@
+//! Shows a run's progress on stderr: a bar, or plain lines, or JSON.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use serde_json::json;
+
+use super::run_progress::RunProgress;
+use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
+use super::table::count;
+use crate::cli::input::global::ProgressMode;
+use mocban_core::domain::one_line;
+use mocban_project::time_text::duration;
+use mocban_runner::{RunEvent, StopLevel};
+
+/// Shows one run.
+#[derive(Debug)]
+pub(crate) struct ProgressReporter {
+    screen: Screen,
+    palette: Palette,
+    progress: RunProgress,
+    started: Instant,
+    display: Display,
+}
+
+#[derive(Debug)]
+enum Display {
+    Bar(ProgressBar),
+    Plain { last: Instant, percent: u64 },
+    Json,
+    None,
+}
+
+/// Time after which the next event prints a plain line.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
+/// After this many percentage points of progress, a plain line is printed before `PLAIN_INTERVAL` is over.
+const PLAIN_PERCENT: u64 = 5;
+/// Shortest time between two plain lines.
+const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);
+
+impl ProgressReporter {
+    /// Starts the requested display; `-q` turns the automatic one off.
+    pub(crate) fn new(mode: ProgressMode, quiet: bool, screen: &Screen, palette: Palette) -> Self {
+        let now = Instant::now();
+        Self {
+            screen: screen.clone(),
+            palette,
+            progress: RunProgress::default(),
+            started: now,
+            display: display(mode, quiet, screen, now),
+        }
+    }
+
+    /// Shows an event.
+    pub(crate) fn event(&mut self, event: &RunEvent) {
+        self.progress.observe(event);
+        match &mut self.display {
+            Display::None => return,
+            Display::Json => {
+                self.screen.json_line(&json!(event));
+                return;
+            }
+            Display::Bar(bar) => update_bar(bar, &self.progress),
+            Display::Plain { last, percent } => {
+                let is_enough = self.progress.percent() >= *percent + PLAIN_PERCENT;
+                let since = last.elapsed();
+                if since >= PLAIN_INTERVAL || is_enough && since >= PLAIN_MIN_INTERVAL {
+                    (*last, *percent) = (Instant::now(), self.progress.percent());
+                    let elapsed = self.started.elapsed().as_millis() as u64;
+                    self.screen.line(&self.progress.line(elapsed));
+                }
+            }
+        }
+        if let Some(line) = event_line(event, self.palette) {
+            self.screen.line(&line);
+        }
+    }
+
+    /// Removes the bar.
+    pub(crate) fn end(self) {
+        if let Display::Bar(bar) = self.display {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn display(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Display {
+    match mode {
+        ProgressMode::Auto if quiet => Display::None,
+        ProgressMode::Auto if std::io::stderr().is_terminal() && !is_dumb_terminal() => bar(screen),
+        ProgressMode::Auto | ProgressMode::Plain => Display::Plain {
+            last: now,
+            percent: 0,
+        },
+        ProgressMode::Bar => bar(screen),
+        ProgressMode::Json => Display::Json,
+        ProgressMode::None => Display::None,
+    }
+}
+
+fn bar(screen: &Screen) -> Display {
+    // The bar is narrower than the terminal, so that the "^C" printed after it does not wrap.
+    let style = ProgressStyle::with_template(
+        "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
+    )
+    .unwrap_or_else(|_| ProgressStyle::default_bar())
+    .progress_chars("━╸─")
+    .with_key(
+        "per_sec",
+        |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+            // Formatting into memory does not fail.
+            let _ = write!(to, "{:.1}/s", state.per_sec());
+        },
+    );
+    let bar = screen.add_bar(ProgressBar::new(0).with_style(style));
+    bar.enable_steady_tick(Duration::from_millis(250));
+    Display::Bar(bar)
+}
+
+fn update_bar(bar: &ProgressBar, progress: &RunProgress) {
+    if bar.length() != Some(progress.stages) {
+        bar.set_length(progress.stages);
+    }
+    bar.set_position(progress.finished);
+    bar.set_message(progress.by_stage_line());
+}
+
+/// Returns the line that is printed for an event, if any.
+fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
+    match event {
+        RunEvent::PairFailed {
+            pair,
+            stage,
+            failure,
+            ..
+        } => Some(format!(
+            "{} {} at {stage}: {} ({})",
+            palette.paint(Tone::Bad, "failed"),
+            palette.paint(Tone::Strong, pair),
+            one_line(&failure.message),
+            failure.class
+        )),
+        RunEvent::PairBackingOff {
+            pair,
+            stage,
+            failure,
+            wait_ms,
+        } => Some(format!(
+            "{} {pair} at {stage}: {} ({}), retrying in {}",
+            palette.paint(Tone::Warn, "waiting"),
+            one_line(&failure.message),
+            failure.class,
+            duration(*wait_ms)
+        )),
+        RunEvent::Recovered { pairs } => {
+            let pairs = count(*pairs, "pair");
+            Some(format!("{pairs} recovered from a worker that died"))
+        }
+        RunEvent::Stopping { level, reason } => {
+            Some(palette.paint(Tone::Warn, stopping_line(*level, reason)))
+        }
+        RunEvent::BlockDone {
+            block,
+            added,
+            changed,
+            retired,
+            ..
+        } => Some(format!(
+            "block {block}: {} added, {changed} changed, {retired} retired",
+            count(*added, "pair")
+        )),
+        RunEvent::BlockFailed {
+            block,
+            stage,
+            failure,
+        } => Some(format!(
+            "{} block {} at {stage}: {} ({})",
+            palette.paint(Tone::Bad, "failed"),
+            palette.paint(Tone::Strong, block),
+            one_line(&failure.message),
+            failure.class
+        )),
+        RunEvent::BlockBackingOff {
+            block,
+            stage,
+            failure,
+            wait_ms,
+        } => Some(format!(
+            "{} block {block} at {stage}: {} ({}), retrying in {}",
+            palette.paint(Tone::Warn, "waiting"),
+            one_line(&failure.message),
+            failure.class,
+            duration(*wait_ms)
+        )),
+        RunEvent::Started { .. }
+        | RunEvent::BlockStageStarted { .. }
+        | RunEvent::BlockStageFinished { .. }
+        | RunEvent::StageStarted { .. }
+        | RunEvent::StageFinished { .. }
+        | RunEvent::PairDone { .. } => None,
+    }
+}
+
+fn stopping_line(level: StopLevel, reason: &str) -> String {
+    match level {
+        StopLevel::Go => reason.to_owned(),
+        StopLevel::Drain => {
+            format!("{reason}: finishing the current stages; press Ctrl-C again to stop now")
+        }
+        StopLevel::Now => format!("{reason}: stopping now; stored results are kept"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Palette, RunEvent, StopLevel, event_line, json};
+    use mocban_core::domain::{Failure, FailureClass, PairName, Stage};
+
+    #[test]
+    fn lines_of_events() {
+        let pair: PairName = "0003".parse().expect("valid id");
+        let (stage, failure) = (
+            Stage::Fit,
+            Failure::new(FailureClass::BadInput, "a.stl: no faces"),
+        );
+        let stopping = |level| RunEvent::Stopping {
+            level,
+            reason: "interrupted".into(),
+        };
+        let events = [
+            RunEvent::PairFailed {
+                pair: pair.clone(),
+                stage,
+                failure: failure.clone(),
+                skipped: 4,
+            },
+            RunEvent::PairBackingOff {
+                pair,
+                stage,
+                failure,
+                wait_ms: 30_000,
+            },
+            RunEvent::Recovered { pairs: 1 },
+            stopping(StopLevel::Drain),
+            stopping(StopLevel::Now),
+        ];
+        let lines = events
+            .each_ref()
+            .map(|event| event_line(event, Palette::PLAIN));
+        insta::assert_snapshot!(lines.map(Option::unwrap_or_default).join("\n"));
+        insta::assert_snapshot!(
+            "json",
+            events.map(|event| json!(event).to_string()).join("\n")
+        );
+    }
+}
