@@ -171,7 +171,7 @@
 //!
 //! A stage that takes too long, is stopped or has lost its lease is cancelled: inner loops poll the token of their thread
 //! (`domain/cancel.rs`) and unwind to the function that started the computation. `runner/compute_thread.rs` and
-//! `runner/block_task.rs` then wait for the end of the thread before its memory is given to others, and
+//! `runner/block/task.rs` then wait for the end of the thread before its memory is given to others, and
 //! `local_server/request_work.rs` cancels the work of requests that nobody waits for. Code that hands work to other
 //! threads, such as those of `rayon`, takes the token along as a `ThreadToken`. A loop over vertices, triangles, pixels or
 //! rows of a file must poll, at best through `polled`.

@@ -7,17 +7,7 @@
 //! runs its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
 
 mod artifacts_owner;
-mod block_artifacts;
-mod block_checkpoint;
-mod block_inputs;
-mod block_memory;
-mod block_pipeline;
-mod block_plan;
-mod block_progress;
-mod block_size;
-mod block_slot;
-mod block_stages;
-mod block_task;
+mod block;
 pub mod check;
 mod checkpointer;
 mod claim_size;
@@ -43,6 +33,7 @@ mod run_guard;
 mod run_metrics;
 mod run_plan;
 mod run_selection;
+mod scan_size;
 mod scheduler;
 mod stage_executor;
 mod stage_files;
@@ -54,7 +45,7 @@ mod tests;
 mod worker_session;
 
 pub use artifacts_owner::claim_artifacts;
-pub use block_stages::{
+pub use block::stages::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
     CharacterOutput, CutFiles,
 };

@@ -9,9 +9,9 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 
 use super::artifacts_owner::claim_artifacts;
-use super::block_pipeline::BlockPipeline;
-use super::block_plan;
-use super::block_stages::{BlockStages, block_settings};
+use super::block::pipeline::BlockPipeline;
+use super::block::plan;
+use super::block::stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
@@ -194,7 +194,7 @@ impl RunStart<'_> {
         ended.await?;
         let among = self.selection.map(|selection| &selection.blocks);
         let what = (options.rerun, among);
-        block_plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+        plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
     }
 
     /// Returns what the tasks of the run share.

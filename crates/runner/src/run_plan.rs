@@ -1,8 +1,8 @@
 //! What a run would do, without doing it.
 
-use super::block_inputs;
-use super::block_pipeline::BlockPipeline;
-use super::block_stages::block_settings;
+use super::block::inputs;
+use super::block::pipeline::BlockPipeline;
+use super::block::stages::block_settings;
 use super::error::RunError;
 use super::input_changes;
 use super::input_reads::read_limits;
@@ -41,7 +41,7 @@ pub async fn plan(
     let planned = catalog
         .plan(&fingerprints(settings), pairs, options.rerun)
         .await?;
-    block_inputs::store_changes(project, catalog, blocks, &limits).await?;
+    inputs::store_changes(project, catalog, blocks, &limits).await?;
     let settings = block_settings(&BlockPipeline::new(options));
     let blocks = catalog.plan_blocks(&settings, options.rerun, blocks);
     Ok(RunPlan {

@@ -7,8 +7,8 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::block_slot::{BlockRunCounts, BlockSlot};
-use super::block_task::BlockReport;
+use super::block::slot::{BlockRunCounts, BlockSlot};
+use super::block::task::BlockReport;
 use super::compute_thread::task_result;
 use super::error::RunError;
 use super::events::RunEvent;

@@ -4,12 +4,12 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::block_size;
 use super::memory_budget::{self, PAIR_BYTES};
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
+use crate::scan_size;
 use mocban_align::stages::normalize::{NormalizeError, Normalized, PrintMasks};
 use mocban_align::stages::register::RegisterError;
 use mocban_align::stages::{Settings, StageError, depth, pipeline};
@@ -64,8 +64,8 @@ impl PipelineExecutor {
 
     fn fit(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let scan = self.inputs.read_scan(pair)?;
-        let length = block_size::length_of(&scan.mesh().vertices);
-        if let Some(reason) = block_size::wrong_unit(length, pair.attributes.unit) {
+        let length = scan_size::length_of(&scan.mesh().vertices);
+        if let Some(reason) = scan_size::wrong_unit(length, pair.attributes.unit) {
             let text = format!("{}: {reason}", pair.attributes.mesh_path);
             return Err(ExecutionError::failed(FailureClass::BadInput, text));
         }
@@ -111,7 +111,7 @@ impl PipelineExecutor {
                 NormalizeError::Print(_) => &pair.attributes.print_path,
                 NormalizeError::NoStrokes => &pair.attributes.mesh_path,
             };
-            in_file(pair, path, &error.into(), block_size::length_of_map(&depth))
+            in_file(pair, path, &error.into(), scan_size::length_of_map(&depth))
         })?;
         pair.depth = Some(depth);
         let (outcome, json) = round_trip(&normalized.outcome)?;
@@ -144,7 +144,7 @@ impl PipelineExecutor {
                     }
                     _ => &pair.attributes.mesh_path,
                 };
-                in_file(pair, path, &error.into(), block_size::length_of_map(&depth))
+                in_file(pair, path, &error.into(), scan_size::length_of_map(&depth))
             })?;
         let (outcome, json) = round_trip(&registered.outcome)?;
         let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
@@ -190,7 +190,7 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
 /// Returns the failure of a stage on a file. `length` is that of the scan in its unit, or 0 if it does not matter.
 fn in_file(pair: &PairContext, path: &str, error: &StageError, length: f64) -> ExecutionError {
     let advice = match error.class() {
-        FailureClass::NoSolution => block_size::advice(length, pair.attributes.unit),
+        FailureClass::NoSolution => scan_size::advice(length, pair.attributes.unit),
         _ => String::new(),
     };
     ExecutionError::failed(error.class(), format!("{path}: {error}{advice}"))

@@ -37,7 +37,7 @@ pub trait BlockStages: Send + Sync + 'static {
 }
 
 /// Returns the settings of the stages of blocks.
-pub(super) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
+pub(crate) fn block_settings(stages: &dyn BlockStages) -> BlockSettings {
     BlockSettings::new(|stage| stages.settings(stage))
 }
 
@@ -72,7 +72,7 @@ pub struct BlockFile {
 }
 
 impl BlockFile {
-    pub(super) const fn new(stored: String, input: Input, bytes: u64) -> Self {
+    pub(crate) const fn new(stored: String, input: Input, bytes: u64) -> Self {
         Self {
             stored,
             input,

@@ -4,13 +4,13 @@ use std::io;
 
 use serde::Serialize;
 
-use crate::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use crate::block::stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_align::block::BlockError;
 use mocban_core::domain::FailureClass;
 use mocban_core::mesh::MeshReadError;
 
 /// Returns the output of a stage with an outcome and no characters.
-pub(super) fn output(outcome: &impl Serialize) -> Result<BlockStageOutput, BlockStageError> {
+pub(crate) fn output(outcome: &impl Serialize) -> Result<BlockStageOutput, BlockStageError> {
     let outcome = serde_json::to_value(outcome)
         .map_err(|error| BlockStageError::failed(FailureClass::Bug, error.to_string()))?;
     Ok(BlockStageOutput {
@@ -20,7 +20,7 @@ pub(super) fn output(outcome: &impl Serialize) -> Result<BlockStageOutput, Block
 }
 
 /// Returns the failure of a stage that reads a file.
-pub(super) fn failed(file: &BlockFile, error: BlockError) -> BlockStageError {
+pub(crate) fn failed(file: &BlockFile, error: BlockError) -> BlockStageError {
     match error {
         BlockError::Mesh(MeshReadError::Io(error)) if is_stop(&error) => BlockStageError::Stopped,
         BlockError::Mesh(MeshReadError::Io(error)) => file.unreadable(error),
@@ -38,7 +38,7 @@ pub(super) fn failed(file: &BlockFile, error: BlockError) -> BlockStageError {
 /// The error of a read after the run was asked to stop.
 #[derive(Debug, thiserror::Error)]
 #[error("the run stops")]
-pub(super) struct StopRequested;
+pub(crate) struct StopRequested;
 
 /// Returns whether reading failed because the run stops.
 fn is_stop(error: &io::Error) -> bool {

@@ -2,14 +2,14 @@
 
 use serde_json::Value;
 
-use super::block_inputs::BlockSources;
-use super::block_stages::BlockStageOutput;
+use super::inputs::BlockSources;
+use super::stages::BlockStageOutput;
 use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum BlockEnd {
+pub(crate) enum BlockEnd {
     /// Every stage is stored.
     Done,
     /// The block failed.
@@ -23,17 +23,17 @@ pub(super) enum BlockEnd {
 }
 
 /// A block in progress.
-pub(super) struct BlockInProgress {
-    pub(super) lease: BlockLease,
-    pub(super) work: BlockWork,
-    pub(super) sources: BlockSources,
+pub(crate) struct BlockInProgress {
+    pub(crate) lease: BlockLease,
+    pub(crate) work: BlockWork,
+    pub(crate) sources: BlockSources,
     /// Versions of the input files, as far as they are known.
-    pub(super) inputs: BlockInputVersions,
+    pub(crate) inputs: BlockInputVersions,
 }
 
 impl BlockInProgress {
     /// Describes what a stage is computed from.
-    pub(super) fn made_with(&self, stage: BlockStage, settings: &Value) -> MadeWith {
+    pub(crate) fn made_with(&self, stage: BlockStage, settings: &Value) -> MadeWith {
         let BlockWork {
             attributes,
             control_points,
@@ -50,14 +50,14 @@ impl BlockInProgress {
 }
 
 /// A computed stage.
-pub(super) struct ComputedBlockStage {
-    pub(super) output: BlockStageOutput,
-    pub(super) files: ArtifactSet,
-    pub(super) ms: u64,
+pub(crate) struct ComputedBlockStage {
+    pub(crate) output: BlockStageOutput,
+    pub(crate) files: ArtifactSet,
+    pub(crate) ms: u64,
 }
 
 /// What happens to a block after a stage.
-pub(super) enum AfterStage {
+pub(crate) enum AfterStage {
     /// The job continues with this stage.
     Continue(Box<BlockInProgress>, BlockStage),
     /// Its task ends.

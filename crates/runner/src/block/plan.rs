@@ -1,10 +1,10 @@
 //! Requeues blocks at the start of a run.
 
-use super::block_inputs;
-use super::block_stages::{BlockStages, block_settings};
-use super::error::RunError;
-use super::input_reads::ReadLimits;
-use super::policy;
+use super::inputs;
+use super::stages::{BlockStages, block_settings};
+use crate::error::RunError;
+use crate::input_reads::ReadLimits;
+use crate::policy;
 use mocban_catalog::{BlockSelection, Catalog, RerunPolicy};
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
@@ -14,7 +14,7 @@ use mocban_store::Project;
 ///
 /// # Errors
 /// Returns an error if a database operation fails.
-pub(super) async fn requeue(
+pub(crate) async fn requeue(
     project: &Project,
     catalog: &Catalog,
     stages: &dyn BlockStages,
@@ -22,7 +22,7 @@ pub(super) async fn requeue(
     limits: &ReadLimits,
     now: UnixMillis,
 ) -> Result<(), RunError> {
-    block_inputs::store_changes(project, catalog, among, limits).await?;
+    inputs::store_changes(project, catalog, among, limits).await?;
     let settings = block_settings(stages);
     let requeued = catalog.retry_while_unavailable(async || {
         catalog.requeue_stale_blocks(&settings, policy, among).await

@@ -8,16 +8,16 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
-use super::block_artifacts::StageArtifacts;
-use super::block_checkpoint::{store_failure, store_stage, while_unavailable};
-use super::block_inputs::{BlockSources, outdated};
-use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
-use super::block_stages::BlockStageError;
-use super::compute_thread::panic_text;
-use super::error::RunError;
-use super::events::RunEvent;
-use super::run_context::RunContext;
-use super::stop::StopLevel;
+use super::artifacts::StageArtifacts;
+use super::checkpoint::{store_failure, store_stage, while_unavailable};
+use super::inputs::{BlockSources, outdated};
+use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::stages::BlockStageError;
+use crate::compute_thread::panic_text;
+use crate::error::RunError;
+use crate::events::RunEvent;
+use crate::run_context::RunContext;
+use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
@@ -29,10 +29,10 @@ use mocban_system::platform::sleep_active;
 const MAX_RERUNS: usize = 4;
 
 /// How a block's task ended, or the error that ends the run.
-pub(super) type BlockReport = Result<BlockEnd, RunError>;
+pub(crate) type BlockReport = Result<BlockEnd, RunError>;
 
 /// Runs the remaining stages of a leased block.
-pub(super) async fn process_block(
+pub(crate) async fn process_block(
     context: Arc<RunContext>,
     lease: BlockLease,
     work: BlockWork,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::block_stages::{BlockArtifacts, BlockStageError};
+use super::stages::{BlockArtifacts, BlockStageError};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, Failure, FailureClass,
 };
@@ -11,7 +11,7 @@ use mocban_system::failpoint::{self, Point};
 
 /// The artifacts of a stage in progress. In an object store, they are one pack, except for the meshes and prints of
 /// characters: pairs read these as inputs, so each is an object of its own.
-pub(super) struct StageArtifacts<'a> {
+pub(crate) struct StageArtifacts<'a> {
     project: &'a Project,
     block: &'a BlockName,
     stage: BlockStage,
@@ -22,7 +22,7 @@ pub(super) struct StageArtifacts<'a> {
 
 impl<'a> StageArtifacts<'a> {
     /// Creates an empty set of artifacts.
-    pub(super) fn new(project: &'a Project, block: &'a BlockName, stage: BlockStage) -> Self {
+    pub(crate) fn new(project: &'a Project, block: &'a BlockName, stage: BlockStage) -> Self {
         Self {
             project,
             block,
@@ -36,7 +36,7 @@ impl<'a> StageArtifacts<'a> {
     ///
     /// # Errors
     /// Returns an error if the pack cannot be stored.
-    pub(super) fn finish(self) -> Result<ArtifactSet, BlockStageError> {
+    pub(crate) fn finish(self) -> Result<ArtifactSet, BlockStageError> {
         let written = self.written.into_inner();
         let mut written = written.unwrap_or_else(PoisonError::into_inner);
         let packed = self.packed.into_inner();

@@ -3,8 +3,8 @@
 use std::io::Read as _;
 use std::path::PathBuf;
 
-use super::input_reads::ReadItem;
-use super::memory_budget::{mesh_bytes, print_pixels};
+use crate::input_reads::ReadItem;
+use crate::memory_budget::{mesh_bytes, print_pixels};
 use mocban_align::block::MAX_MAP_PIXELS;
 use mocban_catalog::BlockAttributes;
 use mocban_core::mesh::{STL_HEAD, binary_stl_triangles};
@@ -12,7 +12,7 @@ use mocban_core::raster;
 use mocban_store::{Input, Project};
 
 /// Bytes reserved for the height maps of both sides, their relief and the search for the page. Measured: 120 MB.
-pub(super) const BLOCK_BYTES: u64 = 160 << 20;
+pub(crate) const BLOCK_BYTES: u64 = 160 << 20;
 /// Part of the length of a streamed scan that the meshes of its characters take while they are cut. Measured: 1/18,
 /// with scans of 0.25 and 1.3 GB.
 const STREAMED_SHARE: u64 = 16;
@@ -24,23 +24,23 @@ const MAP_PIXEL_BYTES: u64 = 16;
 
 /// Returns the memory for the height maps of a block in a run with a limit: a quarter of it, but not more than the
 /// largest maps take.
-pub(super) fn map_bytes(memory: Option<u64>) -> u64 {
+pub(crate) fn map_bytes(memory: Option<u64>) -> u64 {
     let largest = MAX_MAP_PIXELS as u64 * MAP_PIXEL_BYTES;
     memory.map_or(largest, |bytes| largest.min(bytes / 4))
 }
 
 /// Returns the size of the largest height map, in pixels, that fits the memory for it.
-pub(super) fn max_map_pixels(memory: Option<u64>) -> usize {
+pub(crate) fn max_map_pixels(memory: Option<u64>) -> usize {
     (map_bytes(memory) / MAP_PIXEL_BYTES) as usize
 }
 
 /// A block whose memory is estimated.
-pub(super) struct EstimatedBlock {
-    pub(super) project: Project,
-    pub(super) attributes: BlockAttributes,
-    pub(super) limits: raster::ImageLimits,
+pub(crate) struct EstimatedBlock {
+    pub(crate) project: Project,
+    pub(crate) attributes: BlockAttributes,
+    pub(crate) limits: raster::ImageLimits,
     /// Memory for its height maps, whose size is known only when its scan is read.
-    pub(super) map_bytes: u64,
+    pub(crate) map_bytes: u64,
 }
 
 impl ReadItem for EstimatedBlock {

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use super::context::StageContext;
 use super::failure::{failed, output};
-use super::held::HeldInputs;
+use super::stage_cache::HeldInputs;
 use super::scan_stream::ScanStream;
-use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
+use crate::block::stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
 use mocban_align::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
@@ -31,7 +31,7 @@ const MIN_PRIOR: f64 = 0.5;
 type CutPrint = Result<(ArtifactRef, PrintCrop), String>;
 
 /// Cuts the characters out of the scan and the page.
-pub(super) fn cut(
+pub(crate) fn cut(
     context: &StageContext<'_>,
     held: &HeldInputs,
 ) -> Result<BlockStageOutput, BlockStageError> {

@@ -3,16 +3,16 @@
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use super::block_inputs::as_failure;
-use super::block_progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
-use super::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
-use super::compute_thread::run_blocking;
-use super::error::RunError;
-use super::events::RunEvent;
-use super::folder_check::check_folders;
-use super::policy;
-use super::run_context::RunContext;
-use super::stage_output::result_hash;
+use super::inputs::as_failure;
+use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
+use super::stages::{BlockStageError, BlockStageOutput, CharacterOutput};
+use crate::compute_thread::run_blocking;
+use crate::error::RunError;
+use crate::events::RunEvent;
+use crate::folder_check::check_folders;
+use crate::policy;
+use crate::run_context::RunContext;
+use crate::stage_output::result_hash;
 use mocban_catalog::{
     BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
     NewCharacter,
@@ -33,10 +33,10 @@ macro_rules! while_unavailable {
         }
     }};
 }
-pub(super) use while_unavailable;
+pub(crate) use while_unavailable;
 
 /// Stores a computed stage. Fails the block instead if the output is not valid.
-pub(super) async fn store_stage(
+pub(crate) async fn store_stage(
     context: &RunContext,
     block: Box<BlockInProgress>,
     stage: BlockStage,
@@ -158,7 +158,7 @@ async fn finish_cut(
 }
 
 /// Stores a failure of a stage.
-pub(super) async fn store_failure(
+pub(crate) async fn store_failure(
     context: &RunContext,
     block: Box<BlockInProgress>,
     stage: BlockStage,

@@ -3,7 +3,7 @@
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::scan_stream::ScanStream;
-use crate::block_stages::{BlockStageError, BlockStageOutput};
+use crate::block::stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };
@@ -14,7 +14,7 @@ use mocban_core::raster::png_grey16;
 const MIN_SIDE_MM: f64 = 60.0;
 
 /// Finds the faces of a scan and writes their heights.
-pub(super) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, BlockStageError> {
+pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, BlockStageError> {
     let scan = &context.inputs.mesh;
     let fail = |error: BlockError| failed(scan, error);
     let mut mesh = ScanStream::open(scan, context.mesh_limits, context.stop)?;

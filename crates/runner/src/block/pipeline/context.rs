@@ -4,32 +4,32 @@ use std::sync::atomic::AtomicBool;
 
 use serde::de::DeserializeOwned;
 
-use crate::block_stages::{BlockArtifacts, BlockInputs, BlockStageError};
+use crate::block::stages::{BlockArtifacts, BlockInputs, BlockStageError};
 use mocban_core::domain::{BlockStage, BlockStageRecord};
 use mocban_core::mesh::MeshLimits;
 use mocban_core::raster::ImageLimits;
 
 /// What a stage reads and writes.
-pub(super) struct StageContext<'a> {
-    pub(super) inputs: &'a BlockInputs,
-    pub(super) earlier: &'a [BlockStageRecord],
-    pub(super) artifacts: &'a dyn BlockArtifacts,
-    pub(super) stop: &'a AtomicBool,
-    pub(super) mesh_limits: &'a MeshLimits,
-    pub(super) image_limits: &'a ImageLimits,
+pub(crate) struct StageContext<'a> {
+    pub(crate) inputs: &'a BlockInputs,
+    pub(crate) earlier: &'a [BlockStageRecord],
+    pub(crate) artifacts: &'a dyn BlockArtifacts,
+    pub(crate) stop: &'a AtomicBool,
+    pub(crate) mesh_limits: &'a MeshLimits,
+    pub(crate) image_limits: &'a ImageLimits,
     /// Largest height map, in pixels.
-    pub(super) max_map_pixels: usize,
+    pub(crate) max_map_pixels: usize,
 }
 
 impl StageContext<'_> {
     /// Returns the record of an earlier stage.
-    pub(super) fn record(&self, stage: BlockStage) -> Result<&BlockStageRecord, BlockStageError> {
+    pub(crate) fn record(&self, stage: BlockStage) -> Result<&BlockStageRecord, BlockStageError> {
         let record = self.earlier.iter().find(|record| record.stage == stage);
         record.ok_or(BlockStageError::RerunFrom(stage))
     }
 
     /// Returns the outcome of an earlier stage.
-    pub(super) fn outcome<T: DeserializeOwned>(
+    pub(crate) fn outcome<T: DeserializeOwned>(
         &self,
         stage: BlockStage,
     ) -> Result<T, BlockStageError> {

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use super::context::StageContext;
 use super::failure::output;
-use super::held::{HeldInputs, HeldPage};
-use crate::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
+use super::stage_cache::{HeldInputs, HeldPage};
+use crate::block::stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,
@@ -23,7 +23,7 @@ struct PageBoxes {
 }
 
 /// Places the characters on the face.
-pub(super) fn boxes(
+pub(crate) fn boxes(
     context: &StageContext<'_>,
     held: &HeldInputs,
 ) -> Result<BlockStageOutput, BlockStageError> {

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::block_stages::{BlockFile, BlockInputs, BlockStageError};
-use super::error::RunError;
-use super::input_reads::{ReadItem, ReadLimits, read_each};
+use super::stages::{BlockFile, BlockInputs, BlockStageError};
+use crate::error::RunError;
+use crate::input_reads::{ReadItem, ReadLimits, read_each};
 use mocban_catalog::{
     BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
 };
@@ -14,7 +14,7 @@ use mocban_store::{Input, InputError, Project, hash_input, stat_input};
 /// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
 /// and pages that no stage has read; labels may have been added to a block that was finished without them. A file
 /// counts as unchanged if reading it fails or is ended by `limits`.
-pub(super) async fn store_changes(
+pub(crate) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
     among: Option<&BlockSelection>,
@@ -88,7 +88,7 @@ fn change(input: &Input, known: &InputVersion) -> Option<InputVersion> {
 
 /// The input files of a block, with what is known about them.
 #[derive(Debug, Clone)]
-pub(super) struct BlockSources {
+pub(crate) struct BlockSources {
     attributes: BlockAttributes,
     mesh: Input,
     page: Input,
@@ -98,7 +98,7 @@ pub(super) struct BlockSources {
 }
 
 impl BlockSources {
-    pub(super) fn new(
+    pub(crate) fn new(
         project: &Project,
         attributes: &BlockAttributes,
         limits: [(u64, &'static str); 2],
@@ -118,7 +118,7 @@ impl BlockSources {
     ///
     /// # Errors
     /// Returns an error if a file is missing, unreadable or too large.
-    pub(super) fn versions(
+    pub(crate) fn versions(
         &self,
         stage: BlockStage,
         known: &BlockInputVersions,
@@ -139,7 +139,7 @@ impl BlockSources {
     ///
     /// # Errors
     /// Returns an error that names the changed file.
-    pub(super) fn check_unchanged(&self, read: &BlockInputVersions) -> Result<(), BlockStageError> {
+    pub(crate) fn check_unchanged(&self, read: &BlockInputVersions) -> Result<(), BlockStageError> {
         let files = [
             (Some(&self.mesh), &read.mesh),
             (Some(&self.page), &read.page),
@@ -157,7 +157,7 @@ impl BlockSources {
     }
 
     /// Returns what a stage is computed from. `control_points` are those of these files.
-    pub(super) fn inputs(&self, control_points: Option<ControlPoints>) -> BlockInputs {
+    pub(crate) fn inputs(&self, control_points: Option<ControlPoints>) -> BlockInputs {
         let file = |path: &str, input: &Input| {
             BlockFile::new(path.to_owned(), input.clone(), input.size())
         };
@@ -200,7 +200,7 @@ fn version(
 }
 
 /// Returns the first stage whose result does not belong to these versions, among the stages before `stage`.
-pub(super) fn outdated(
+pub(crate) fn outdated(
     stage: BlockStage,
     used: &BlockInputVersions,
     now: &BlockInputVersions,
@@ -219,7 +219,7 @@ pub(super) fn outdated(
 }
 
 /// Converts an error of a stage to the failure that is stored. Also returns whether a retry may succeed.
-pub(super) fn as_failure(error: BlockStageError) -> (Failure, bool) {
+pub(crate) fn as_failure(error: BlockStageError) -> (Failure, bool) {
     match error {
         BlockStageError::Failed {
             failure,

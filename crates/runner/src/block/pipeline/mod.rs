@@ -7,7 +7,7 @@ mod context;
 mod cut;
 mod face;
 mod failure;
-mod held;
+mod stage_cache;
 mod scan_stream;
 
 use std::sync::atomic::AtomicBool;
@@ -15,12 +15,10 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use self::context::StageContext;
-use self::held::{HeldGuard, HeldInputs};
-use super::block_memory::max_map_pixels;
-use super::block_stages::{
-    BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
-};
-use super::options::RunOptions;
+use self::stage_cache::{HeldGuard, HeldInputs};
+use super::memory::max_map_pixels;
+use super::stages::{BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages};
+use crate::options::RunOptions;
 use mocban_core::domain::{BlockStage, BlockStageRecord};
 use mocban_core::mesh::MeshLimits;
 use mocban_core::raster::ImageLimits;
@@ -30,7 +28,7 @@ const REVISIONS: [u32; 4] = [2, 1, 2, 2];
 
 /// Computes the stages of blocks.
 #[derive(Debug)]
-pub(super) struct BlockPipeline {
+pub(crate) struct BlockPipeline {
     mesh_limits: MeshLimits,
     image_limits: ImageLimits,
     max_map_pixels: usize,
@@ -40,7 +38,7 @@ pub(super) struct BlockPipeline {
 
 impl BlockPipeline {
     /// Creates a pipeline with the limits of a run.
-    pub(super) fn new(options: &RunOptions) -> Self {
+    pub(crate) fn new(options: &RunOptions) -> Self {
         Self {
             mesh_limits: options.mesh_limits,
             image_limits: options.image_limits,

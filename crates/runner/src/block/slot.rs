@@ -4,30 +4,30 @@ use std::sync::Arc;
 
 use tokio::task::JoinSet;
 
-use super::block_memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
-use super::block_progress::BlockEnd;
-use super::block_task::{BlockReport, process_block};
-use super::compute_thread::task_result;
-use super::error::RunError;
-use super::input_reads::{ReadLimits, read_each};
-use super::options::RunOptions;
-use super::policy;
-use super::prefetch::Prefetch;
-use super::run_context::RunContext;
-use super::stop::StopLevel;
+use super::memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
+use super::progress::BlockEnd;
+use super::task::{BlockReport, process_block};
+use crate::compute_thread::task_result;
+use crate::error::RunError;
+use crate::input_reads::{ReadLimits, read_each};
+use crate::options::RunOptions;
+use crate::policy;
+use crate::prefetch::Prefetch;
+use crate::run_context::RunContext;
+use crate::stop::StopLevel;
 use mocban_catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
 use mocban_core::domain::WorkerId;
 use mocban_core::raster;
 
 /// What a run has counted about blocks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct BlockRunCounts {
-    pub(super) done: u64,
-    pub(super) failed: u64,
+pub(crate) struct BlockRunCounts {
+    pub(crate) done: u64,
+    pub(crate) failed: u64,
 }
 
 /// The slot of a process for a block.
-pub(super) struct BlockSlot {
+pub(crate) struct BlockSlot {
     context: Arc<RunContext>,
     /// The blocks of this run; `None` for all.
     among: Option<BlockSelection>,
@@ -39,11 +39,11 @@ pub(super) struct BlockSlot {
     /// The next block needs memory that a running pair has to return first.
     waits_for_memory: bool,
     task: JoinSet<BlockReport>,
-    pub(super) counts: BlockRunCounts,
+    pub(crate) counts: BlockRunCounts,
 }
 
 impl BlockSlot {
-    pub(super) fn new(
+    pub(crate) fn new(
         context: Arc<RunContext>,
         among: Option<BlockSelection>,
         options: &RunOptions,
@@ -61,18 +61,18 @@ impl BlockSlot {
     }
 
     /// Returns whether a block is in progress.
-    pub(super) fn is_busy(&self) -> bool {
+    pub(crate) fn is_busy(&self) -> bool {
         !self.task.is_empty()
     }
 
     /// Notes that a running pair returned its memory.
-    pub(super) const fn memory_was_freed(&mut self) {
+    pub(crate) const fn memory_was_freed(&mut self) {
         self.waits_for_memory = false;
     }
 
     /// Claims a block and starts its task, unless one is in progress. Returns whether one is in progress now, or waits
     /// for the memory of running pairs. In both cases no pair may be claimed.
-    pub(super) async fn start(
+    pub(crate) async fn start(
         &mut self,
         worker: WorkerId,
         pairs: &mut Prefetch,
@@ -132,7 +132,7 @@ impl BlockSlot {
     }
 
     /// Waits for the end of the block in progress. Returns `None` at once if there is none.
-    pub(super) async fn ended(&mut self) -> Option<BlockReport> {
+    pub(crate) async fn ended(&mut self) -> Option<BlockReport> {
         self.task.join_next().await.map(task_result)
     }
 
@@ -140,7 +140,7 @@ impl BlockSlot {
     ///
     /// # Errors
     /// Returns the error that ends the run.
-    pub(super) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
+    pub(crate) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
         self.may_find_one = true;
         match ended? {
             BlockEnd::Done => self.counts.done += 1,
@@ -151,7 +151,7 @@ impl BlockSlot {
     }
 
     /// Returns how many blocks any process has yet to finish.
-    pub(super) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
+    pub(crate) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
         let (catalog, among) = (&self.context.catalog, self.among.as_ref());
         let left =
             catalog.retry_while_unavailable(async || catalog.outstanding_blocks(among).await);
@@ -159,7 +159,7 @@ impl BlockSlot {
     }
 
     /// Ends back-offs that are due, and finds out whether a claim may find a block.
-    pub(super) async fn poll(&mut self) -> Result<(), RunError> {
+    pub(crate) async fn poll(&mut self) -> Result<(), RunError> {
         let left = self.outstanding().await?;
         let (now, longest) = (self.context.clock.now(), policy::longest_backoff_ms());
         let is_due = left.next_due.is_some_and(|due| due <= now);

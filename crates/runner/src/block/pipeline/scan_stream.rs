@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::failure::{StopRequested, failed};
-use crate::block_stages::{BlockFile, BlockStageError};
+use crate::block::stages::{BlockFile, BlockStageError};
 use mocban_align::block::BlockError;
 use mocban_core::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,
@@ -16,7 +16,7 @@ use mocban_core::mesh::{
 const BUFFER: usize = 1 << 20;
 
 /// The scan of a block.
-pub(super) struct ScanStream<'a> {
+pub(crate) struct ScanStream<'a> {
     source: ScanSource,
     limits: &'a MeshLimits,
     stop: &'a AtomicBool,
@@ -34,7 +34,7 @@ impl<'a> ScanStream<'a> {
     ///
     /// # Errors
     /// Returns an error if it cannot be read, is no mesh, or has no faces.
-    pub(super) fn open(
+    pub(crate) fn open(
         scan: &BlockFile,
         limits: &'a MeshLimits,
         stop: &'a AtomicBool,

@@ -2,15 +2,15 @@
 
 use super::context::StageContext;
 use super::failure::{failed, output};
-use super::held::{HeldFaces, HeldInputs};
-use crate::block_stages::{BlockStageError, BlockStageOutput};
+use super::stage_cache::{HeldFaces, HeldInputs};
+use crate::block::stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     self, AlignOutcome, BlockError, CarvedFace, PageAlignment, PageInk, StoredPageMap,
 };
 use mocban_core::domain::{BlockSide, ControlPoints, FailureClass};
 
 /// Aligns the page with a face of the block: from the control points, if there are some, or else by a search.
-pub(super) fn align(
+pub(crate) fn align(
     context: &StageContext<'_>,
     held: &HeldInputs,
 ) -> Result<BlockStageOutput, BlockStageError> {

@@ -4,20 +4,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::context::StageContext;
 use super::failure::failed;
-use crate::block_stages::BlockStageError;
+use crate::block::stages::BlockStageError;
 use mocban_align::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
 use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
 use mocban_core::raster::{self, PrintImage};
 
 /// What the last stage read.
 #[derive(Debug, Default)]
-pub(super) struct HeldInputs {
+pub(crate) struct HeldInputs {
     faces: Mutex<Option<(ContentHash, HeldFaces)>>,
     page: Mutex<Option<Arc<HeldPage>>>,
 }
 
 /// Forgets the inputs when it is dropped, also if a stage is cancelled or panics.
-pub(super) struct HeldGuard<'a>(pub(super) Option<&'a HeldInputs>);
+pub(crate) struct HeldGuard<'a>(pub(crate) Option<&'a HeldInputs>);
 
 impl Drop for HeldGuard<'_> {
     fn drop(&mut self) {
@@ -28,25 +28,25 @@ impl Drop for HeldGuard<'_> {
 }
 
 /// The faces of a block.
-pub(super) type HeldFaces = Arc<Vec<(BlockSide, CarvedFace)>>;
+pub(crate) type HeldFaces = Arc<Vec<(BlockSide, CarvedFace)>>;
 
 /// A page, its ink and the hash of its file.
 #[derive(Debug)]
-pub(super) struct HeldPage {
-    pub(super) hash: ContentHash,
-    pub(super) image: PrintImage,
-    pub(super) ink: PageInk,
+pub(crate) struct HeldPage {
+    pub(crate) hash: ContentHash,
+    pub(crate) image: PrintImage,
+    pub(crate) ink: PageInk,
 }
 
 impl HeldInputs {
     /// Forgets the inputs of a block that is finished.
-    pub(super) fn clear(&self) {
+    pub(crate) fn clear(&self) {
         *self.faces.lock().unwrap_or_else(PoisonError::into_inner) = None;
         *self.page.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// Returns the faces of a block, from memory or from the artifacts of `face`.
-    pub(super) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
+    pub(crate) fn faces(&self, context: &StageContext<'_>) -> Result<HeldFaces, BlockStageError> {
         let record = context.record(BlockStage::Face)?;
         let mut held = self.faces.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((hash, faces)) = &*held
@@ -72,7 +72,7 @@ impl HeldInputs {
     }
 
     /// Returns the page of a block and its ink, from memory or from its file.
-    pub(super) fn page(
+    pub(crate) fn page(
         &self,
         context: &StageContext<'_>,
     ) -> Result<Arc<HeldPage>, BlockStageError> {

@@ -1,0 +1,12 @@
+//! Leases whole blocks and runs their stages, one block at a time.
+
+pub(crate) mod artifacts;
+pub(crate) mod checkpoint;
+pub(crate) mod inputs;
+pub(crate) mod memory;
+pub(crate) mod pipeline;
+pub(crate) mod plan;
+pub(crate) mod progress;
+pub(crate) mod slot;
+pub(crate) mod stages;
+pub(crate) mod task;
