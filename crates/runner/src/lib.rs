@@ -8,6 +8,7 @@
 
 mod artifacts_owner;
 mod block;
+mod block_stages;
 pub mod check;
 mod checkpointer;
 mod claim_size;
@@ -45,7 +46,7 @@ mod tests;
 mod worker_session;
 
 pub use artifacts_owner::claim_artifacts;
-pub use block::stages::{
+pub use block_stages::{
     BlockArtifacts, BlockFile, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
     CharacterOutput, CutFiles,
 };

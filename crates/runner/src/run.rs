@@ -11,7 +11,7 @@ use tokio::task::JoinSet;
 use super::artifacts_owner::claim_artifacts;
 use super::block::pipeline::BlockPipeline;
 use super::block::plan;
-use super::block::stages::{BlockStages, block_settings};
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;

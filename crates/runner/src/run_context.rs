@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use super::block::stages::{BlockStages, block_settings};
+use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{Clock, Timing};

@@ -2,7 +2,7 @@
 
 use super::block::inputs;
 use super::block::pipeline::BlockPipeline;
-use super::block::stages::block_settings;
+use super::block_stages::block_settings;
 use super::error::RunError;
 use super::input_changes;
 use super::input_reads::read_limits;

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::stages::{BlockArtifacts, BlockStageError};
+use crate::block_stages::{BlockArtifacts, BlockStageError};
 use mocban_core::domain::{
     ArtifactRef, ArtifactSet, BlockName, BlockStage, BlockStageRecord, Failure, FailureClass,
 };

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::stages::{BlockFile, BlockInputs, BlockStageError};
+use crate::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use crate::error::RunError;
 use crate::input_reads::{ReadItem, ReadLimits, read_each};
 use mocban_catalog::{

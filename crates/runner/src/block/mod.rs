@@ -8,5 +8,4 @@ pub(crate) mod pipeline;
 pub(crate) mod plan;
 pub(crate) mod progress;
 pub(crate) mod slot;
-pub(crate) mod stages;
 pub(crate) mod task;

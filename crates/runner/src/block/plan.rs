@@ -1,7 +1,7 @@
 //! Requeues blocks at the start of a run.
 
 use super::inputs;
-use super::stages::{BlockStages, block_settings};
+use crate::block_stages::{BlockStages, block_settings};
 use crate::error::RunError;
 use crate::input_reads::ReadLimits;
 use crate::policy;

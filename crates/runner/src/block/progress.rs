@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::inputs::BlockSources;
-use super::stages::BlockStageOutput;
+use crate::block_stages::BlockStageOutput;
 use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 

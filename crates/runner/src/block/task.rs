@@ -12,7 +12,7 @@ use super::artifacts::StageArtifacts;
 use super::checkpoint::{store_failure, store_stage, while_unavailable};
 use super::inputs::{BlockSources, outdated};
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
-use super::stages::BlockStageError;
+use crate::block_stages::BlockStageError;
 use crate::compute_thread::panic_text;
 use crate::error::RunError;
 use crate::events::RunEvent;

@@ -3,7 +3,7 @@
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::stage_cache::{HeldFaces, HeldInputs};
-use crate::block::stages::{BlockStageError, BlockStageOutput};
+use crate::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     self, AlignOutcome, BlockError, CarvedFace, PageAlignment, PageInk, StoredPageMap,
 };

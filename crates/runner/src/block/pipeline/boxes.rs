@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::context::StageContext;
 use super::failure::output;
 use super::stage_cache::{HeldInputs, HeldPage};
-use crate::block::stages::{BlockFile, BlockStageError, BlockStageOutput};
+use crate::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     AlignOutcome, BoxesOutcome, CarvedFace, CharacterBox, PageMap, StoredPageMap, check_label_fit,
     find_boxes, place_characters,

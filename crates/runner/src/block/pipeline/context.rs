@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::de::DeserializeOwned;
 
-use crate::block::stages::{BlockArtifacts, BlockInputs, BlockStageError};
+use crate::block_stages::{BlockArtifacts, BlockInputs, BlockStageError};
 use mocban_core::domain::{BlockStage, BlockStageRecord};
 use mocban_core::mesh::MeshLimits;
 use mocban_core::raster::ImageLimits;

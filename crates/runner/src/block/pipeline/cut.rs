@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use super::context::StageContext;
 use super::failure::{failed, output};
-use super::stage_cache::HeldInputs;
 use super::scan_stream::ScanStream;
-use crate::block::stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
+use super::stage_cache::HeldInputs;
+use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, CutFiles};
 use mocban_align::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,

@@ -3,7 +3,7 @@
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::scan_stream::ScanStream;
-use crate::block::stages::{BlockStageError, BlockStageOutput};
+use crate::block_stages::{BlockStageError, BlockStageOutput};
 use mocban_align::block::{
     BlockError, FaceOutcome, FoundFace, HEIGHT_STEP_MM, Orientation, draw_height_maps, heights_role,
 };

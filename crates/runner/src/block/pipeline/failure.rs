@@ -4,7 +4,7 @@ use std::io;
 
 use serde::Serialize;
 
-use crate::block::stages::{BlockFile, BlockStageError, BlockStageOutput};
+use crate::block_stages::{BlockFile, BlockStageError, BlockStageOutput};
 use mocban_align::block::BlockError;
 use mocban_core::domain::FailureClass;
 use mocban_core::mesh::MeshReadError;

@@ -7,8 +7,8 @@ mod context;
 mod cut;
 mod face;
 mod failure;
-mod stage_cache;
 mod scan_stream;
+mod stage_cache;
 
 use std::sync::atomic::AtomicBool;
 
@@ -17,7 +17,9 @@ use serde_json::{Value, json};
 use self::context::StageContext;
 use self::stage_cache::{HeldGuard, HeldInputs};
 use super::memory::max_map_pixels;
-use super::stages::{BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages};
+use crate::block_stages::{
+    BlockArtifacts, BlockInputs, BlockStageError, BlockStageOutput, BlockStages,
+};
 use crate::options::RunOptions;
 use mocban_core::domain::{BlockStage, BlockStageRecord};
 use mocban_core::mesh::MeshLimits;

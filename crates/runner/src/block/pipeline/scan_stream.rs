@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::failure::{StopRequested, failed};
-use crate::block::stages::{BlockFile, BlockStageError};
+use crate::block_stages::{BlockFile, BlockStageError};
 use mocban_align::block::BlockError;
 use mocban_core::mesh::{
     self, Mesh, MeshLimits, MeshReadError, STL_HEAD, Triangle, TriangleStream,

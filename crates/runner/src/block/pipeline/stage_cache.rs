@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::context::StageContext;
 use super::failure::failed;
-use crate::block::stages::BlockStageError;
+use crate::block_stages::BlockStageError;
 use mocban_align::block::{CarvedFace, FaceOutcome, PageInk, StoredHeights, heights_role};
 use mocban_core::domain::{BlockSide, BlockStage, ContentHash};
 use mocban_core::raster::{self, PrintImage};
