@@ -15,6 +15,7 @@ const SUMMARY: &str = include_str!("../../docs/SUMMARY.md");
 /// All pages.
 const PAGES: &[(&str, &str)] = of_docs! {
     include_str:
+    "architecture.md",
     "explanation/benchmarks.md",
     "explanation/method.md",
     "explanation/queue.md",

@@ -1,6 +1,7 @@
 //! Checks the dependencies of the crates, and that neither files nor folders import each other in cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
@@ -344,65 +345,68 @@ fn folders_do_not_import_each_other_in_cycles() {
     assert!(found.is_empty(), "import cycles: {found:#?}");
 }
 
-/// Largest number of files in the walkthrough of one pair in `src/lib.rs`, and of their lines without unit tests.
-const MAX_WALK_FILES: usize = 18;
-const MAX_WALK_LINES: usize = 4500;
+/// Most words of the entrance to the code, and most lines of the page of a crate.
+const MAX_ENTRANCE_WORDS: usize = 1500;
+const MAX_PAGE_LINES: usize = 60;
 
-/// Returns the files at the start of list items below a heading in `src/lib.rs`. Paths are relative to the folder of the repository.
-fn listed_files(heading: &str) -> Vec<String> {
-    let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
-    let heading = format!("//! ## {heading}");
-    let section = lib.lines().skip_while(|line| **line != heading).skip(1);
-    section
-        .take_while(|line| !line.starts_with("//! ## "))
-        .filter_map(|line| {
-            let (mark, file) = line.strip_prefix("//! ")?.split_once('`')?;
-            let number = mark
-                .strip_suffix(". ")
-                .and_then(|number| number.parse::<u8>().ok());
-            let is_item = mark == "- " || number.is_some();
-            is_item.then(|| file.split('`').next().unwrap_or_default().to_owned())
-        })
-        .collect()
+/// Returns the names between backticks in a text.
+fn quoted_names(text: &str) -> Vec<&str> {
+    text.split('`').skip(1).step_by(2).collect()
 }
 
 #[test]
-fn the_way_of_one_pair_is_listed_and_short() {
-    let files = source_files();
-    let listed = listed_files("One pair, from manifest row to report cell");
-    let lines: usize = listed
-        .iter()
-        .map(|name| {
-            let file = files.iter().find(|file| file.name == *name);
-            file.unwrap_or_else(|| panic!("{name} does not exist"))
-                .production_lines()
-        })
-        .sum();
-    assert!(
-        (1..=MAX_WALK_FILES).contains(&listed.len()),
-        "{} files",
-        listed.len()
-    );
-    assert!(lines <= MAX_WALK_LINES, "{lines} lines");
+fn files_named_in_the_entrance_exist() {
+    let mut missing = Vec::new();
+    for page in ["docs/architecture.md", "CONTRIBUTING.md"] {
+        let text = std::fs::read_to_string(package_dir().join(page)).expect("a page");
+        let words = text.split_whitespace().count();
+        assert!(
+            page == "CONTRIBUTING.md" || words <= MAX_ENTRANCE_WORDS,
+            "{words} words"
+        );
+        for name in quoted_names(&text) {
+            let is_path = ["crates/", "src/", "tests/", "docs/"]
+                .iter()
+                .any(|top| name.starts_with(top));
+            let is_pattern = name.contains(['*', '{', ' ']);
+            if is_path && !is_pattern && !package_dir().join(name).exists() {
+                missing.push(format!("{page}: {name}"));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
 }
 
 #[test]
-fn files_that_name_a_threshold_metric_are_listed() {
-    let variants =
-        ["NlSsim", "Density", "Ensemble", "Relief"].map(|name| format!("ThresholdMetric::{name}"));
-    let names_metric = |file: &&SourceFile| {
-        let code = file.production_code();
-        let imports_variants = code.contains("ThresholdMetric::{");
-        variants.iter().any(|variant| code.contains(variant))
-            || imports_variants
-            || code.contains("enum ThresholdMetric")
-    };
+fn each_crate_begins_with_a_short_page_that_names_its_files_and_its_invariant() {
     let files = source_files();
-    let found: BTreeSet<String> = files
+    let pages = files
         .iter()
-        .filter(names_metric)
-        .map(|file| file.name.clone())
-        .collect();
-    let listed: BTreeSet<String> = listed_files("A new threshold metric").into_iter().collect();
-    assert_eq!(found, listed);
+        .filter(|file| file.name.ends_with("src/lib.rs"));
+    for file in pages.filter(|file| file.crate_name != "mocban") {
+        let page: Vec<&str> = file
+            .text
+            .lines()
+            .take_while(|line| line.starts_with("//!"))
+            .collect();
+        assert!(
+            page.len() <= MAX_PAGE_LINES,
+            "{}: {} lines",
+            file.name,
+            page.len()
+        );
+        let page = page.join("\n");
+        assert!(page.contains("**Invariant:**"), "{}", file.name);
+        for name in quoted_names(&page)
+            .into_iter()
+            .filter(|name| Path::new(name).extension().is_some_and(|end| end == "rs"))
+        {
+            let exists = files.iter().any(|other| {
+                other.name == name
+                    || other.crate_name == file.crate_name
+                        && other.name.ends_with(&format!("/{name}"))
+            });
+            assert!(exists, "{}: {name} does not exist", file.name);
+        }
+    }
 }

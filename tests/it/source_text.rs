@@ -26,14 +26,6 @@ impl SourceFile {
         without_comments(&self.text[..test_module_start(&self.text)])
     }
 
-    /// Returns the number of lines without unit tests.
-    pub(crate) fn production_lines(&self) -> usize {
-        if self.is_test {
-            return 0;
-        }
-        self.text[..test_module_start(&self.text)].lines().count()
-    }
-
     /// Returns the module's path from the crate root. The path of `lib.rs` and `main.rs` is empty.
     pub(crate) fn module(&self) -> Vec<String> {
         let name = self.path.trim_end_matches(".rs");

@@ -1,10 +1,20 @@
-//! The catalog: a database of SQLite or PostgreSQL with the data of every pair and the job queue. No other module
-//! contains SQL.
+//! The catalog: pairs, blocks, jobs, leases, results and verdicts in SQLite or PostgreSQL.
 //!
-//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs,
-//! `blocks` the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another
-//! catalog. One writer task owns the only write connection of this process and commits requests in groups. Reads use
-//! separate connections, also during a run. Callers pass the current time as an argument.
+//! - `queue`: the job queue; `blocks`: the data of whole blocks; `records`: the data of pairs, verdicts and imports;
+//!   `audit`: checks and repairs; `transfer`: copies to another catalog; `db`: connections, statements, errors
+//! - One writer task owns the only write connection of a process and commits the requests of several pairs at once, after at
+//!   most 250 ms. Reads use other connections, also during a run. Callers pass the current time.
+//! - A statement has one text for both databases, which `db/dialect.rs` translates; claims and checkpoints have one for each.
+//!   In SQLite, a group of them is one transaction. In PostgreSQL, each is one statement that commits by itself, with one
+//!   array per column, and claims begin behind the last claimed pair, because a snapshot that another session holds would
+//!   keep dead rows in the way.
+//! - If the server is unavailable, the writer reconnects and repeats its commit; the fencing token shows whether an earlier
+//!   attempt was stored. The write connection of a worker holds a lock, by which others see that it is gone.
+//! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).
+//! - `db init --roles` gives the tables to group roles: the database refuses what a role may not do.
+//!
+//! **Invariant:** no other crate contains SQL, a write under a lost lease changes nothing, and every test of this crate runs
+//! on both databases.
 
 mod audit;
 mod blocks;

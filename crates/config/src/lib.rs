@@ -2,6 +2,8 @@
 //!
 //! A layer overrides all layers after it in this list: flags, environment variables, `--config` or the project's file,
 //! the preset that this file names, and the embedded `config/default.toml`, which contains every setting.
+//!
+//! **Invariant:** every value has a type, a range and an origin, and no password is in any layer.
 
 mod document;
 mod error;

@@ -4,7 +4,9 @@
 //! (`artwork`) and `damage` removes parts of them. `carving` and `weathering` compute the carved surface. `scanner`,
 //! `block_body`, `debris` and `scan_pose` turn the surface into a mesh. `inking`, `print_sheet`, `paper_geometry`,
 //! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment. `generator` makes pairs
-//! in memory, from a seed, and `dataset` writes them to disk.
+//! in memory, from a seed, and `dataset` writes them to disk. [`block`] does the same for a whole block and its page.
+//!
+//! **Invariant:** the same seed gives the same bytes, and the ground truth is known, not measured.
 
 mod artwork;
 pub mod block;

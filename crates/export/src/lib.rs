@@ -1,4 +1,16 @@
-//! Exports results for other tools, and images for people.
+//! Aligned pairs and blocks for other tools, pictures for people, and the data of 3D views.
+//!
+//! - `exporter.rs` reads pages of pairs, encodes them on all cores, and appends them in the order of the catalog
+//! - `record.rs` has the fields of a pair that all formats share, `record_fields.rs` their units and frames,
+//!   `pair_pictures.rs` reads inputs and artifacts when a format needs them
+//! - `formats/` has the formats, which implement `format_writer.rs`; `manifest.rs` recognizes an earlier export
+//! - `block_lines.rs`, `block_grid.rs` and `page_labels.rs` write whole blocks, their maps and their boxes
+//! - `pictures` and `contact_sheet.rs` draw overlays and sheets; `block_view` draws any part of a page, of its relief, or of
+//!   both
+//! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
+//!
+//! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs, and an earlier export is
+//! replaced as a whole or not at all.
 
 mod annotations;
 mod block_grid;

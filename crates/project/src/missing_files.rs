@@ -12,7 +12,7 @@ pub const WINDOWS_HINT: &str =
 /// Files of a list that do not exist.
 #[derive(Debug, Default)]
 pub struct MissingFiles {
-    /// Messages of the first [`MAX_MISSING`] files.
+    /// Messages of the first thousand files.
     pub lines: Vec<String>,
     /// Number of all missing files.
     pub count: usize,

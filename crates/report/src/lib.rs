@@ -1,7 +1,12 @@
-//! Builds reports from the catalog as plain data, and renders them as text, JSON, CSV, Markdown, LaTeX and HTML.
+//! Statistics of results and verdicts as plain data, and their renderers.
 //!
-//! [`build()`] streams the pairs through a [`ReportAccumulator`]. [`agreement()`] streams the pairs and counts
-//! verdicts. The numbers come from [`stats`]; the renderers only read the finished [`Report`].
+//! [`build()`] streams the pairs through a [`ReportAccumulator`]. [`agreement()`] counts verdicts of several reviewers.
+//! [`consensus`] decides which verdict counts for a result, [`pair_artifacts`] reads the stored stages of a pair,
+//! [`ground_truth`] and `manual_alignment` give errors against known alignments, and [`stats`] has intervals and tests.
+//! `render` writes text, JSON, CSV, Markdown, LaTeX and HTML.
+//!
+//! **Invariant:** Acc comes from people's verdicts on the results that exist now, never from ground truth; renderers compute
+//! nothing.
 
 mod accumulate;
 mod accuracy_sentence;

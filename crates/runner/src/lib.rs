@@ -1,10 +1,47 @@
-//! Runs the stages of a project's pairs, several pairs at a time.
+//! Runs the stages of pairs and blocks, several pairs at a time, and checks a project.
 //!
-//! `run` prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
-//! `pair_task` and the task starts a `compute_thread`. The thread calls the stages through `stage_executor`. The task
-//! sends computed stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what
-//! follows a failure. Whole blocks run before pairs, one at a time: `block_slot` leases a block, and a `block_task`
-//! runs its stages through `block_stages`. The code map in `lib.rs` says where a lost lease is noticed.
+//! [`run()`] prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
+//! `pair_task`, and the task a `compute_thread`, which calls the stages through `stage_executor`. The task hands computed
+//! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a failure.
+//! Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages, and
+//! `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it.
+//!
+//! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores
+//! nothing.
+//!
+//! # A lost lease
+//!
+//! ```text
+//!             claim                    checkpoint of the last stage
+//!   ready ------------> leased ------------------------------------> done
+//!     ^                  |  ^ |
+//!     |   release        |  | | checkpoint, heartbeat: the lease is renewed
+//!     +------------------+  +-+
+//!     |                  |
+//!     |                  | the worker sends no heartbeat for a lease (PostgreSQL: 7 s without its lock), or its stage is
+//!     |                  | overdue, or a repair resets the job
+//!     |   recovery: a new fencing token
+//!     +------------------+------------> quarantined, if the job has crashed too many workers
+//! ```
+//!
+//! | who finds out | by | what happens |
+//! |---|---|---|
+//! | `checkpointer.rs` | a checkpoint is refused | this and later results are dropped; the stage that runs is cancelled |
+//! | `pair_task.rs`, `block/task.rs` | a failure is refused | the failure is not stored |
+//! | `worker_session.rs` | a heartbeat is refused | the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
+//! | nobody | a release is refused | nothing: the job was recovered meanwhile |
+//!
+//! The pair ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. A pair that another
+//! worker recovered runs alone until its next stage is stored, because it may have killed the worker. `liveness.rs` decides
+//! when a worker counts as dead, `Timing` in `policy.rs` has the times, and the statements are in
+//! `crates/catalog/src/queue`. If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in
+//! progress and ends with that error.
+//!
+//! # Cancellation
+//!
+//! A stage that takes too long, is stopped or has lost its lease is cancelled: inner loops poll the token of their thread
+//! ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs`, which waits for the end of the thread before its
+//! memory is given to others. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
 mod artifacts_owner;
 mod block;

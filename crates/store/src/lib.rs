@@ -1,4 +1,16 @@
-//! A project on disk: its directory, its input files, its artifacts, and the lock of its run.
+//! The files of a project: inputs, artifacts and locks, in folders and in object stores.
+//!
+//! - [`Project`]: a project folder; [`Input`]: a mesh, print, page or label file at a path, below a named root or in an
+//!   object store
+//! - artifacts: files that stages compute, named by the hash of their content (`artifacts.rs`); in an object store, those
+//!   of a pair are packed into one object (`remote/pack.rs`), and cut meshes and prints are objects of their own
+//! - [`RunLock`] shows which processes work on a project; [`TargetLock`] which write an output
+//! - `owner.json` in a place of artifacts names the catalog that it belongs to (`place_owner.rs`)
+//! - `remote/`: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs` keeps copies of inputs, `listing.rs`
+//!   notices changes
+//!
+//! **Invariant:** a file gets its name when it is whole and on the disk, and nothing that another project may use is
+//! removed. "Cannot be read" is an error, not an absent file.
 
 mod artifact_error;
 mod artifact_object;
