@@ -39,14 +39,14 @@ pub fn max_f32(a: f32, b: f32) -> f32 {
 /// Floats of this magnitude (1.5 x 2^23) have no fraction bits.
 const INTEGER_BIAS: f32 = 12_582_912.0;
 
-/// Rounds down a number that is small compared with [`INTEGER_BIAS`]. Casts and `floor` would not vectorise.
+/// Rounds down a number that is small compared with `INTEGER_BIAS`. Casts and `floor` would not vectorise.
 #[inline(always)]
 pub fn floor_f32(v: f32) -> f32 {
     let nearest = (v + INTEGER_BIAS) - INTEGER_BIAS;
     if nearest > v { nearest - 1.0 } else { nearest }
 }
 
-/// Rounds up a number that is small compared with [`INTEGER_BIAS`].
+/// Rounds up a number that is small compared with `INTEGER_BIAS`.
 #[inline(always)]
 pub fn ceil_f32(v: f32) -> f32 {
     let nearest = (v + INTEGER_BIAS) - INTEGER_BIAS;

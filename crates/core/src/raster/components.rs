@@ -206,7 +206,7 @@ fn union(runs: &mut [Run], one: usize, other: usize) {
     runs[one.max(other)].root = one.min(other);
 }
 
-/// Removes specks and fills pinholes that are smaller than [`SPECK_SHARE`] of `area`, a number of pixels.
+/// Removes specks and fills pinholes that are smaller than `SPECK_SHARE` of `area`, a number of pixels.
 pub fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = ConnectedComponents::label(mask).with_area_at_least(size);
