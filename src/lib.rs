@@ -30,7 +30,7 @@
 //!     stroke maps, scores, confidence)
 //! 11. `crates/runner/src/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `crates/store/src/artifacts.rs`: writes artifact files by content hash
-//! 13. `crates/catalog/src/db/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
+//! 13. `crates/catalog/src/queue/commit/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
 //!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
 //!     turns by SQLite's lock (`busy_retry.rs`)
 //! 14. `crates/catalog/src/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a finished
@@ -46,8 +46,8 @@
 //!
 //! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
 //! (checks the values of a row), `cli/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
-//! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `db/writer.rs` (the task that owns
-//! the write connection), `db/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
+//! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `queue/commit/writer.rs` (the task that owns
+//! the write connection), `queue/commit/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
 //! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
 //! `runner/run_metrics.rs` (counts and times, which heartbeats store for `status --hosts`),
 //! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
@@ -65,7 +65,7 @@
 //! `run_selection.rs` selects the blocks and pairs of a run that names some. The
 //! stages are called through the trait in `block_stages.rs`. `catalog/blocks/cut.rs` stores the last stage and its pairs in
 //! one transaction: it adds new pairs, sends changed ones back to the first stage, and retires those whose boxes are gone.
-//! A retired pair has no row in `job`, only one in `retired_pair` (`catalog/blocks/retired.rs`), so that no other statement
+//! A retired pair has no row in `job`, only one in `retired_pair` (`catalog/queue/retired.rs`), so that no other statement
 //! has to leave it out. `catalog/blocks/staleness.rs` compares what each result was made with (settings, hashes of the
 //! files, attributes) with the present, for the start of a run and for `--dry-run`.
 //!
@@ -91,8 +91,8 @@
 //! Every test of the catalog runs on both.
 //!
 //! Claims and checkpoints have statements for each database. In SQLite, a group commit is one transaction
-//! (`db/group_commit.rs`). In PostgreSQL, each claim, and the checkpoints of a batch, are one statement that commits by
-//! itself (`db/server_commit.rs`, `queue/server_claim.rs`, `queue/server_checkpoint.rs`). Its rows are one array per column
+//! (`queue/commit/group_commit.rs`). In PostgreSQL, each claim, and the checkpoints of a batch, are one statement that commits by
+//! itself (`queue/commit/server_commit.rs`, `queue/server_claim.rs`, `queue/server_checkpoint.rs`). Its rows are one array per column
 //! (`db/column_arrays.rs`), and settings of the write connection keep the planner to indexes (`db/postgres.rs`).
 //!
 //! In PostgreSQL, claims begin behind the last claimed pair (`queue/claim_start.rs`), because they would otherwise pass over
@@ -104,10 +104,10 @@
 //! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
 //! rights first, so that `review` and `verdict` can say what is missing.
 //!
-//! If the server is unavailable, the writer task reconnects and repeats its commit (`db/write_connection.rs`); if the
+//! If the server is unavailable, the writer task reconnects and repeats its commit (`queue/commit/write_connection.rs`); if the
 //! server refuses the connection for good, the run ends. If an earlier attempt was stored but its reply was lost, the
 //! fencing token and the position of the job show it; leases whose claim had no reply are searched for too
-//! (`db/known_leases.rs`). The write connection of each worker holds a lock (`queue/worker_lock.rs`): a worker whose
+//! (`queue/commit/known_leases.rs`). The write connection of each worker holds a lock (`queue/worker_lock.rs`): a worker whose
 //! lock is free for about 7 seconds and that sends no heartbeat is dead, except after an outage (`runner/liveness.rs`).
 //! The transaction that recovers its pairs looks again first (`queue/recovery.rs`). `Catalog::retry_while_unavailable`
 //! repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with other settings.

@@ -1,9 +1,9 @@
 //! The catalog: a database of SQLite or PostgreSQL with the data of every pair and the job queue. No other module
 //! contains SQL.
 //!
-//! `db` has the connections, the writer task and the errors, `queue` the job queue, `records` the data of pairs,
-//! `blocks` the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` copies to another
-//! catalog. One writer task owns the only write connection of this process and commits requests in groups. Reads use
+//! `db` has the connections and the errors, `queue` the job queue and the writer task, `records` the data of pairs,
+//! `blocks` the data and jobs of whole blocks, `audit` the checks and repairs, and `transfer` backups and copies to
+//! another catalog. Each folder imports only folders named before it. One writer task owns the only write connection of this process and commits requests in groups. Reads use
 //! separate connections, also during a run. Callers pass the current time as an argument.
 
 mod audit;
@@ -18,6 +18,7 @@ mod postgres_server;
 mod query_plans;
 mod queue;
 mod records;
+mod recovery;
 mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
 #[expect(clippy::missing_errors_doc, reason = "only tests call these methods")]
@@ -44,8 +45,8 @@ pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
     BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockSettings, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
-    NewCharacter, StoredCharacter,
+    BlockLease, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith, NewCharacter,
+    StoredCharacter,
 };
 pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
@@ -53,7 +54,6 @@ pub use blocks::records::{
 };
 pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
-pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
@@ -61,7 +61,9 @@ pub use db::roles::{ROLES, initialize_database, roles_sql};
 pub use handle::Catalog;
 pub use mocban_core::domain::InputVersion;
 pub use new_catalog::NewCatalog;
+pub use queue::block_settings::BlockSettings;
 pub use queue::claim::ClaimRequest;
+pub use queue::commit::commit_delay::Waiting;
 pub use queue::counters::JobCounts;
 pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
 pub use queue::lease::{

@@ -6,8 +6,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tokio::sync::{mpsc, oneshot};
 
-use crate::db::commit_delay::CommitDelay;
 use crate::db::query::query_scalar;
+use crate::queue::commit::commit_delay::CommitDelay;
 use crate::{
     Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, Lease, Result,
     StageCheckpoint,

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::blocks::characters;
 use crate::blocks::checkpoint::{self, Stored};
 use crate::blocks::model::{BlockCheckpoint, BlockLease, CutPair, NewCharacter};
-use crate::blocks::{characters, retired};
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
@@ -12,6 +12,7 @@ use crate::db::script::Script;
 use crate::queue::checkpoint::add_inputs;
 use crate::queue::counters::Deltas;
 use crate::queue::lease::InputVersions;
+use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, PairId, PairName};

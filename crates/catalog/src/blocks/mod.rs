@@ -16,7 +16,6 @@ pub(crate) mod import;
 pub(crate) mod model;
 pub(crate) mod records;
 pub(crate) mod recovery;
-pub(crate) mod retired;
 pub(crate) mod selection;
 pub(crate) mod staleness;
 pub(crate) mod true_boxes;

@@ -6,8 +6,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::db::row::from_row;
-use crate::queue::fingerprint::differences;
-use crate::queue::plan::FieldChange;
 use mocban_core::domain::InputVersion;
 use mocban_core::domain::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
@@ -58,38 +56,6 @@ impl BlockInputVersions {
             version.as_ref().is_some_and(|version| version.hash == hash)
         };
         is(&self.mesh, points.mesh) && is(&self.page, points.page)
-    }
-}
-
-/// The settings of the four stages of a block, by stage: each stage's revision and settings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BlockSettings([Value; 4]);
-
-impl BlockSettings {
-    /// Collects the settings of each stage.
-    pub fn new(fields: impl Fn(BlockStage) -> Value) -> Self {
-        Self(BlockStage::ALL.map(fields))
-    }
-
-    /// Returns the settings as a JSON array by stage. Another process can pass the text to
-    /// [`BlockSettings::changes_from`].
-    pub fn json(&self) -> String {
-        Value::from(self.0.to_vec()).to_string()
-    }
-
-    /// Returns the settings that differ from those of another process, which are given as [`BlockSettings::json`].
-    /// Returns nothing if the text cannot be read.
-    pub fn changes_from(&self, other: &str) -> Vec<FieldChange> {
-        let other: Vec<Value> = serde_json::from_str(other).unwrap_or_default();
-        let stages = BlockStage::ALL.into_iter().zip(other);
-        let changes =
-            stages.flat_map(|(stage, old)| differences(stage.name(), &old, self.of(stage)));
-        changes.collect()
-    }
-
-    /// Returns the settings of a stage.
-    pub const fn of(&self, stage: BlockStage) -> &Value {
-        &self.0[stage.index()]
     }
 }
 

@@ -6,13 +6,14 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::import::NEW_JOB;
-use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockSettings, MadeWith};
+use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
 use crate::blocks::records::{control_points, input_versions};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::{FromRow, Row};
 use crate::db::value::Json;
+use crate::queue::block_settings::BlockSettings;
 use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};

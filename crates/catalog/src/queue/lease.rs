@@ -3,8 +3,10 @@
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
+use sqlx::error::BoxDynError;
 
 use crate::db::row::from_row;
+use crate::db::value::{Argument, FromValue, Value as ColumnValue};
 use crate::queue::counters::{CounterKey, cursor};
 use mocban_core::domain::{
     ArtifactSet, ContentHash, Failure, InputVersion, JobStatus, MetricOutcome, PairId, Stage,
@@ -199,3 +201,21 @@ pub struct StageFailure {
 /// Row id of a fingerprint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct FingerprintId(pub i64);
+
+impl FromValue for FingerprintId {
+    fn from_value(value: ColumnValue<'_>) -> Result<Self, BoxDynError> {
+        Ok(Self(i64::from_value(value)?))
+    }
+}
+
+impl From<FingerprintId> for Argument {
+    fn from(FingerprintId(id): FingerprintId) -> Self {
+        Self::from(id)
+    }
+}
+
+impl From<Option<FingerprintId>> for Argument {
+    fn from(id: Option<FingerprintId>) -> Self {
+        Self::from(id.map(|FingerprintId(id)| id))
+    }
+}

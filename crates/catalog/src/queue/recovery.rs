@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use crate::blocks::recovery as blocks;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
@@ -160,36 +159,6 @@ impl Catalog {
         Ok(holders)
     }
 
-    /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused
-    /// several deaths.
-    ///
-    /// A pair is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned` returns true,
-    /// which also considers other recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let workers = mark_dead(conn, &dead).await?;
-                let affected = affected_pairs(conn, &workers).await?;
-                let items = left_by(conn, &workers).await?;
-                let deaths: i64 = query_scalar(DEATHS).fetch_one(&mut *conn).await?;
-                // Before the pairs: a block is blamed only if its worker holds no pair.
-                let most = u32::try_from(deaths).unwrap_or(u32::MAX);
-                let blocks = blocks::recover(conn, &workers, most, now).await?;
-                let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
-                let found = query.bind(deaths).fetch_all(&mut *conn).await?;
-                let recovered = count_recovered(conn, found, &affected, now).await?;
-                Ok(Recovered {
-                    blocks,
-                    ..recovered
-                })
-            })
-        })
-        .await
-    }
-
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
     /// the stored hashes to detect replaced files.
     ///
@@ -211,40 +180,38 @@ impl Catalog {
         })
         .await
     }
-
-    /// Recovers overdue leases of other workers that are not known to be dead. A lease is overdue if its worker's last
-    /// heartbeat is more than `margin_ms` after the deadline. This is rare, because processes enforce their own
-    /// deadlines.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn recover_overdue(
-        &self,
-        me: WorkerId,
-        margin_ms: i64,
-        now: UnixMillis,
-    ) -> Result<Recovered> {
-        self.in_transaction(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
-            .await
-    }
 }
 
-async fn overdue(
+/// Recovers the pairs of dead workers, given as a JSON array.
+pub(crate) async fn recover(
     conn: &mut Conn,
-    me: WorkerId,
+    workers: &str,
+    deaths: i64,
+    now: UnixMillis,
+) -> Result<Recovered> {
+    let affected = affected_pairs(conn, workers).await?;
+    let items = left_by(conn, workers).await?;
+    let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
+    let found = query.bind(deaths).fetch_all(&mut *conn).await?;
+    count_recovered(conn, found, &affected, now).await
+}
+
+/// Recovers the pairs of living workers, given as a JSON array, whose leases are overdue.
+pub(crate) async fn recover_overdue(
+    conn: &mut Conn,
+    workers: &str,
     margin_ms: i64,
     now: UnixMillis,
 ) -> Result<Recovered> {
-    let others = holders_but(conn, me).await?;
-    let affected = affected_pairs(conn, &others).await?;
-    let blocks = blocks::recover_overdue(conn, &others, margin_ms, now).await?;
-    let query = query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
+    let affected = affected_pairs(conn, workers).await?;
+    let query = query_as(OVERDUE).bind(workers).bind(CRASH_LIMIT);
     let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
-    let recovered = count_recovered(conn, found, &affected, now).await?;
-    Ok(Recovered {
-        blocks,
-        ..recovered
-    })
+    count_recovered(conn, found, &affected, now).await
+}
+
+/// Counts the recent deaths of workers.
+pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
+    query_scalar(DEATHS).fetch_one(conn).await
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
@@ -259,7 +226,7 @@ async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
 }
 
 /// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
-async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
+pub(crate) async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Observed {
             workers,
@@ -311,7 +278,7 @@ async fn still_dead(conn: &mut Conn, seen: &[LeaseHolder]) -> Result<Vec<WorkerI
 }
 
 /// Returns the workers with leases except one, as a JSON array.
-async fn holders_but(conn: &mut Conn, me: WorkerId) -> Result<String> {
+pub(crate) async fn holders_but(conn: &mut Conn, me: WorkerId) -> Result<String> {
     let holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(conn).await?;
     let others = holders.iter().map(|holder| holder.worker);
     let others = others.filter(|worker| *worker != me);

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::db::conn::Conn;
+use crate::db::conn::{Conn, Work};
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
-use crate::db::write_connection::Work;
 use crate::queue::counters::{CounterKey, Deltas, KeyedJob};
 use crate::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
 use crate::queue::fragments::fingerprint_before;

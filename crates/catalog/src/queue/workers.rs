@@ -1,9 +1,9 @@
 //! Worker registration, due back-offs and open work.
 
-use crate::blocks::model::BlockSettings;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::queue::block_settings::BlockSettings;
 use crate::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::queue::fingerprint::FingerprintIds;
 use crate::queue::selection::PairSelection;

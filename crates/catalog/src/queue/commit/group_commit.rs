@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use crate::db::conn::Conn;
 use crate::db::error::{CatalogError, Result};
-use crate::db::known_leases::stored_before;
-use crate::db::request::{Reply, Request};
 use crate::db::script::{Script, ScriptRows, Statement};
-use crate::db::write_connection::BEGIN;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::claim::{self, ClaimRequest, Heartbeat};
+use crate::queue::commit::known_leases::stored_before;
+use crate::queue::commit::request::{Reply, Request};
+use crate::queue::commit::write_connection::BEGIN;
 use crate::queue::counters::Deltas;
 use crate::queue::fail::{self, FailedRow};
 use crate::queue::lease::{FencedRow, Lease, StageFailure};

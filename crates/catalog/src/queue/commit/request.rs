@@ -2,10 +2,11 @@
 
 use tokio::sync::oneshot;
 
+use crate::db::conn::Work;
 use crate::db::error::Result;
-use crate::db::write_connection::{Work, WriteConnection};
 use crate::queue::checkpoint::LeasedCheckpoints;
 use crate::queue::claim::{ClaimRequest, Heartbeat};
+use crate::queue::commit::write_connection::WriteConnection;
 use crate::queue::lease::{Lease, StageFailure};
 
 /// Where a reply goes.
