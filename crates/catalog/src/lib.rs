@@ -38,16 +38,15 @@ mod tests_on_postgres;
 pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
-pub use blocks::claim::OutstandingBlocks;
+pub use blocks::block_job::BlockJob;
 pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
-pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
-    BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith, NewCharacter,
-    StoredCharacter,
+    BlockAttributes, BlockInputVersions, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
+    NewCharacter, StoredCharacter,
 };
+pub use blocks::queue::OutstandingBlocks;
 pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
     StoredBlockFailure,
@@ -66,11 +65,13 @@ pub use queue::claim::ClaimRequest;
 pub use queue::commit::commit_delay::Waiting;
 pub use queue::counters::JobCounts;
 pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
+pub use queue::kind::JobKind;
 pub use queue::lease::{
-    CheckpointOutcome, FailureAction, FingerprintId, InputVersions, Lease, MetricResult,
-    StageCheckpoint, StageFailure,
+    CheckpointOutcome, FailureAction, Lease, MetricResult, StageCheckpoint, StageFailure,
 };
+pub use queue::pair_job::PairJob;
 pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
+pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;

@@ -1,32 +1,34 @@
 //! Recovers the leases of workers that died or hang, of pairs and blocks in one transaction.
 
-use crate::blocks::recovery as blocks;
-use crate::queue::recovery::{self as pairs, DeadWorker, Recovered};
+use crate::blocks::block_job::BlockJob;
+use crate::db::conn::Conn;
+use crate::queue::pair_job::PairJob;
+use crate::queue::recovery::{
+    self as recovery, DeadWorker, Recovered, RecoveredJobs, holders_but, mark_dead,
+};
 use crate::{Catalog, Result};
 use mocban_core::domain::{UnixMillis, WorkerId};
 
 impl Catalog {
-    /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused
-    /// several deaths.
+    /// Recovers the leases of dead workers. Each pair or block becomes ready again, or is quarantined if it probably
+    /// caused several deaths.
     ///
-    /// A pair is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned` returns true,
-    /// which also considers other recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
+    /// A pair or block is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned`
+    /// returns true, which also considers other recent deaths. Therefore, killing processes from outside rarely
+    /// quarantines one.
     ///
     /// # Errors
     /// Returns an error if a database operation fails.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let workers = pairs::mark_dead(conn, &dead).await?;
-                let deaths = pairs::deaths(conn).await?;
-                // Before the pairs: a block is blamed only if its worker holds no pair.
-                let most = u32::try_from(deaths).unwrap_or(u32::MAX);
-                let blocks = blocks::recover(conn, &workers, most, now).await?;
-                let recovered = pairs::recover(conn, &workers, deaths, now).await?;
-                Ok(Recovered {
-                    blocks,
-                    ..recovered
-                })
+                let workers = mark_dead(conn, &dead).await?;
+                let items = recovery::left_by(conn, &workers).await?;
+                let deaths = recovery::deaths(conn).await?;
+                let left = [&*workers, &items];
+                let pairs = recovery::recover::<PairJob>(conn, left, deaths, now).await?;
+                let blocks = recovery::recover::<BlockJob>(conn, left, deaths, now).await?;
+                Ok(both(pairs, &blocks))
             })
         })
         .await
@@ -44,17 +46,27 @@ impl Catalog {
         margin_ms: i64,
         now: UnixMillis,
     ) -> Result<Recovered> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let others = pairs::holders_but(conn, me).await?;
-                let blocks = blocks::recover_overdue(conn, &others, margin_ms, now).await?;
-                let recovered = pairs::recover_overdue(conn, &others, margin_ms, now).await?;
-                Ok(Recovered {
-                    blocks,
-                    ..recovered
-                })
-            })
-        })
-        .await
+        self.in_transaction(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
+            .await
+    }
+}
+
+async fn overdue(
+    conn: &mut Conn,
+    me: WorkerId,
+    margin_ms: i64,
+    now: UnixMillis,
+) -> Result<Recovered> {
+    let others = holders_but(conn, me).await?;
+    let pairs = recovery::recover_overdue::<PairJob>(conn, &others, margin_ms, now).await?;
+    let blocks = recovery::recover_overdue::<BlockJob>(conn, &others, margin_ms, now).await?;
+    Ok(both(pairs, &blocks))
+}
+
+fn both(pairs: RecoveredJobs<PairJob>, blocks: &RecoveredJobs<BlockJob>) -> Recovered {
+    Recovered {
+        ready: pairs.ready,
+        poisoned: pairs.poisoned,
+        blocks: blocks.ready,
     }
 }

@@ -81,7 +81,7 @@ impl Lease {
     /// Returns the first lease of a pair by the first worker.
     pub fn of_pair(pair: PairId) -> Self {
         Self {
-            pair,
+            unit: pair,
             worker: WorkerId(1),
             token: 1,
             cursor: Stage::Fit,

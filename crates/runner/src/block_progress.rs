@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::block_inputs::BlockSources;
 use super::block_stages::BlockStageOutput;
-use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
+use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease, MadeWith};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
@@ -24,7 +24,7 @@ pub(super) enum BlockEnd {
 
 /// A block in progress.
 pub(super) struct BlockInProgress {
-    pub(super) lease: BlockLease,
+    pub(super) lease: Lease<BlockJob>,
     pub(super) work: BlockWork,
     pub(super) sources: BlockSources,
     /// Versions of the input files, as far as they are known.

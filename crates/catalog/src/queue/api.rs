@@ -85,13 +85,7 @@ impl Catalog {
         let Some(last) = stages.last() else {
             return Ok(CheckpointOutcome::Lease(lease));
         };
-        let advanced = last.stage.next().map(|cursor| Lease {
-            cursor,
-            fingerprint: Some(last.fingerprint),
-            attempt: 1,
-            cleared: true,
-            ..lease
-        });
+        let advanced = lease.after(last);
         let item = Box::new((lease, stages));
         let stored = self
             .reply_to(|reply| Message::Deferrable(Request::Checkpoint(item, reply)))

@@ -12,6 +12,7 @@ use crate::Result;
 use crate::db::conn::Conn;
 use crate::db::dialect::{Sql, postgres_text};
 use crate::db::script::Script;
+use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::WorkerId;
 
 /// A kind of job: what it works on and its stages.
@@ -19,7 +20,7 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
     /// Row id of what a job works on.
     type Unit: Debug + Copy + Ord + Send + Sync;
     /// The user's id of it.
-    type Name: Debug + Clone + PartialEq + Eq + AsRef<str> + Send + Sync;
+    type Name: Debug + Clone + PartialEq + Eq + Send + Sync;
     /// Some of them.
     type Selection: Debug + Clone + Send + Sync;
     /// A stage.
@@ -33,12 +34,16 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
     fn unit(id: i64) -> Self::Unit;
     /// Returns a row id.
     fn id(unit: Self::Unit) -> i64;
+    /// Returns the user's id as text.
+    fn text(name: &Self::Name) -> &str;
     /// Returns the ids of a selection as a JSON array.
     fn ids(selection: &Self::Selection) -> Cow<'_, str>;
     /// Returns the stage with an index from 0.
     fn stage(index: usize) -> Option<Self::Stage>;
     /// Returns the index of a stage.
     fn index(stage: Self::Stage) -> usize;
+    /// Returns the fingerprint of the settings, for a pair.
+    fn fingerprint(made_with: &Self::Provenance) -> Option<FingerprintId>;
 
     /// Returns the stage after another one.
     fn next(stage: Self::Stage) -> Option<Self::Stage> {
@@ -50,13 +55,15 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
 pub(crate) trait StoredKind: JobKind {
     /// Number of the kind.
     const NUMBER: usize;
+    /// Whether jobs are counted by position, status and fingerprint.
+    const IS_COUNTED: bool;
     /// The names in braces in a [`Template`] and what they stand for.
     const NAMES: &'static [(&'static str, &'static str)];
     /// Columns of results and failures that hold the provenance, each with its value in an item of a statement.
     const PROVENANCE: &'static [(&'static str, &'static str)];
 
     /// Returns the fields of an item that [`Self::PROVENANCE`] reads.
-    fn provenance(made_with: &Self::Provenance) -> Result<impl Serialize>;
+    fn provenance(made_with: &Self::Provenance) -> Result<impl Serialize + use<'_, Self>>;
 
     /// Returns these fields for a stage whose worker died, from what is known of inputs and settings.
     fn crashed(
@@ -65,6 +72,9 @@ pub(crate) trait StoredKind: JobKind {
         stage: Self::Stage,
         worker: Option<WorkerId>,
     ) -> impl Future<Output = Result<Value>> + Send;
+
+    /// Returns whether the version of a file is known.
+    fn are_known(inputs: &Self::Inputs) -> bool;
 
     /// Adds the statements that store versions of input files to a script.
     fn add_inputs<'i>(

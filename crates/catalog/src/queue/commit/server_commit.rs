@@ -137,7 +137,7 @@ async fn claim(
 
 /// Returns leases without those of a pair that was leased again meanwhile.
 fn without_pairs_of(mut leases: Vec<Lease>, later: &[Lease]) -> Vec<Lease> {
-    leases.retain(|lease| later.iter().all(|other| other.pair != lease.pair));
+    leases.retain(|lease| later.iter().all(|other| other.unit != lease.unit));
     leases
 }
 
