@@ -5,7 +5,7 @@ use std::time::Instant;
 use mocban::catalog::{BlockSettings, Catalog, ClaimRequest, WorkerInfo, WorkerSettings};
 use mocban::catalog::{
     CheckpointOutcome, FingerprintIds, Fingerprints, InputVersion, InputVersions, Lease,
-    MetricResult, StageCheckpoint,
+    MetricResult, PairProvenance, StageCheckpoint,
 };
 use mocban::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, RegisterOutcome, Scores, Stage,
@@ -159,10 +159,12 @@ fn checkpoints(
         };
         StageCheckpoint {
             stage,
-            fingerprint: fingerprints.of(stage),
-            mesh_hash: mesh.hash,
-            print_hash: reads_print.then_some(print.hash),
-            attributes: ATTRIBUTES.to_owned(),
+            made_with: PairProvenance {
+                fingerprint: fingerprints.of(stage),
+                mesh_hash: Some(mesh.hash),
+                print_hash: reads_print.then_some(print.hash),
+                attributes: ATTRIBUTES.to_owned(),
+            },
             result_hash: result_hash(&outcome, &files),
             outcome,
             files: files.clone(),

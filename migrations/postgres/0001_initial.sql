@@ -3,7 +3,7 @@
 -- changes numbers. Keys are compared byte by byte, whatever the collation of the database.
 
 CREATE TABLE catalog_version (version bigint NOT NULL);
-INSERT INTO catalog_version (version) VALUES (12);
+INSERT INTO catalog_version (version) VALUES (13);
 
 -- Half of a page is free, so that a heartbeat changes its row without changing the index.
 CREATE TABLE worker (
@@ -325,20 +325,21 @@ CREATE TABLE block_job (
     token bigint NOT NULL DEFAULT 0 CHECK (token >= 0),
     worker bigint REFERENCES worker (id),
     deadline bigint,
-    class text CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
-    message text,
-    failed_stage bigint CHECK (failed_stage BETWEEN 0 AND 3),
-    failed_at bigint,
-    failed_with text CHECK (failed_with IS NULL OR CAST(failed_with AS json) IS NOT NULL),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
     CHECK ((status = 1) = (deadline IS NOT NULL)),
-    CHECK ((status = 2) = (run_at IS NOT NULL)),
-    CHECK (status <> 4 OR message IS NOT NULL),
-    CHECK ((class IS NULL) = (message IS NULL) AND (class IS NULL) = (failed_stage IS NULL)
-        AND (class IS NULL) = (failed_at IS NULL) AND (class IS NULL) = (failed_with IS NULL))
+    CHECK ((status = 2) = (run_at IS NOT NULL))
 );
 CREATE INDEX block_job_leased ON block_job (worker) WHERE status = 1;
+
+CREATE TABLE block_failure (
+    block bigint PRIMARY KEY REFERENCES block (id),
+    stage bigint NOT NULL CHECK (stage BETWEEN 0 AND 3),
+    class text NOT NULL CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
+    message text NOT NULL,
+    made_with text NOT NULL CHECK (CAST(made_with AS json) IS NOT NULL),
+    at bigint NOT NULL
+);
 
 CREATE TABLE block_result (
     block bigint NOT NULL REFERENCES block (id),

@@ -54,7 +54,7 @@ GRANT EXECUTE ON ALL FUNCTIONS IN SCHEMA {schema} TO mocban_viewer;
 -- Workers: what `import`, `plan`, `run`, `worker` and `retry` write.
 GRANT INSERT, UPDATE ON worker, run_settings, fingerprint, pair, truth, block, block_job TO mocban_worker;
 GRANT INSERT, UPDATE, DELETE ON job, retired_pair, failure, attempt, stage_result, metric_result, counter_part, block_result,
-    block_attempt, block_character TO mocban_worker;
+    block_failure, block_attempt, block_character TO mocban_worker;
 GRANT INSERT, UPDATE (value) ON checksum TO mocban_worker;
 
 -- Workers append verdicts with `verdict import`. Reviewers append all that the review page stores. Nobody else may, and

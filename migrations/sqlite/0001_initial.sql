@@ -1,7 +1,7 @@
 -- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
 -- `domain::job`. In SQLite before 3.45, `json_valid(NULL)` is 0, so checks of columns that may be NULL ask for NULL first.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 12;
+PRAGMA user_version = 13;
 
 -- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
 -- JSON array by stage; `died` is set when others found it dead. `metrics` are counts and times of the process, which it
@@ -318,8 +318,7 @@ CREATE TABLE block (
     control_points TEXT CHECK (control_points IS NULL OR json_valid(control_points))
 ) STRICT;
 
--- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`. The failure is stored
--- beside it: `failed_with` are the settings and inputs of the failed attempt.
+-- One row per block: a cursor over the stages face, align, boxes and cut, with a lease as in `job`.
 CREATE TABLE block_job (
     block INTEGER PRIMARY KEY REFERENCES block (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
@@ -330,20 +329,23 @@ CREATE TABLE block_job (
     token INTEGER NOT NULL DEFAULT 0 CHECK (token >= 0),
     worker INTEGER REFERENCES worker (id),
     deadline INTEGER,
-    class TEXT CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
-    message TEXT,
-    failed_stage INTEGER CHECK (failed_stage BETWEEN 0 AND 3),
-    failed_at INTEGER,
-    failed_with TEXT CHECK (failed_with IS NULL OR json_valid(failed_with)),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
     CHECK ((status = 1) = (deadline IS NOT NULL)),
-    CHECK ((status = 2) = (run_at IS NOT NULL)),
-    CHECK (status <> 4 OR message IS NOT NULL),
-    CHECK ((class IS NULL) = (message IS NULL) AND (class IS NULL) = (failed_stage IS NULL)
-        AND (class IS NULL) = (failed_at IS NULL) AND (class IS NULL) = (failed_with IS NULL))
+    CHECK ((status = 2) = (run_at IS NOT NULL))
 ) STRICT;
 CREATE INDEX block_job_leased ON block_job (worker) WHERE status = 1;
+
+-- Why the job of a block backs off or is quarantined. `made_with` are the settings, inputs and attributes of the failed
+-- attempt.
+CREATE TABLE block_failure (
+    block INTEGER PRIMARY KEY REFERENCES block (id),
+    stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
+    class TEXT NOT NULL CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
+    message TEXT NOT NULL,
+    made_with TEXT NOT NULL CHECK (json_valid(made_with)),
+    at INTEGER NOT NULL
+) STRICT;
 
 -- The current result of each stage of a block. `made_with` are the settings, inputs and attributes that it was computed
 -- from, as JSON.

@@ -6,15 +6,15 @@ use std::sync::Arc;
 use sqlx::{PgPool, SqlitePool};
 use tokio::sync::{mpsc, oneshot};
 
-use crate::db::commit_delay::CommitDelay;
-use crate::db::conn::{Conn, Held};
+use crate::db::conn::{Conn, Held, Work};
 use crate::db::error::{CatalogError, Result};
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
-use crate::db::request::{Message, Reply};
 use crate::db::retry_wait::RetryWait;
-use crate::db::write_connection::{Work, WriteConnection};
-use crate::db::writer;
+use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::request::{Message, Reply};
+use crate::queue::commit::write_connection::WriteConnection;
+use crate::queue::commit::writer;
 use crate::records::left_out::LeftOut;
 
 /// Capacity of the writer's channel.

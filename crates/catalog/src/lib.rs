@@ -28,6 +28,7 @@ mod postgres_server;
 mod query_plans;
 mod queue;
 mod records;
+mod recovery;
 mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
 #[expect(clippy::missing_errors_doc, reason = "only tests call these methods")]
@@ -47,23 +48,21 @@ mod tests_on_postgres;
 pub use audit::audited_pairs::{AuditPage, AuditedPair, AuditedResult};
 pub use audit::fingerprint_hashes::FaultyFingerprint;
 pub use audit::integrity::{CounterDrift, Drift};
-pub use blocks::claim::OutstandingBlocks;
+pub use blocks::block_job::BlockJob;
 pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
-pub use blocks::fail::BlockRetry;
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
-    BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockSettings, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
+    BlockAttributes, BlockInputVersions, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
     NewCharacter, StoredCharacter,
 };
+pub use blocks::queue::OutstandingBlocks;
 pub use blocks::records::{
     AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
     StoredBlockFailure,
 };
 pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
-pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, LogLoss, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
@@ -71,14 +70,18 @@ pub use db::roles::{ROLES, initialize_database, roles_sql};
 pub use handle::Catalog;
 pub use mocban_core::domain::InputVersion;
 pub use new_catalog::NewCatalog;
+pub use queue::block_settings::BlockSettings;
 pub use queue::claim::ClaimRequest;
+pub use queue::commit::commit_delay::Waiting;
 pub use queue::counters::JobCounts;
 pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
+pub use queue::kind::JobKind;
 pub use queue::lease::{
-    CheckpointOutcome, FailureAction, FingerprintId, InputVersions, Lease, MetricResult,
-    StageCheckpoint, StageFailure,
+    CheckpointOutcome, FailureAction, Lease, MetricResult, StageCheckpoint, StageFailure,
 };
+pub use queue::pair_job::PairJob;
 pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
+pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
 pub use queue::selection::PairSelection;

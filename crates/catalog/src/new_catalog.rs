@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::db::commit_delay::CommitDelay;
 use crate::db::error::{CatalogError, Result};
 use crate::db::network_fs;
 use crate::db::unplaced::{self, UnplacedFile};
 use crate::handle::Catalog;
+use crate::queue::commit::commit_delay::CommitDelay;
 
 /// A new catalog that no other process sees yet. It disappears if this value is dropped.
 #[derive(Debug)]

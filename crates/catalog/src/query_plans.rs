@@ -11,6 +11,7 @@ use crate::queue::checkpoint;
 use crate::queue::claim;
 use crate::queue::fail;
 use crate::queue::job_counts;
+use crate::queue::pair_job::PairJob;
 use crate::queue::recovery;
 use crate::queue::requeue;
 use crate::queue::staleness;
@@ -39,7 +40,7 @@ async fn plan(sql: impl Into<Sql>) -> Vec<String> {
 
 #[tokio::test]
 async fn a_claim_scans_the_ready_index_in_order() {
-    let plan = plan(claim::CLAIM).await;
+    let plan = plan(claim::CLAIM.of::<PairJob>()).await;
     assert!(
         plan.iter().any(|line| line.contains("INDEX job_ready")),
         "{plan:?}"
@@ -62,10 +63,10 @@ async fn a_claim_scans_the_ready_index_in_order() {
 #[tokio::test]
 async fn fenced_writes_find_their_jobs_by_key() {
     for sql in [
-        checkpoint::ADVANCE.into(),
-        fail::FAIL.into(),
-        claim::RELEASE,
-        requeue::REQUEUE.into(),
+        checkpoint::ADVANCE.of::<PairJob>(),
+        fail::FAIL.of::<PairJob>(),
+        claim::RELEASE.of::<PairJob>(),
+        requeue::REQUEUE.of::<PairJob>(),
         repair::RESTORE.into(),
     ] {
         let plan = plan(sql).await;
@@ -81,11 +82,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn recovery_and_holders_use_the_index_of_leases() {
     for sql in [
-        recovery::RECOVER,
-        recovery::LEFT_BY,
-        recovery::OVERDUE,
-        recovery::HOLDERS,
-        recovery::AFFECTED_PAIRS,
+        recovery::RECOVER.of::<PairJob>(),
+        recovery::LEFT_BY.into(),
+        recovery::OVERDUE.of::<PairJob>(),
+        recovery::HOLDERS.into(),
+        recovery::AFFECTED.of::<PairJob>(),
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -96,6 +97,8 @@ async fn recovery_and_holders_use_the_index_of_leases() {
             "VIRTUAL TABLE",
             "INDEX job_leased",
             "INDEX block_job_leased",
+            // The leases that these indexes find.
+            "SCAN lease",
         ];
         assert_only(&plan, &small);
     }
@@ -103,7 +106,7 @@ async fn recovery_and_holders_use_the_index_of_leases() {
 
 #[tokio::test]
 async fn due_pairs_use_the_index_of_backoffs() {
-    let plan = plan(workers::DUE).await;
+    let plan = plan(claim::DUE.of::<PairJob>()).await;
     assert!(
         plan.iter().any(|line| line.contains("INDEX job_backoff")),
         "{plan:?}"
@@ -159,7 +162,7 @@ async fn members_of_a_group_are_paged_by_key() {
 
 #[tokio::test]
 async fn rows_written_by_a_checkpoint_are_found_by_key() {
-    for sql in checkpoint::ROWS {
+    for sql in checkpoint::rows() {
         assert_only(&plan(sql).await, &["VIRTUAL TABLE"]);
     }
 }

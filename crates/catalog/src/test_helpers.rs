@@ -6,8 +6,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tokio::sync::{mpsc, oneshot};
 
-use crate::db::commit_delay::CommitDelay;
 use crate::db::query::query_scalar;
+use crate::queue::commit::commit_delay::CommitDelay;
 use crate::{
     Catalog, CheckpointOutcome, ImportChunk, ImportRow, ImportSummary, Lease, Result,
     StageCheckpoint,
@@ -81,7 +81,7 @@ impl Lease {
     /// Returns the first lease of a pair by the first worker.
     pub fn of_pair(pair: PairId) -> Self {
         Self {
-            pair,
+            unit: pair,
             worker: WorkerId(1),
             token: 1,
             cursor: Stage::Fit,

@@ -16,7 +16,7 @@ use super::pair_context::{PairContext, StoredStage};
 use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
-use mocban_catalog::{InputVersions, StageCheckpoint};
+use mocban_catalog::{InputVersions, PairProvenance, StageCheckpoint};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
 use mocban_core::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use mocban_store::{ArtifactError, NewArtifact};
@@ -196,10 +196,12 @@ fn run_stage(
     pair.stored.insert(stage, stored);
     let checkpoint = StageCheckpoint {
         stage,
-        fingerprint: context.fingerprints.of(stage),
-        mesh_hash,
-        print_hash,
-        attributes: pair.attributes_json.clone(),
+        made_with: PairProvenance {
+            fingerprint: context.fingerprints.of(stage),
+            mesh_hash: Some(mesh_hash),
+            print_hash,
+            attributes: pair.attributes_json.clone(),
+        },
         result_hash: stage_output::result_hash(&json, &artifacts),
         outcome: json,
         files: artifacts,

@@ -4,7 +4,7 @@ use super::error::RunError;
 use super::events::RunEvent;
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, RunContext};
-use mocban_catalog::{FailureAction, InputVersions, Lease, StageFailure};
+use mocban_catalog::{FailureAction, InputVersions, Lease, PairProvenance, StageFailure};
 use mocban_core::domain::{Failure, PairName, Stage};
 
 /// A stage of a pair that failed.
@@ -34,7 +34,7 @@ impl PairFailure {
         let Self { stage, failure, .. } = self;
         let now = context.clock.now();
         let attempt = FailedAttempt {
-            pair: lease.pair(),
+            id: lease.id(),
             class: failure.class,
             is_transient: self.is_transient,
             attempt: lease.attempt(),
@@ -45,8 +45,11 @@ impl PairFailure {
             stage,
             failure: failure.clone(),
             action,
-            fingerprint: context.fingerprints.of(stage),
-            attributes: self.attributes,
+            made_with: PairProvenance::new(
+                context.fingerprints.of(stage),
+                &self.inputs,
+                self.attributes,
+            ),
             inputs: self.inputs,
             ms: self.ms,
             at: now,
@@ -56,25 +59,21 @@ impl PairFailure {
             return Ok(PairEnd::LeaseLost);
         }
         let pair = self.name;
-        let wait_ms = match action {
-            FailureAction::BackOff { run_at } => (run_at - now).unsigned_abs(),
-            FailureAction::RetryExclusive => 0,
-            FailureAction::Quarantine => {
-                let skipped = (context.until.index() + 1).saturating_sub(stage.index()) as u64;
-                context.emit(RunEvent::PairFailed {
-                    pair,
-                    stage,
-                    failure,
-                    skipped,
-                });
-                return Ok(PairEnd::Failed);
-            }
-        };
+        if action == FailureAction::Quarantine {
+            let skipped = (context.until.index() + 1).saturating_sub(stage.index()) as u64;
+            context.emit(RunEvent::PairFailed {
+                pair,
+                stage,
+                failure,
+                skipped,
+            });
+            return Ok(PairEnd::Failed);
+        }
         context.emit(RunEvent::PairBackingOff {
             pair,
             stage,
             failure,
-            wait_ms,
+            wait_ms: action.wait_ms(now),
         });
         Ok(PairEnd::Retry)
     }

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use mocban_catalog::{BlockFailureAction, FailureAction};
-use mocban_core::domain::{BlockId, FailureClass, PairId, UnixMillis};
+use mocban_catalog::FailureAction;
+use mocban_core::domain::{FailureClass, UnixMillis};
 use mocban_system::failpoint;
 
 /// Attempts of a stage that fails to read or write.
@@ -16,13 +16,14 @@ const BACKOFF_CAP: Duration = Duration::from_mins(1);
 /// A failed attempt of a stage.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FailedAttempt {
-    pub(super) pair: PairId,
+    /// Row id of the pair or block.
+    pub(super) id: i64,
     pub(super) class: FailureClass,
     /// Whether a retry may succeed.
     pub(super) is_transient: bool,
     /// Number of the attempt, from 1.
     pub(super) attempt: u32,
-    /// Whether the pair ran with no other beside it.
+    /// Whether it ran with no other beside it. Always true for a block, because it was the only one of its process.
     pub(super) exclusive: bool,
 }
 
@@ -31,7 +32,7 @@ pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureA
     match failed.class {
         FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
             FailureAction::BackOff {
-                run_at: now + backoff_ms(failed.pair.0, failed.attempt),
+                run_at: now + backoff_ms(failed.id, failed.attempt),
             }
         }
         FailureClass::Resource if !failed.exclusive => FailureAction::RetryExclusive,
@@ -41,22 +42,6 @@ pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureA
         | FailureClass::NoSolution
         | FailureClass::Bug => FailureAction::Quarantine,
     }
-}
-
-/// Decides what follows a failed attempt of a stage of a block: a retry after a wait, or quarantine. Unlike a pair, a
-/// block that needs too much time or memory is not retried, because it was the only block of its process.
-pub(super) fn block_failure_action(
-    block: BlockId,
-    class: FailureClass,
-    is_transient: bool,
-    attempt: u32,
-    now: UnixMillis,
-) -> BlockFailureAction {
-    if class == FailureClass::Io && is_transient && attempt < IO_ATTEMPTS {
-        let run_at = now + backoff_ms(block.0, attempt);
-        return BlockFailureAction::BackOff { run_at };
-    }
-    BlockFailureAction::Quarantine
 }
 
 /// Returns the wait after an attempt in milliseconds: `min(cap, base * 2^(attempt - 1))` times a factor from 0.5 to
@@ -164,11 +149,11 @@ mod tests {
     use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Timing, backoff_ms, failure_action};
     use crate::input_reads::{MAX_HANGING, THREADS};
     use mocban_catalog::FailureAction;
-    use mocban_core::domain::{FailureClass, PairId};
+    use mocban_core::domain::FailureClass;
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
         FailedAttempt {
-            pair: PairId(7),
+            id: 7,
             class,
             is_transient: true,
             attempt,

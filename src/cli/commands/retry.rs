@@ -6,7 +6,7 @@ use serde_json::json;
 use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
-use mocban_catalog::{BlockRetry, Catalog, RetrySelection};
+use mocban_catalog::{BlockJob, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
 use mocban_project::exit::{ExitCode, Refusal};
 use mocban_runner::NamedWork;
@@ -47,15 +47,15 @@ pub(crate) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
 async fn selection(
     args: &RetryArgs,
     catalog: &Catalog,
-) -> anyhow::Result<(RetrySelection, BlockRetry)> {
+) -> anyhow::Result<(RetrySelection, RetrySelection<BlockJob>)> {
     if let Some(class) = args.class {
-        return Ok((RetrySelection::Class(class), BlockRetry::Class(class)));
+        return Ok((RetrySelection::Class(class), RetrySelection::Class(class)));
     }
     if args.names.is_empty() {
-        return Ok((RetrySelection::All, BlockRetry::All));
+        return Ok((RetrySelection::All, RetrySelection::All));
     }
     let NamedWork { pairs, blocks } = select::pairs_and_blocks(catalog, &args.names).await?;
-    Ok((RetrySelection::Names(pairs), BlockRetry::Names(blocks)))
+    Ok((RetrySelection::Names(pairs), RetrySelection::Names(blocks)))
 }
 
 fn no_match(selection: &RetrySelection) -> String {

@@ -12,6 +12,7 @@ use crate::db::schema::{self, SchemaDifference, wanted_objects};
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::fragments::{fingerprint_before, inconsistent};
 use crate::queue::job_counts::count_jobs;
+use crate::queue::pair_job::PairJob;
 use crate::queue::requeue::CLEAR_FAILURES;
 use crate::{Catalog, Result};
 use mocban_core::domain::{PairId, Stage};
@@ -192,7 +193,7 @@ async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {
         .bind(&items)
         .execute(&mut *conn)
         .await?;
-    query(CLEAR_FAILURES)
+    query(CLEAR_FAILURES.of::<PairJob>())
         .bind(&items)
         .execute(&mut *conn)
         .await?;

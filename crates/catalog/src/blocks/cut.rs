@@ -2,16 +2,21 @@
 
 use std::collections::BTreeSet;
 
-use crate::blocks::checkpoint::{self, Stored};
-use crate::blocks::model::{BlockCheckpoint, BlockLease, CutPair, NewCharacter};
-use crate::blocks::{characters, retired};
+use crate::blocks::block_job::BlockJob;
+use crate::blocks::characters;
+use crate::blocks::model::{CutPair, NewCharacter};
+use crate::blocks::queue::uncounted;
 use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
 use crate::db::script::Script;
-use crate::queue::checkpoint::add_inputs;
+use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::counters::Deltas;
-use crate::queue::lease::InputVersions;
+use crate::queue::kind::StoredKind as _;
+use crate::queue::lease::{Lease, StageCheckpoint};
+use crate::queue::pair_job::PairJob;
+use crate::queue::provenance::InputVersions;
+use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, PairId, PairName};
@@ -40,6 +45,9 @@ pub enum CutReply {
     NameTaken(PairName),
 }
 
+/// Finds out whether the last stage was stored already under the same lease, although its reply was lost.
+const IS_DONE: &str = "SELECT 1 FROM block_job WHERE block = ?1 AND token = ?2 AND status = 3";
+
 const NAME: &str = "SELECT name FROM block WHERE id = ?1";
 
 /// Selects the first pair with one of these names that does not belong to the block.
@@ -62,12 +70,13 @@ impl Catalog {
     /// Returns an error if the name of a pair is invalid, or if a database operation fails.
     pub async fn finish_cut(
         &self,
-        lease: BlockLease,
-        stage: BlockCheckpoint,
+        lease: Lease<BlockJob>,
+        stage: StageCheckpoint<BlockJob>,
         characters: Vec<NewCharacter>,
     ) -> Result<CutReply> {
+        let done = (lease, vec![stage]);
         self.in_transaction(move |conn| {
-            Box::pin(async move { finish(conn, &lease, &stage, &characters).await })
+            Box::pin(async move { finish(conn, &done, &characters).await })
         })
         .await
     }
@@ -75,15 +84,16 @@ impl Catalog {
 
 async fn finish(
     conn: &mut Conn,
-    lease: &BlockLease,
-    stage: &BlockCheckpoint,
+    done: &LeasedCheckpoints<BlockJob>,
     found: &[NewCharacter],
 ) -> Result<CutReply> {
-    let name = query_scalar(NAME).bind(lease.block.0);
+    let (lease, stages) = done;
+    let at = stages.last().map_or(0, |last| last.at);
+    let name = query_scalar(NAME).bind(lease.unit.0);
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
     let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
-    let taken = query_scalar(TAKEN).bind(lease.block.0);
+    let taken = query_scalar(TAKEN).bind(lease.unit.0);
     let taken: Option<PairName> = taken
         .bind(names_json(&names))
         .fetch_optional(&mut *conn)
@@ -91,15 +101,18 @@ async fn finish(
     if let Some(taken) = taken {
         return Ok(CutReply::NameTaken(taken));
     }
-    match checkpoint::store(conn, lease, stage).await? {
-        Stored::LeaseLost => return Ok(CutReply::LeaseLost),
-        Stored::Before => return Ok(CutReply::Stored(CutSummary::default())),
-        Stored::Now => {}
+    if !checkpoint::store(conn, done, &mut uncounted()).await? {
+        let finished = query_scalar(IS_DONE).bind(lease.unit.0).bind(lease.token);
+        let finished: Option<i64> = finished.fetch_optional(conn).await?;
+        return Ok(match finished {
+            Some(_) => CutReply::Stored(CutSummary::default()),
+            None => CutReply::LeaseLost,
+        });
     }
     let mut deltas = Deltas::default();
-    let summary = store_pairs(conn, &rows, stage.at, &mut deltas).await?;
-    let gone = characters::store(conn, lease.block, &name, found).await?;
-    let retired = retired::retire(conn, &gone, stage.at, &mut deltas).await?;
+    let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
+    let gone = characters::store(conn, lease.unit, &name, found).await?;
+    let retired = retired::retire(conn, &gone, at, &mut deltas).await?;
     deltas.apply(conn).await?;
     Ok(CutReply::Stored(CutSummary { retired, ..summary }))
 }
@@ -156,7 +169,7 @@ async fn store_pairs(
         })
         .collect();
     let mut script = Script::default();
-    add_inputs(&mut script, versions.iter().map(|(id, seen)| (*id, seen)))?;
+    PairJob::add_inputs(&mut script, versions.iter().map(|(id, seen)| (*id, seen)))?;
     script.run(conn).await?;
     let changed: BTreeSet<&PairName> = summary
         .changed

@@ -1,17 +1,13 @@
-//! Blocks as plain values: attributes, leases, and what is stored under a lease.
-
-use std::time::Instant;
+//! Blocks as plain values: attributes, input files, and what is stored of them.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::db::row::from_row;
-use crate::queue::fingerprint::differences;
-use crate::queue::plan::FieldChange;
 use mocban_core::domain::InputVersion;
 use mocban_core::domain::{
-    BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
-    ControlPoints, Failure, LengthUnit, PrintFromMesh, UnixMillis, WorkerId,
+    BlockCharacterState, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
+    ControlPoints, LengthUnit, PrintFromMesh,
 };
 
 /// Attributes of a block as imported.
@@ -61,38 +57,6 @@ impl BlockInputVersions {
     }
 }
 
-/// The settings of the four stages of a block, by stage: each stage's revision and settings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BlockSettings([Value; 4]);
-
-impl BlockSettings {
-    /// Collects the settings of each stage.
-    pub fn new(fields: impl Fn(BlockStage) -> Value) -> Self {
-        Self(BlockStage::ALL.map(fields))
-    }
-
-    /// Returns the settings as a JSON array by stage. Another process can pass the text to
-    /// [`BlockSettings::changes_from`].
-    pub fn json(&self) -> String {
-        Value::from(self.0.to_vec()).to_string()
-    }
-
-    /// Returns the settings that differ from those of another process, which are given as [`BlockSettings::json`].
-    /// Returns nothing if the text cannot be read.
-    pub fn changes_from(&self, other: &str) -> Vec<FieldChange> {
-        let other: Vec<Value> = serde_json::from_str(other).unwrap_or_default();
-        let stages = BlockStage::ALL.into_iter().zip(other);
-        let changes =
-            stages.flat_map(|(stage, old)| differences(stage.name(), &old, self.of(stage)));
-        changes.collect()
-    }
-
-    /// Returns the settings of a stage.
-    pub const fn of(&self, stage: BlockStage) -> &Value {
-        &self.0[stage.index()]
-    }
-}
-
 /// What a result or a failure of a stage was made with. Stored as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MadeWith {
@@ -135,35 +99,6 @@ impl MadeWith {
     }
 }
 
-/// The right to run stages of one block. `token` is the fencing token: see [`Lease`](crate::Lease).
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct BlockLease {
-    pub(crate) block: BlockId,
-    pub(crate) worker: WorkerId,
-    pub(crate) token: i64,
-    pub(crate) cursor: BlockStage,
-    pub(crate) attempt: u32,
-}
-
-from_row! { BlockLease { block, worker, token, cursor: "stage", attempt } }
-
-impl BlockLease {
-    /// Returns the block.
-    pub const fn block(&self) -> BlockId {
-        self.block
-    }
-
-    /// Returns the next stage to run.
-    pub const fn cursor(&self) -> BlockStage {
-        self.cursor
-    }
-
-    /// Returns the number of the attempt at this stage, from 1.
-    pub const fn attempt(&self) -> u32 {
-        self.attempt
-    }
-}
-
 /// A leased block with its attributes and results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockWork {
@@ -175,60 +110,6 @@ pub struct BlockWork {
     pub control_points: Option<ControlPoints>,
     /// Results of all completed stages, in order.
     pub results: Vec<BlockStageRecord>,
-}
-
-/// A finished stage of a block: everything that its checkpoint stores.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BlockCheckpoint {
-    /// The stage, its outcome and its artifacts.
-    pub record: BlockStageRecord,
-    /// Settings, inputs and attributes that it was computed from.
-    pub made_with: MadeWith,
-    /// Versions of all input files that are known, including files that only earlier stages read.
-    pub inputs: BlockInputVersions,
-    /// Computing time in milliseconds.
-    pub ms: u64,
-    /// When it finished.
-    pub at: UnixMillis,
-    /// Deadline of the next stage.
-    pub next_deadline: UnixMillis,
-    /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
-    pub alive_since: UnixMillis,
-    /// When its files were written.
-    pub written: Instant,
-}
-
-/// What happens to a block whose stage failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BlockFailureAction {
-    /// Retry at a given time.
-    BackOff {
-        /// When.
-        run_at: UnixMillis,
-    },
-    /// No retry until a user requests one, or the settings or inputs change.
-    Quarantine,
-}
-
-/// A failed stage of a block.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BlockFailure {
-    /// Which stage.
-    pub stage: BlockStage,
-    /// Class and message.
-    pub failure: Failure,
-    /// What happens to the job.
-    pub action: BlockFailureAction,
-    /// Settings, inputs and attributes of the attempt.
-    pub made_with: MadeWith,
-    /// Versions of the input files that were read.
-    pub inputs: BlockInputVersions,
-    /// Computing time in milliseconds, if anything was computed.
-    pub ms: Option<u64>,
-    /// When it failed.
-    pub at: UnixMillis,
-    /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
-    pub alive_since: UnixMillis,
 }
 
 /// A character of a block as the stage `cut` returns it.

@@ -3,7 +3,6 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::blocks::checkpoint::update_inputs;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions};
 use crate::db::conn::Conn;
 use crate::db::query::query_as;
@@ -35,13 +34,13 @@ const STATES: &str = concat!(
     "
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
-    j.failed_stage, j.class, j.message, j.failed_at,
+    f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut') AS characters,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'left') AS left_out,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'retired') AS retired,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2)
         AS low_confidence
-FROM block AS b JOIN block_job AS j ON j.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
+FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
     is_counted!("b.id", "?3"),
     " ORDER BY b.name"
 );
@@ -287,22 +286,6 @@ impl Catalog {
     pub async fn known_blocks(&self) -> Result<Vec<KnownBlock>> {
         let mut conn = self.read_conn().await?;
         query_as(BLOCKS).fetch_all(&mut conn).await
-    }
-
-    /// Stores versions of the input files of blocks. Keeps the stored version of a file whose new version is `None`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn store_block_inputs(&self, seen: Vec<(BlockId, BlockInputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                for (block, inputs) in &seen {
-                    update_inputs(conn, *block, inputs).await?;
-                }
-                Ok(())
-            })
-        })
-        .await
     }
 
     /// Returns every block with the results of its stages, for a check.

@@ -5,35 +5,38 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::blocks::block_job::BlockJob;
 use crate::blocks::import::NEW_JOB;
-use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockSettings, MadeWith};
+use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
+use crate::blocks::queue::uncounted;
 use crate::blocks::records::{control_points, input_versions};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
-use crate::db::query::{query, query_as, query_scalar};
+use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row};
 use crate::db::value::Json;
+use crate::queue::block_settings::BlockSettings;
+use crate::queue::counters::{CounterKey, KeyedJob};
+use crate::queue::lease::position;
+use crate::queue::requeue::requeue;
 use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
 
 const JOBS: &str = "
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.mesh_hash, b.mesh_stat, b.page_hash,
-    b.page_stat, b.labels_hash, b.labels_stat, b.control_points, j.stage, j.status, j.failed_stage, j.failed_with
-FROM block AS b JOIN block_job AS j ON j.block = b.id ORDER BY b.id";
+    b.page_stat, b.labels_hash, b.labels_stat, b.control_points, j.stage, j.status, f.stage AS failed_stage,
+    f.made_with AS failed_with
+FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id ORDER BY b.id";
 
 const RESULTS: &str = "SELECT block, stage, made_with FROM block_result ORDER BY block, stage";
-
-/// Sends a block to a stage, with no attempts or crashes. Skips it if it was leased meanwhile.
-const REQUEUE: &str = "
-UPDATE block_job SET stage = ?2, status = 0, run_at = NULL, attempt = 0, crashes = 0, class = NULL, message = NULL,
-    failed_stage = NULL, failed_at = NULL, failed_with = NULL WHERE block = ?1 AND status <> 1 RETURNING block";
 
 /// Sends a block back to a stage and ends its lease.
 const RESET: &str = "
 UPDATE block_job SET stage = min(stage, ?2), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
-    deadline = NULL, token = token + 1, class = NULL, message = NULL, failed_stage = NULL, failed_at = NULL,
-    failed_with = NULL WHERE block = ?1";
+    deadline = NULL, token = token + 1 WHERE block = ?1";
+
+const CLEAR_FAILURE: &str = "DELETE FROM block_failure WHERE block = ?1";
 
 /// Why a block runs, or runs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -90,7 +93,7 @@ pub struct BlockPlanEntry {
 }
 
 /// A block's job with what its failure was made with.
-struct BlockJob {
+struct PlannedBlock {
     block: BlockId,
     attributes: BlockAttributes,
     inputs: BlockInputVersions,
@@ -100,7 +103,7 @@ struct BlockJob {
     failure: Option<(BlockStage, MadeWith)>,
 }
 
-impl FromRow for BlockJob {
+impl FromRow for PlannedBlock {
     fn from_row(row: &Row) -> Result<Self> {
         let failed_with: Option<Json<MadeWith>> = row.get("failed_with")?;
         let failed_stage: Option<BlockStage> = row.get("failed_stage")?;
@@ -116,7 +119,16 @@ impl FromRow for BlockJob {
     }
 }
 
-impl BlockJob {
+impl PlannedBlock {
+    /// Returns the job with its key.
+    fn keyed(&self) -> KeyedJob {
+        let key = CounterKey::new(self.cursor, self.status, None);
+        KeyedJob {
+            unit: self.block.0,
+            key,
+        }
+    }
+
     fn next(&self) -> Option<BlockStage> {
         let index = usize::try_from(self.cursor).ok()?;
         BlockStage::from_index(index)
@@ -230,20 +242,14 @@ impl Catalog {
         let (settings, among) = (settings.clone(), among.cloned());
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let mut requeued = 0;
                 let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
-                for (job, from, why) in decided {
-                    if matches!(why, BlockReason::New | BlockReason::Unfinished)
-                        && job.next() == Some(from)
-                    {
-                        continue;
-                    }
-                    let requeue = query_scalar(REQUEUE).bind(job.block.0);
-                    let requeue = requeue.bind(from.index() as i64);
-                    let moved: Option<BlockId> = requeue.fetch_optional(&mut *conn).await?;
-                    requeued += u64::from(moved.is_some());
-                }
-                Ok(requeued)
+                let stale = decided.iter().filter(|(job, from, why)| {
+                    let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
+                    !waits || job.next() != Some(*from)
+                });
+                let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
+                let stale: Vec<_> = stale.collect();
+                requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
             })
         })
         .await
@@ -262,6 +268,8 @@ impl Catalog {
                     new.execute(&mut *conn).await?;
                     let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
                     reset.execute(&mut *conn).await?;
+                    let clear = query(CLEAR_FAILURE).bind(block.0);
+                    clear.execute(&mut *conn).await?;
                 }
                 Ok(())
             })
@@ -276,8 +284,8 @@ async fn decisions(
     settings: &BlockSettings,
     policy: RerunPolicy,
     among: Option<&BlockSelection>,
-) -> Result<Vec<(BlockJob, BlockStage, BlockReason)>> {
-    let jobs: Vec<BlockJob> = query_as(JOBS).fetch_all(&mut *conn).await?;
+) -> Result<Vec<(PlannedBlock, BlockStage, BlockReason)>> {
+    let jobs: Vec<PlannedBlock> = query_as(JOBS).fetch_all(&mut *conn).await?;
     let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, MadeWith>> = BTreeMap::new();
     for row in &query(RESULTS).fetch_all(conn).await? {
         let Json(made) = row.get("made_with")?;

@@ -1,6 +1,7 @@
 //! A connection to either database.
 
 use std::ops::{Deref, DerefMut};
+use std::pin::Pin;
 
 use sqlx::pool::PoolConnection;
 use sqlx::{Database, Postgres, Sqlite, Transaction};
@@ -39,6 +40,9 @@ impl<D: Database> DerefMut for Held<D> {
         }
     }
 }
+
+/// A future that borrows a connection.
+pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 
 #[cfg(test)]
 impl Conn {

@@ -74,7 +74,7 @@ impl From<&'static str> for Sql {
 
 /// Translates a text for both databases. In SQLite, `CROSS JOIN` keeps the order of two tables; PostgreSQL has the
 /// join, but no such hint, and no condition after it. SQLite also has a faster `jsonb_each` with the same result.
-fn postgres_text(both: &str) -> String {
+pub(crate) fn postgres_text(both: &str) -> String {
     both.replace("CROSS JOIN", "JOIN")
         .replace("jsonb_each(", "json_each(")
 }

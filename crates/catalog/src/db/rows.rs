@@ -3,8 +3,7 @@
 use serde_json::Value;
 use sqlx::error::BoxDynError;
 
-use crate::db::value::{Argument, FromValue, Value as ColumnValue, read_blob, read_text};
-use crate::queue::lease::FingerprintId;
+use crate::db::value::{FromValue, Value as ColumnValue, read_blob, read_text};
 use mocban_core::domain::{
     Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
     ContentHash, FailureClass, JobStatus, LengthUnit, PairId, PairName, PrintFromMesh, Reason,
@@ -29,7 +28,6 @@ decode! {
     PairId: integer = |id| Ok::<_, String>(Self(id));
     WorkerId: integer = |id| Ok::<_, String>(Self(id));
     BlockId: integer = |id| Ok::<_, String>(Self(id));
-    FingerprintId: integer = |id| Ok::<_, String>(Self(id));
     JobStatus: integer = status;
     Stage: integer = stage;
     BlockStage: integer = block_stage;
@@ -47,18 +45,6 @@ decode! {
     Affine2: text = serde_json::from_str;
     AttentionCheck: text = serde_json::from_str;
     PrintFromMesh: text = serde_json::from_str;
-}
-
-impl From<FingerprintId> for Argument {
-    fn from(FingerprintId(id): FingerprintId) -> Self {
-        Self::from(id)
-    }
-}
-
-impl From<Option<FingerprintId>> for Argument {
-    fn from(id: Option<FingerprintId>) -> Self {
-        Self::from(id.map(|FingerprintId(id)| id))
-    }
 }
 
 fn status(code: i64) -> Result<JobStatus, String> {

@@ -1,8 +1,8 @@
 //! Requests of the queue to the writer task, and its counters.
 
-use crate::db::commit_delay::Waiting;
-use crate::db::request::{Message, Reply, Request};
 use crate::queue::claim::{ClaimRequest, Heartbeat};
+use crate::queue::commit::commit_delay::Waiting;
+use crate::queue::commit::request::{Message, Reply, Request};
 use crate::queue::counters::{JobCounts, by_status, counters};
 use crate::queue::job_counts::count_jobs;
 use crate::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
@@ -85,13 +85,7 @@ impl Catalog {
         let Some(last) = stages.last() else {
             return Ok(CheckpointOutcome::Lease(lease));
         };
-        let advanced = last.stage.next().map(|cursor| Lease {
-            cursor,
-            fingerprint: Some(last.fingerprint),
-            attempt: 1,
-            cleared: true,
-            ..lease
-        });
+        let advanced = lease.after(last);
         let item = Box::new((lease, stages));
         let stored = self
             .reply_to(|reply| Message::Deferrable(Request::Checkpoint(item, reply)))

@@ -1,49 +1,51 @@
-//! Statements that store finished stages in SQLite if the lease is still valid, and what they share with those for
-//! PostgreSQL.
+//! Statements that store finished stages if the lease is still valid. In PostgreSQL, those of pairs have a statement of
+//! their own: see `server_checkpoint.rs`.
 
 use serde::Serialize;
-use serde_json::{Value, json};
 
+use crate::db::conn::Conn;
+#[cfg(test)]
 use crate::db::dialect::Sql;
 use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
-use crate::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
-use crate::queue::lease::{FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint};
+use crate::queue::counters::{CounterKey, Cursor, DONE, Deltas};
+use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::lease::{FencedRow, Lease, StageCheckpoint, position, was_written_long_ago};
+use crate::queue::pair_job::PairJob;
+#[cfg(test)]
+use crate::queue::pair_job::UPDATE_INPUTS;
+use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::{
-    ContentHash, JobStatus, MetricOutcome, PairId, Stage, ThresholdMetric, UnixMillis, WorkerId,
+    ArtifactSet, ContentHash, JobStatus, MetricOutcome, ThresholdMetric, UnixMillis, WorkerId,
 };
 use mocban_system::failpoint::{self, Point};
 
 /// A lease, and the finished stages to store under it, in the order they were computed.
-pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
+pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<K>>);
 
-/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the pair's crash count. Marks
-/// a job dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
-pub(crate) const ADVANCE: &str = "
-UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
-    worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
-    attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.value ->> 'low_confidence',
-    fingerprint = item.value ->> 'fingerprint',
-    dirty = dirty OR item.value ->> 'mixed' OR ((item.value ->> 'first') IS NOT NULL
-        AND job.fingerprint IS NOT (SELECT upstream FROM fingerprint WHERE id = item.value ->> 'first'))
+/// Advances jobs. Skips a job if its lease was lost or its worker counts as dead. Resets the crash count. Marks the job of
+/// a pair dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
+pub(crate) static ADVANCE: Template = Template::new(
+    "
+UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [next] = 4 THEN NULL ELSE worker END,
+    deadline = [deadline], attempt = 1, crashes = 0{and_advance}
 FROM jsonb_each(?) AS item
-WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
+WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
-        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
-RETURNING pair, token";
+        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
+RETURNING {unit} AS unit, token",
+);
 
 /// Items: [`ResultItem`].
-const RESULT: &str = "
-INSERT INTO stage_result
-    (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
-SELECT value ->> 'pair', value ->> 'index', value ->> 'worker', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
-    unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'outcome', value -> 'files',
-    unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'at'
-FROM jsonb_each(?) WHERE true
-ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
-    print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
-    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
+static RESULT: Template = Template::new(
+    "
+INSERT INTO {result} ({unit}, stage, worker, {made_with}, outcome, files, result_hash, ms, at)
+SELECT [unit], [stage], [worker], {made_with_values}, item.value ->> 'outcome', CAST(item.value -> 'files' AS text),
+    unhex(item.value ->> 'result_hash'), [ms], [at]
+FROM jsonb_each(?) AS item WHERE true
+ON CONFLICT ({unit}, stage) DO UPDATE SET {made_with_updates}, outcome = excluded.outcome, files = excluded.files,
+    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
+);
 
 /// Removes the old metrics, because the new method may compute fewer.
 const CLEAR_METRICS: &str = "
@@ -65,59 +67,64 @@ SELECT value ->> 'pair', value ->> 'metric', value ->> 'threshold_level',
     value ->> 'margin', value ->> 'confidence', value ->> 'at_bound', unhex(value ->> 'hash')
 FROM jsonb_each(?)";
 
-/// Items: pair, index of the stage, worker, milliseconds, time.
-const ATTEMPT: &str = "
-INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
-
-/// Updates the input files of pairs. Items: see [`input_item`].
-pub(crate) const UPDATE_INPUTS: Sql = Sql::pair(
+/// Items: unit, index of the stage, worker, milliseconds, time.
+static ATTEMPT: Template = Template::new(
     "
-UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
-    print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
-FROM (
-    SELECT value ->> 'pair' AS id, unhex(value ->> 'mesh_hash') AS mesh_hash, value ->> 'mesh_stat' AS mesh_stat,
-        unhex(value ->> 'print_hash') AS print_hash, value ->> 'print_stat' AS print_stat FROM jsonb_each(?)) AS new
-WHERE pair.id = new.id AND (pair.mesh_hash IS NOT new.mesh_hash OR pair.mesh_stat IS NOT new.mesh_stat
-    OR pair.print_hash IS NOT new.print_hash OR pair.print_stat IS NOT new.print_stat)",
-    "
-UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
-    print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
-FROM (
-    SELECT pair AS id, decode(mesh_hash, 'hex') AS mesh_hash, mesh_stat, decode(print_hash, 'hex') AS print_hash,
-        print_stat
-    FROM json_to_recordset(CAST(? AS json)) AS item (pair bigint, mesh_hash text, mesh_stat text, print_hash text,
-        print_stat text)) AS new
-WHERE pair.id = new.id AND (pair.mesh_hash IS DISTINCT FROM new.mesh_hash OR pair.mesh_stat IS DISTINCT FROM new.mesh_stat
-    OR pair.print_hash IS DISTINCT FROM new.print_hash OR pair.print_stat IS DISTINCT FROM new.print_stat)",
+INSERT INTO {attempt} ({unit}, stage, worker, ms, at) SELECT [0], [1], [2], [3], [4] FROM jsonb_each(?) AS item",
 );
 
-const CLEAR_FAILURE: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
+static CLEAR_FAILURE: Template =
+    Template::new("DELETE FROM {failure} WHERE {unit} IN (SELECT [0] FROM jsonb_each(?) AS item)");
 
-/// The statements of [`add_results`].
+/// Returns the statements of [`add_results`] for pairs.
 #[cfg(test)]
-pub(crate) const ROWS: [&str; 6] = [
-    RESULT,
-    CLEAR_METRICS,
-    METRICS,
-    ATTEMPT,
-    UPDATE_INPUTS.sqlite,
-    CLEAR_FAILURE,
-];
+pub(crate) fn rows() -> [Sql; 6] {
+    [
+        RESULT.of::<PairJob>(),
+        CLEAR_METRICS.into(),
+        METRICS.into(),
+        ATTEMPT.of::<PairJob>(),
+        UPDATE_INPUTS,
+        CLEAR_FAILURE.of::<PairJob>(),
+    ]
+}
+
+/// Stores finished stages of one job. Returns `false`, and stores nothing, if the lease was lost, or if the files of a
+/// stage may have been removed as unreferenced.
+pub(crate) async fn store<K: StoredKind>(
+    conn: &mut Conn,
+    checkpoint: &LeasedCheckpoints<K>,
+    deltas: &mut Deltas,
+) -> Result<bool> {
+    let mut stages = checkpoint.1.iter();
+    if stages.any(|stage| was_written_long_ago(stage.written)) {
+        return Ok(false);
+    }
+    let mut script = Script::default();
+    let statement = add_advance(&mut script, [checkpoint].into_iter())?;
+    let rows = script.run(conn).await?;
+    let advanced = rows.read_if_any(statement.as_ref())?;
+    if !checkpoint.0.is_in(&advanced) {
+        return Ok(false);
+    }
+    let mut script = Script::default();
+    add_results(&mut script, &[checkpoint], deltas)?;
+    script.run(conn).await?;
+    Ok(true)
+}
 
 /// Adds the statement `ADVANCE` to a script. The statement returns one row for each job that it changed.
-pub(crate) fn add_advance<'i>(
+pub(crate) fn add_advance<'i, K: StoredKind>(
     script: &mut Script,
-    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
+    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints<K>>,
 ) -> Result<Option<Statement<FencedRow>>> {
-    script.add_over(ADVANCE, checkpoints.filter_map(AdvancedJob::of))
+    script.add_over(ADVANCE.of::<K>(), checkpoints.filter_map(AdvancedJob::of))
 }
 
 /// Adds the statements that store the results of advanced jobs to a script.
-pub(crate) fn add_results<'i>(
+pub(crate) fn add_results<K: StoredKind>(
     script: &mut Script,
-    advanced: &[&'i LeasedCheckpoints],
+    advanced: &[&LeasedCheckpoints<K>],
     deltas: &mut Deltas,
 ) -> Result<()> {
     for (lease, stages) in advanced.iter().map(|stored| &**stored) {
@@ -132,31 +139,22 @@ pub(crate) fn add_results<'i>(
         let stored = advanced.iter();
         stored.flat_map(|(lease, stages)| stages.iter().map(move |one| (lease, one)))
     };
-    let rows = |(lease, one): (&Lease, &'i StageCheckpoint)| ResultItem {
-        pair: lease.pair,
-        index: one.stage.index(),
-        worker: lease.worker,
-        result: one,
-    };
-    script.execute_over(RESULT, each().map(rows))?;
-    let attempts = each().map(rows);
-    let attempts = attempts.map(|row| {
-        (
-            row.pair,
-            row.index,
-            row.worker,
-            row.result.ms,
-            row.result.at,
-        )
-    });
-    script.execute_over(ATTEMPT, attempts)?;
+    let mut results = Vec::new();
+    for (lease, one) in each() {
+        results.push(ResultItem::of(lease, one)?);
+    }
+    let attempts = results.iter();
+    let attempts = attempts.map(|row| (row.unit, row.stage, row.worker, row.ms, row.at));
+    script.execute_over(RESULT.of::<K>(), results.iter())?;
+    script.execute_over(ATTEMPT.of::<K>(), attempts)?;
     let uncleared = advanced.iter().filter(|(lease, _)| !lease.cleared);
-    script.execute_over(CLEAR_FAILURE, uncleared.map(|(lease, _)| [lease.pair]))?;
+    let uncleared = uncleared.map(|(lease, _)| [lease.id()]);
+    script.execute_over(CLEAR_FAILURE.of::<K>(), uncleared)?;
     let metrics = || {
         each().flat_map(|(lease, one)| {
             let metrics = one.metrics.iter();
             metrics.map(|metric| MetricItem {
-                pair: lease.pair,
+                pair: lease.id(),
                 hash: metric.result_hash,
                 outcome: &metric.outcome,
             })
@@ -167,50 +165,68 @@ pub(crate) fn add_results<'i>(
     let inputs = advanced.iter().filter_map(|(lease, stages)| {
         // The last stage with inputs also lists the inputs of all earlier stages.
         let mut inputs = stages.iter().rev().map(|one| &one.inputs);
-        Some((lease.pair, inputs.find(|inputs| !inputs.is_empty())?))
+        Some((lease.unit, inputs.find(|inputs| K::are_known(inputs))?))
     });
-    add_inputs(script, inputs)
+    K::add_inputs(script, inputs)
 }
 
 /// An item of [`RESULT`].
 #[derive(Serialize)]
-struct ResultItem<'i> {
-    pair: PairId,
-    index: usize,
+struct ResultItem<'i, P> {
+    unit: i64,
+    stage: usize,
     worker: WorkerId,
     #[serde(flatten)]
-    result: &'i StageCheckpoint,
+    made_with: P,
+    outcome: &'i str,
+    files: &'i ArtifactSet,
+    result_hash: ContentHash,
+    ms: u64,
+    at: UnixMillis,
+}
+
+impl<'i> ResultItem<'i, ()> {
+    fn of<K: StoredKind>(
+        lease: &Lease<K>,
+        result: &'i StageCheckpoint<K>,
+    ) -> Result<ResultItem<'i, impl Serialize + use<'i, K>>> {
+        Ok(ResultItem {
+            unit: lease.id(),
+            stage: K::index(result.stage),
+            worker: lease.worker,
+            made_with: K::provenance(&result.made_with)?,
+            outcome: &result.outcome,
+            files: &result.files,
+            result_hash: result.result_hash,
+            ms: result.ms,
+            at: result.at,
+        })
+    }
 }
 
 /// An item of [`METRICS`].
 #[derive(Serialize)]
 struct MetricItem<'i> {
-    pair: PairId,
+    pair: i64,
     hash: ContentHash,
     #[serde(flatten)]
     outcome: &'i MetricOutcome,
 }
 
-/// Builds an item of [`UPDATE_INPUTS`].
-pub(crate) fn input_item((pair, inputs): (PairId, &InputVersions)) -> Value {
-    let (mesh, print) = (inputs.mesh.as_ref(), inputs.print.as_ref());
-    json!({
-        "pair": pair, "mesh_hash": mesh.map(|seen| seen.hash), "mesh_stat": mesh.map(|seen| &seen.stat),
-        "print_hash": print.map(|seen| seen.hash), "print_stat": print.map(|seen| &seen.stat),
-    })
-}
-
 /// Returns the counter key of a job after a stage is stored.
-fn key_after(stage: &StageCheckpoint) -> CounterKey {
-    let (cursor, status) = match stage.stage.next() {
-        Some(next) => (cursor(next), JobStatus::Leased),
+fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
+    let (cursor, status) = match K::next(stage.stage) {
+        Some(next) => (position::<K>(next), JobStatus::Leased),
         None => (DONE, JobStatus::Done),
     };
-    CounterKey::new(cursor, status, Some(stage.fingerprint.0))
+    let fingerprint = K::fingerprint(&stage.made_with);
+    CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))
 }
 
 /// Returns the position and the status of a job after stages are stored, or `None` if there are none.
-pub(crate) fn position_after(stages: &[StageCheckpoint]) -> Option<(Cursor, JobStatus)> {
+pub(crate) fn position_after<K: JobKind>(
+    stages: &[StageCheckpoint<K>],
+) -> Option<(Cursor, JobStatus)> {
     let after = key_after(stages.last()?);
     Some((after.cursor, after.status))
 }
@@ -218,17 +234,17 @@ pub(crate) fn position_after(stages: &[StageCheckpoint]) -> Option<(Cursor, JobS
 /// A job to advance, and its state afterwards. An item of [`ADVANCE`].
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct AdvancedJob {
-    pub(crate) pair: i64,
+    pub(crate) unit: i64,
     pub(crate) worker: i64,
     pub(crate) token: i64,
     /// Position under the lease.
     pub(crate) stage: Cursor,
     pub(crate) next: Cursor,
     pub(crate) status: i64,
+    /// The job of a pair becomes dirty if the upstream of `first` is not its fingerprint, or if `mixed` is 1, because
+    /// the stages are not consecutive.
     pub(crate) fingerprint: i64,
-    /// The job becomes dirty if the upstream of this fingerprint is not the job's fingerprint.
     pub(crate) first: Option<i64>,
-    /// The job becomes dirty if this is 1, because the stages are not consecutive.
     pub(crate) mixed: i64,
     pub(crate) low_confidence: i64,
     pub(crate) deadline: Option<UnixMillis>,
@@ -237,7 +253,7 @@ pub(crate) struct AdvancedJob {
 
 impl AdvancedJob {
     /// Describes a job after its checkpoint, or returns `None` if there are no stages.
-    pub(crate) fn of((lease, stages): &LeasedCheckpoints) -> Option<Self> {
+    pub(crate) fn of<K: JobKind>((lease, stages): &LeasedCheckpoints<K>) -> Option<Self> {
         let last = stages.last()?;
         let after = key_after(last);
         let low_confidence = last.metrics.iter().any(|metric| {
@@ -245,10 +261,10 @@ impl AdvancedJob {
         });
         let (first, follow) = chain(stages);
         Some(Self {
-            pair: lease.pair.0,
+            unit: lease.id(),
             worker: lease.worker.0,
             token: lease.token,
-            stage: cursor(lease.cursor),
+            stage: position::<K>(lease.cursor),
             next: after.cursor,
             status: after.status.code(),
             fingerprint: after.fingerprint,
@@ -262,23 +278,14 @@ impl AdvancedJob {
 }
 
 /// Returns the fingerprint of the first stage, and whether the stages are consecutive. Ignores the stages before the
-/// last `Stage::Fit`, which begins a new chain. If the first stage is `Fit`, its fingerprint is returned as `None`.
-fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
-    let restart = stages.iter().rposition(|one| one.stage == Stage::Fit);
+/// last one with index 0, which begins a new chain. If the chain begins there, no fingerprint is returned.
+fn chain<K: JobKind>(stages: &[StageCheckpoint<K>]) -> (Option<FingerprintId>, bool) {
+    let restart = stages.iter().rposition(|one| K::index(one.stage) == 0);
     let chain = &stages[restart.unwrap_or(0)..];
-    let follow = |two: &[StageCheckpoint]| two[0].stage.next() == Some(two[1].stage);
+    let follow = |two: &[StageCheckpoint<K>]| K::next(two[0].stage) == Some(two[1].stage);
     let first = restart.is_none().then(|| chain.first()).flatten();
     (
-        first.map(|one| one.fingerprint),
+        first.and_then(|one| K::fingerprint(&one.made_with)),
         chain.windows(2).all(follow),
     )
-}
-
-/// Adds the statement that stores the input files of pairs to a script.
-pub(crate) fn add_inputs<'a>(
-    script: &mut Script,
-    inputs: impl Iterator<Item = (PairId, &'a InputVersions)>,
-) -> Result<()> {
-    let known = inputs.filter(|(_, inputs)| !inputs.is_empty());
-    script.execute_over(UPDATE_INPUTS, known.map(input_item))
 }

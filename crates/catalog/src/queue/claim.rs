@@ -1,31 +1,33 @@
-//! Statements that take leases, keep them alive and give them back.
+//! Statements that take leases, keep them alive and give them back, for pairs and blocks.
 
 use std::cmp::Reverse;
 
 use serde_json::json;
 
-use crate::db::dialect::Sql;
+use crate::db::conn::Conn;
 use crate::db::error::Result;
+use crate::db::query::query_as;
 use crate::db::script::{Script, Statement};
-use crate::queue::counters::{Cursor, Deltas, cursor};
-use crate::queue::lease::{FencedRow, Lease};
-use crate::queue::selection::PairSelection;
+use crate::queue::counters::{CounterKey, Cursor, Deltas};
+use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::lease::{FencedRow, Lease, position};
+use crate::queue::pair_job::PairJob;
 use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 use mocban_system::failpoint::{self, Point};
 
-/// Which pairs a worker wants to lease.
+/// Which pairs or blocks a worker wants to lease.
 #[derive(Debug, Clone)]
-pub struct ClaimRequest {
+pub struct ClaimRequest<K: JobKind = PairJob> {
     /// The worker.
     pub worker: WorkerId,
-    /// Largest number of pairs to lease.
+    /// Largest number to lease.
     pub slots: usize,
-    /// Lease only pairs whose next stage is this one or an earlier one.
-    pub until: Stage,
+    /// Lease only those whose next stage is this one or an earlier one.
+    pub until: K::Stage,
     /// If set, leases one pair that must run exclusively; otherwise, leases only pairs that need not.
     pub exclusive: bool,
-    /// Lease only these pairs. `None` for all pairs.
-    pub among: Option<PairSelection>,
+    /// Lease only these. `None` for all.
+    pub among: Option<K::Selection>,
     /// Deadline of the first stage.
     pub deadline: UnixMillis,
     /// If the worker's last heartbeat is before this time, nothing is leased. The time is by the worker's own clock.
@@ -46,8 +48,10 @@ impl ClaimRequest {
             alive_since: UnixMillis::MIN,
         }
     }
+}
 
-    /// Returns the largest number of pairs that the claim may lease.
+impl<K: JobKind> ClaimRequest<K> {
+    /// Returns the largest number that the claim may lease.
     pub(crate) fn limit(&self) -> i64 {
         let slots = if self.exclusive {
             self.slots.min(1)
@@ -68,43 +72,55 @@ pub(crate) struct Heartbeat {
     pub(crate) metrics: Option<String>,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. While an exclusive job is leased, no worker holds
-/// another lease. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite would
-/// prepare the statement again each time.
-pub(crate) const CLAIM: &str = "
-UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
-WHERE pair IN (
-    SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
-    ORDER BY prio, stage DESC, pair LIMIT +?)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
-
-/// Like [`CLAIM`], but leases only selected pairs.
-const CLAIM_AMONG: &str = "
-UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
-WHERE pair IN (
-    SELECT j.pair FROM json_each(?) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
-    WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
-    ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
-RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
-
-/// Gives leases back. Their attempts do not count.
-pub(crate) const RELEASE: Sql = Sql::pair(
+/// Leases the first ready jobs, for pairs in the order of the index `job_ready`. While a pair must run exclusively, no
+/// worker leases anything. The limit is `+?`, which hides its value from SQLite's query planner. With a plain `?`, SQLite
+/// would prepare the statement again each time.
+pub(crate) static CLAIM: Template = Template::new(
     "
-UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
+UPDATE {job} SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
+WHERE {unit} IN (
+    SELECT {unit} FROM {job} WHERE status = 0 AND stage <= ? AND {exclusive} = ?
+    ORDER BY {prio}stage DESC, {unit} LIMIT +?)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
+RETURNING {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive",
+);
+
+/// Like [`CLAIM`], but leases only selected jobs.
+static CLAIM_AMONG: Template = Template::new(
+    "
+UPDATE {job} SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
+WHERE {unit} IN (
+    SELECT j.{unit} FROM json_each(?) AS wanted CROSS JOIN {job} AS j ON j.{unit} = wanted.value
+    WHERE j.status = 0 AND j.stage <= ? AND {exclusive} = ?
+    ORDER BY {prio}j.stage DESC, j.{unit} LIMIT +?)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+    AND NOT EXISTS (SELECT 1 FROM job WHERE status = 1 AND (exclusive = 1 OR ?))
+RETURNING {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive",
+);
+
+/// Selects the leases of a worker.
+static LEASES: Template = Template::new(
+    "
+SELECT {unit} AS unit, worker, token, stage, {fingerprint} AS fingerprint, attempt, {exclusive} AS exclusive
+FROM {job} WHERE status = 1 AND worker = ?1 ORDER BY {unit}",
+);
+
+/// Gives leases back. Their attempts do not count. `status + 0` keeps the planner of PostgreSQL from the index of leases,
+/// which contains all leases that ended while a snapshot is held.
+pub(crate) static RELEASE: Template = Template::new(
+    "
+UPDATE {job} SET status = 0, worker = NULL, deadline = NULL, attempt = max({job}.attempt - 1, 0)
 FROM jsonb_each(?) AS item
-WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.token = item.value ->> 2
-    AND job.status = 1
-RETURNING pair, token",
+WHERE {job}.{unit} = [0] AND {job}.worker = [1] AND {job}.token = [2] AND {job}.status + 0 = 1
+RETURNING {unit} AS unit, token",
+);
+
+/// Ends the back-offs that are due at `?1`. Also ends back-offs beyond `?2`, which only a clock jump can cause.
+pub(crate) static DUE: Template = Template::new(
     "
-UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = greatest(job.attempt - 1, 0)
-FROM json_array_elements(CAST(? AS json)) AS item (value)
-WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.worker = CAST(item.value ->> 1 AS bigint)
-    AND job.token = CAST(item.value ->> 2 AS bigint) AND job.status + 0 = 1
-RETURNING job.pair, job.token",
+UPDATE {job} SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
+RETURNING stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
 /// Stores a heartbeat, unless the worker has ended, or its last heartbeat is so old that others may consider it dead. A
@@ -124,17 +140,21 @@ pub(crate) fn add_heartbeat(script: &mut Script, heartbeat: &Heartbeat) -> State
 }
 
 /// Adds a claim to a script, in SQLite.
-pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Statement<Lease> {
-    let statement = script.add(match &request.among {
-        Some(_) => CLAIM_AMONG,
-        None => CLAIM,
-    });
+pub(crate) fn add_claim<K: StoredKind>(
+    script: &mut Script,
+    request: &ClaimRequest<K>,
+) -> Statement<Lease<K>> {
+    let claim = match &request.among {
+        Some(_) => &CLAIM_AMONG,
+        None => &CLAIM,
+    };
+    let statement = script.add(claim.of::<K>());
     script.bind(request.worker.0);
     script.bind(request.deadline);
     if let Some(among) = &request.among {
-        script.bind(among.json.clone());
+        script.bind(K::ids(among).into_owned());
     }
-    script.bind(cursor(request.until));
+    script.bind(position::<K>(request.until));
     script.bind(i64::from(request.exclusive));
     script.bind(request.limit());
     script.bind(request.worker.0);
@@ -143,14 +163,23 @@ pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Statemen
     statement
 }
 
-/// Returns the key by which claims sort pairs.
-pub(crate) const fn order(turn: Cursor, pair: i64) -> (Reverse<Cursor>, i64) {
-    (Reverse(turn), pair)
+/// Returns the leases of a worker.
+pub(crate) async fn leases<K: StoredKind>(
+    conn: &mut Conn,
+    worker: WorkerId,
+) -> Result<Vec<Lease<K>>> {
+    let leases = query_as(LEASES.of::<K>()).bind(worker.0);
+    leases.fetch_all(conn).await
+}
+
+/// Returns the key by which claims sort jobs.
+pub(crate) const fn order(turn: Cursor, unit: i64) -> (Reverse<Cursor>, i64) {
+    (Reverse(turn), unit)
 }
 
 /// Returns claimed leases in the order of the claim. `RETURNING` promises no order.
-pub(crate) fn in_order(mut leases: Vec<Lease>) -> Vec<Lease> {
-    leases.sort_by_key(|lease| order(cursor(lease.cursor), lease.pair.0));
+pub(crate) fn in_order<K: JobKind>(mut leases: Vec<Lease<K>>) -> Vec<Lease<K>> {
+    leases.sort_by_key(|lease| order(position::<K>(lease.cursor), lease.id()));
     for lease in &leases {
         failpoint::hit(lease.cursor, Point::Claiming, None);
     }
@@ -166,12 +195,12 @@ pub(crate) fn count_claimed(leases: &[Lease], deltas: &mut Deltas) {
 }
 
 /// Adds the release of leases to a script.
-pub(crate) fn add_release<'l>(
+pub(crate) fn add_release<'l, K: StoredKind>(
     script: &mut Script,
-    leases: impl Iterator<Item = &'l Lease>,
+    leases: impl Iterator<Item = &'l Lease<K>>,
 ) -> Result<Option<Statement<FencedRow>>> {
-    let fences = leases.map(|lease| json!([lease.pair, lease.worker, lease.token]));
-    script.add_over(RELEASE, fences)
+    let fences = leases.map(|lease| json!([lease.id(), lease.worker, lease.token]));
+    script.add_over(RELEASE.of::<K>(), fences)
 }
 
 /// Counts released leases.
@@ -180,4 +209,20 @@ pub(crate) fn count_released<'l>(leases: impl Iterator<Item = &'l Lease>, deltas
         let to = lease.counter_key().with_status(JobStatus::Ready);
         deltas.move_job(lease.counter_key(), to);
     }
+}
+
+/// Ends the back-offs that are due, and those with more than `longest` milliseconds left. Returns the number of jobs made
+/// ready.
+pub(crate) async fn release_due<K: StoredKind>(
+    conn: &mut Conn,
+    now: UnixMillis,
+    longest: i64,
+    deltas: &mut Deltas,
+) -> Result<u64> {
+    let due = query_as(DUE.of::<K>()).bind(now).bind(now + longest);
+    let due: Vec<CounterKey> = due.fetch_all(conn).await?;
+    for key in &due {
+        deltas.move_job(key.with_status(JobStatus::Backoff), *key);
+    }
+    Ok(due.len() as u64)
 }

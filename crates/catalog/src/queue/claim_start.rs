@@ -120,7 +120,7 @@ mod tests {
 
     fn lease(pair: i64, cursor: Stage) -> Lease {
         Lease {
-            pair: PairId(pair),
+            unit: PairId(pair),
             worker: WorkerId(1),
             token: 1,
             cursor,

@@ -99,11 +99,11 @@ impl CounterKey {
 /// A job with its counter key.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct KeyedJob {
-    pub(crate) pair: i64,
+    pub(crate) unit: i64,
     pub(crate) key: CounterKey,
 }
 
-from_row! { KeyedJob { pair, key in row } }
+from_row! { KeyedJob { unit, key in row } }
 
 /// A number of jobs that are counted together.
 #[derive(Debug, Clone, Copy)]

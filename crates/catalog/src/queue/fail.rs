@@ -2,98 +2,133 @@
 
 use serde_json::{Value, json};
 
+use crate::db::conn::Conn;
 use crate::db::error::Result;
 use crate::db::row::from_row;
 use crate::db::script::{Script, Statement};
-use crate::queue::checkpoint::add_inputs;
 use crate::queue::counters::{CounterKey, Deltas};
-use crate::queue::fragments::fingerprint_before;
+use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::lease::{FailureAction, Lease, StageFailure};
+use crate::queue::pair_job::PairJob;
 use mocban_core::domain::JobStatus;
+use mocban_system::failpoint::{self, Point};
 
-/// Number of attempts kept per pair. Older ones are deleted.
+/// Number of attempts kept per pair or block. Older ones are deleted.
 const ATTEMPTS_KEPT: i64 = 64;
 
-/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead. `job.status + 0` keeps the
-/// planner of PostgreSQL from the index of leases, which contains all leases that ended while a snapshot is held.
-pub(crate) const FAIL: &str = concat!(
+/// Updates failed jobs. Skips a job if its lease was lost or its worker counts as dead. `status + 0` keeps the planner of
+/// PostgreSQL from the index of leases, which contains all leases that ended while a snapshot is held.
+pub(crate) static FAIL: Template = Template::new(
     "
-UPDATE job SET stage = min(job.stage, CAST(item.value ->> 'stage' AS bigint)), status = CAST(item.value ->> 'status' AS bigint),
-    run_at = CAST(item.value ->> 'run_at' AS bigint), exclusive = max(exclusive, CAST(item.value ->> 'exclusive' AS bigint)),
-    worker = NULL, deadline = NULL, fingerprint = ",
-    fingerprint_before!("min(job.stage, CAST(item.value ->> 'stage' AS bigint))"),
-    "
+UPDATE {job} SET stage = min({job}.stage, [stage]), status = [status], run_at = [run_at], worker = NULL, deadline = NULL{and_fail}
 FROM jsonb_each(?) AS item
-WHERE job.pair = CAST(item.value ->> 'pair' AS bigint) AND job.worker = CAST(item.value ->> 'worker' AS bigint)
-    AND job.token = CAST(item.value ->> 'token' AS bigint) AND job.status + 0 = 1 AND EXISTS (
+WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status + 0 = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
-        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= CAST(item.value ->> 'alive_since' AS bigint))
-RETURNING pair, token, stage, status, coalesce(fingerprint, 0) AS fingerprint"
+        WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= [alive_since])
+RETURNING {unit} AS unit, token, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
-const FAILURE: &str = "
-INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
-SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), value ->> 'class', value ->> 'message', CAST(value ->> 'fingerprint' AS bigint),
-    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'attributes', CAST(value ->> 'at' AS bigint)
-FROM jsonb_each(?) WHERE CAST(value ->> 'status' AS bigint) <> 0
-ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
-    fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
-    attributes = excluded.attributes, at = excluded.at";
+/// Stores why a job backs off or is quarantined. Items: see [`item`].
+static FAILURE: Template = Template::new(
+    "
+INSERT INTO {failure} ({unit}, stage, class, message, {made_with}, at)
+SELECT [unit], [stage], item.value ->> 'class', item.value ->> 'message', {made_with_values}, [at]
+FROM jsonb_each(?) AS item WHERE [status] <> 0
+ON CONFLICT ({unit}) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
+    {made_with_updates}, at = excluded.at",
+);
 
-const ATTEMPT: &str = "
-INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
-SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), CAST(value ->> 'worker' AS bigint), value ->> 'class', value ->> 'message',
-    CAST(value ->> 'ms' AS bigint), CAST(value ->> 'at' AS bigint)
-FROM jsonb_each(?)";
+static ATTEMPT: Template = Template::new(
+    "
+INSERT INTO {attempt} ({unit}, stage, worker, class, message, ms, at)
+SELECT [unit], [stage], [worker], item.value ->> 'class', item.value ->> 'message', [ms], [at] FROM jsonb_each(?) AS item",
+);
 
-const PRUNE: &str = "
-DELETE FROM attempt WHERE id IN (
-    SELECT old.id FROM jsonb_each(?) AS item JOIN attempt AS old ON old.pair = CAST(item.value ->> 'pair' AS bigint)
-    WHERE old.id <= (SELECT id FROM attempt WHERE pair = CAST(item.value ->> 'pair' AS bigint) ORDER BY id DESC LIMIT 1 OFFSET ?))";
+static PRUNE: Template = Template::new(
+    "
+DELETE FROM {attempt} WHERE id IN (
+    SELECT old.id FROM jsonb_each(?) AS item JOIN {attempt} AS old ON old.{unit} = [unit]
+    WHERE old.id <= (SELECT id FROM {attempt} WHERE {unit} = [unit] ORDER BY id DESC LIMIT 1 OFFSET ?))",
+);
 
 /// A row of [`FAIL`]: a job with its token and new counter key.
 pub(crate) struct FailedRow {
-    pub(crate) pair: i64,
+    pub(crate) unit: i64,
     pub(crate) token: i64,
     key: CounterKey,
 }
 
-from_row! { FailedRow { pair, token, key in row } }
+from_row! { FailedRow { unit, token, key in row } }
+
+/// A lease, and the failure to store under it.
+pub(crate) type LeasedFailure<K = PairJob> = (Lease<K>, StageFailure<K>);
 
 /// Returns the row for a lease, or `None` if the lease was lost.
-pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r FailedRow> {
+pub(crate) fn row_of<'r, K: JobKind>(
+    lease: &Lease<K>,
+    rows: &'r [FailedRow],
+) -> Option<&'r FailedRow> {
+    let id = lease.id();
     rows.iter()
-        .find(|row| (row.pair, row.token) == (lease.pair.0, lease.token))
+        .find(|row| (row.unit, row.token) == (id, lease.token))
 }
 
 /// Adds the statement `FAIL` to a script. The statement returns one row for each job that it changed.
-pub(crate) fn add_failures<'i>(
+pub(crate) fn add_failures<'i, K: StoredKind>(
     script: &mut Script,
-    failures: impl Iterator<Item = &'i (Lease, StageFailure)>,
+    failures: impl Iterator<Item = &'i LeasedFailure<K>>,
 ) -> Result<Option<Statement<FailedRow>>> {
-    script.add_over(FAIL, failures.map(json_of))
+    let items: Vec<Value> = failures.map(item).collect::<Result<_>>()?;
+    script.add_over(FAIL.of::<K>(), items.iter())
 }
 
 /// Adds the statements that store failures and attempts to a script.
-pub(crate) fn add_failure_records(
+pub(crate) fn add_failure_records<K: StoredKind>(
     script: &mut Script,
-    failed: &[(&(Lease, StageFailure), &FailedRow)],
+    failed: &[(&LeasedFailure<K>, &FailedRow)],
     deltas: &mut Deltas,
 ) -> Result<()> {
     if failed.is_empty() {
         return Ok(());
     }
-    let items = || failed.iter().map(|(item, _)| json_of(item));
-    script.execute_over(FAILURE, items())?;
-    script.execute_over(ATTEMPT, items())?;
-    script.execute_over(PRUNE, items())?;
-    script.bind(ATTEMPTS_KEPT);
-    let inputs = failed.iter().map(|(item, _)| (item.0.pair, &item.1.inputs));
-    add_inputs(script, inputs)?;
-    for ((lease, _), row) in failed {
+    let items = failed.iter().map(|(one, _)| item(one));
+    add_records::<K>(script, &items.collect::<Result<Vec<_>>>()?)?;
+    let inputs = failed.iter().map(|(item, _)| (item.0.unit, &item.1.inputs));
+    K::add_inputs(script, inputs)?;
+    for ((lease, failed), row) in failed {
+        failpoint::hit(failed.stage, Point::Recorded, None);
         deltas.move_job(lease.counter_key(), row.key);
     }
     Ok(())
+}
+
+/// Adds the statements that store failures, and attempts with those, to a script.
+pub(crate) fn add_records<K: StoredKind>(script: &mut Script, items: &[Value]) -> Result<()> {
+    for statement in [&FAILURE, &ATTEMPT] {
+        script.execute_over(statement.of::<K>(), items.iter())?;
+    }
+    script.execute_over(PRUNE.of::<K>(), items.iter())?;
+    script.bind(ATTEMPTS_KEPT);
+    Ok(())
+}
+
+/// Stores a failed stage of one job. Returns `false`, and stores nothing, if the lease was lost.
+pub(crate) async fn store<K: StoredKind>(
+    conn: &mut Conn,
+    failed: &LeasedFailure<K>,
+    deltas: &mut Deltas,
+) -> Result<bool> {
+    let mut script = Script::default();
+    let statement = add_failures(&mut script, [failed].into_iter())?;
+    let rows = script.run(conn).await?;
+    let rows = rows.read_if_any(statement.as_ref())?;
+    let Some(row) = row_of(&failed.0, &rows) else {
+        return Ok(false);
+    };
+    let mut script = Script::default();
+    add_failure_records(&mut script, &[(failed, row)], deltas)?;
+    script.run(conn).await?;
+    Ok(true)
 }
 
 const fn status(action: FailureAction) -> JobStatus {
@@ -104,18 +139,27 @@ const fn status(action: FailureAction) -> JobStatus {
     }
 }
 
-fn json_of((lease, failed): &(Lease, StageFailure)) -> Value {
+/// Builds an item of the statements of a failure.
+fn item<K: StoredKind>((lease, failed): &LeasedFailure<K>) -> Result<Value> {
     let run_at = match failed.action {
         FailureAction::BackOff { run_at } => Some(run_at),
         FailureAction::RetryExclusive | FailureAction::Quarantine => None,
     };
-    json!({
-        "pair": lease.pair.0, "worker": lease.worker.0, "token": lease.token, "stage": failed.stage.index(),
+    let fields = json!({
+        "unit": lease.id(), "worker": lease.worker.0, "token": lease.token, "stage": K::index(failed.stage),
         "status": status(failed.action).code(), "run_at": run_at,
         "exclusive": i64::from(failed.action == FailureAction::RetryExclusive),
-        "class": failed.failure.class, "message": failed.failure.message, "fingerprint": failed.fingerprint.0,
-        "mesh_hash": failed.inputs.mesh.as_ref().map(|seen| seen.hash),
-        "print_hash": failed.inputs.print.as_ref().map(|seen| seen.hash),
-        "attributes": failed.attributes, "ms": failed.ms, "at": failed.at, "alive_since": failed.alive_since,
-    })
+        "class": failed.failure.class, "message": failed.failure.message, "ms": failed.ms, "at": failed.at,
+        "alive_since": failed.alive_since,
+    });
+    let made_with = serde_json::to_value(K::provenance(&failed.made_with)?)?;
+    Ok(merged(fields, made_with))
+}
+
+/// Returns an object with the fields of two.
+pub(crate) fn merged(mut fields: Value, more: Value) -> Value {
+    if let (Value::Object(fields), Value::Object(more)) = (&mut fields, more) {
+        fields.extend(more);
+    }
+    fields
 }

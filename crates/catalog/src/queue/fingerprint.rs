@@ -9,8 +9,8 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
 use crate::db::value::Json;
-use crate::queue::lease::FingerprintId;
 use crate::queue::plan::FieldChange;
+use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
 

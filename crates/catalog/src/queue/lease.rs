@@ -2,45 +2,69 @@
 
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
-use crate::db::row::from_row;
-use crate::queue::counters::{CounterKey, cursor};
+use crate::db::row::{FromRow, Row, from_row};
+use crate::queue::counters::{CounterKey, Cursor};
+use crate::queue::kind::JobKind;
+use crate::queue::pair_job::PairJob;
+use crate::queue::provenance::FingerprintId;
+use crate::{CatalogError, Result};
 use mocban_core::domain::{
-    ArtifactSet, ContentHash, Failure, InputVersion, JobStatus, MetricOutcome, PairId, Stage,
-    UnixMillis, WorkerId,
+    ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, UnixMillis, WorkerId,
 };
 use mocban_system::failpoint;
 
-/// The right to run stages of one pair. A claim creates the lease, and a checkpoint continues it. Results and failures
-/// of stages are stored only under a valid lease.
+/// The right to run stages of one pair or block. A claim creates the lease, and a checkpoint continues it. Results and
+/// failures of stages are stored only under a valid lease.
 ///
 /// `token` is the fencing token. Each claim, recovery and repair increases the job's token, so a write under
 /// an older lease changes nothing.
-#[derive(Debug)]
-pub struct Lease {
-    pub(crate) pair: PairId,
+#[derive(Debug, PartialEq, Eq)]
+pub struct Lease<K: JobKind = PairJob> {
+    pub(crate) unit: K::Unit,
     pub(crate) worker: WorkerId,
     pub(crate) token: i64,
-    pub(crate) cursor: Stage,
-    /// Fingerprint of the result before the cursor.
+    pub(crate) cursor: K::Stage,
+    /// Fingerprint of the result before the cursor. `None` for a block.
     pub(crate) fingerprint: Option<FingerprintId>,
     pub(crate) attempt: u32,
     pub(crate) exclusive: bool,
-    /// Whether a stage was stored under this lease, which removed the pair's failure.
+    /// Whether a stage was stored under this lease, which removed the failure.
     pub(crate) cleared: bool,
 }
 
-from_row! { Lease { pair, worker, token, cursor: "stage", fingerprint, attempt, exclusive, cleared = false } }
+impl<K: JobKind> FromRow for Lease<K> {
+    fn from_row(row: &Row) -> Result<Self> {
+        let index: i64 = row.get("stage")?;
+        let cursor = usize::try_from(index).ok().and_then(K::stage);
+        let unknown = || CatalogError::Corrupt(format!("stage {index} is unknown"));
+        Ok(Self {
+            unit: K::unit(row.get("unit")?),
+            worker: row.get("worker")?,
+            token: row.get("token")?,
+            cursor: cursor.ok_or_else(unknown)?,
+            fingerprint: row.get("fingerprint")?,
+            attempt: row.get("attempt")?,
+            exclusive: row.get("exclusive")?,
+            cleared: false,
+        })
+    }
+}
 
 impl Lease {
     /// Returns the pair.
     pub const fn pair(&self) -> PairId {
-        self.pair
+        self.unit
+    }
+}
+
+impl<K: JobKind> Lease<K> {
+    /// Returns the row id of the pair or block.
+    pub fn id(&self) -> i64 {
+        K::id(self.unit)
     }
 
     /// Returns the next stage to run.
-    pub const fn cursor(&self) -> Stage {
+    pub const fn cursor(&self) -> K::Stage {
         self.cursor
     }
 
@@ -50,6 +74,7 @@ impl Lease {
     }
 
     /// Returns whether the pair must run exclusively, because it exceeded a resource limit or its worker died or hung.
+    /// Never true for a block.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
@@ -57,50 +82,51 @@ impl Lease {
     /// Returns the counter key of the leased job.
     pub(crate) fn counter_key(&self) -> CounterKey {
         let fingerprint = self.fingerprint.map(|FingerprintId(id)| id);
-        CounterKey::new(cursor(self.cursor), JobStatus::Leased, fingerprint)
+        CounterKey::new(position::<K>(self.cursor), JobStatus::Leased, fingerprint)
     }
 
     /// Returns whether a fenced statement changed the job under this lease.
     pub(crate) fn is_in(&self, rows: &[FencedRow]) -> bool {
+        let id = self.id();
         rows.iter()
-            .any(|row| (row.pair, row.token) == (self.pair.0, self.token))
+            .any(|row| (row.unit, row.token) == (id, self.token))
     }
+
+    /// Returns the lease after a checkpoint that ended with this stage, or `None` if the job is done.
+    pub(crate) fn after(&self, last: &StageCheckpoint<K>) -> Option<Self> {
+        Some(Self {
+            cursor: K::next(last.stage)?,
+            fingerprint: K::fingerprint(&last.made_with),
+            attempt: 1,
+            cleared: true,
+            ..*self
+        })
+    }
+}
+
+/// Returns the position of a job with this next stage.
+pub(crate) fn position<K: JobKind>(stage: K::Stage) -> Cursor {
+    K::index(stage) as Cursor
 }
 
 /// A job that was changed under a lease, with the token of that lease.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FencedRow {
-    pub(crate) pair: i64,
+    pub(crate) unit: i64,
     pub(crate) token: i64,
 }
 
-from_row! { FencedRow { pair, token } }
+from_row! { FencedRow { unit, token } }
 
 /// The state of a lease after a checkpoint.
-#[derive(Debug)]
-pub enum CheckpointOutcome {
+#[derive(Debug, PartialEq, Eq)]
+pub enum CheckpointOutcome<K: JobKind = PairJob> {
     /// Stored; the lease continues with the next stage.
-    Lease(Lease),
-    /// Stored; the pair is done.
+    Lease(Lease<K>),
+    /// Stored; the pair or block is done.
     Done,
     /// The lease was lost and nothing was stored.
     LeaseLost,
-}
-
-/// Versions of a pair's input files that its worker read. `None` for a file that was not read.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct InputVersions {
-    /// The mesh.
-    pub mesh: Option<InputVersion>,
-    /// The print.
-    pub print: Option<InputVersion>,
-}
-
-impl InputVersions {
-    /// Returns whether neither file was read.
-    pub(crate) const fn is_empty(&self) -> bool {
-        self.mesh.is_none() && self.print.is_none()
-    }
 }
 
 /// The scores of one metric with the hash that verdicts are bound to.
@@ -113,30 +139,22 @@ pub struct MetricResult {
 }
 
 /// A finished stage: everything that its checkpoint stores.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StageCheckpoint {
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageCheckpoint<K: JobKind = PairJob> {
     /// Which stage.
-    pub stage: Stage,
-    /// Fingerprint of its settings.
-    pub fingerprint: FingerprintId,
-    /// Hash of the mesh.
-    pub mesh_hash: ContentHash,
-    /// Hash of the print, for stages that read it.
-    pub print_hash: Option<ContentHash>,
-    /// The manifest attributes it depends on, as JSON.
-    pub attributes: String,
+    pub stage: K::Stage,
+    /// Settings, inputs and attributes that it was computed from.
+    pub made_with: K::Provenance,
     /// The outcome as JSON.
     pub outcome: String,
     /// Artifacts by role.
     pub files: ArtifactSet,
     /// Hash over outcome and files.
     pub result_hash: ContentHash,
-    /// Results of the metrics, for the last stage.
-    #[serde(skip)]
+    /// Results of the metrics, for the last stage of a pair.
     pub metrics: Vec<MetricResult>,
     /// Versions of all input files read so far. Empty if they have not changed since an earlier stage listed them.
-    #[serde(skip)]
-    pub inputs: InputVersions,
+    pub inputs: K::Inputs,
     /// Computing time in milliseconds.
     pub ms: u64,
     /// When it finished.
@@ -146,7 +164,6 @@ pub struct StageCheckpoint {
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
     /// When the write of its files began.
-    #[serde(skip)]
     pub written: Instant,
 }
 
@@ -167,27 +184,35 @@ pub enum FailureAction {
         /// When.
         run_at: UnixMillis,
     },
-    /// Retry at once, while no other pair runs.
+    /// Retry at once, while no other pair runs. Only for pairs.
     RetryExclusive,
-    /// No retry until a user requests one.
+    /// No retry until a user requests one, or the settings or inputs change.
     Quarantine,
+}
+
+impl FailureAction {
+    /// Returns the time until the next attempt in milliseconds: 0 if there is none, or if it does not wait.
+    pub const fn wait_ms(self, now: UnixMillis) -> u64 {
+        match self {
+            Self::BackOff { run_at } => (run_at - now).unsigned_abs(),
+            Self::RetryExclusive | Self::Quarantine => 0,
+        }
+    }
 }
 
 /// A failed stage.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageFailure {
+pub struct StageFailure<K: JobKind = PairJob> {
     /// Which stage.
-    pub stage: Stage,
+    pub stage: K::Stage,
     /// Class and message.
     pub failure: Failure,
     /// What happens to the job.
     pub action: FailureAction,
-    /// Fingerprint of its settings.
-    pub fingerprint: FingerprintId,
-    /// The manifest attributes it depends on, as JSON.
-    pub attributes: String,
-    /// Input files that were read.
-    pub inputs: InputVersions,
+    /// Settings, inputs and attributes of the attempt.
+    pub made_with: K::Provenance,
+    /// Versions of the input files that were read.
+    pub inputs: K::Inputs,
     /// Computing time in milliseconds, if anything was computed.
     pub ms: Option<u64>,
     /// When it failed.
@@ -195,7 +220,3 @@ pub struct StageFailure {
     /// If the worker's last heartbeat is before this time, the lease is void. The time is by the worker's own clock.
     pub alive_since: UnixMillis,
 }
-
-/// Row id of a fingerprint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-pub struct FingerprintId(pub i64);

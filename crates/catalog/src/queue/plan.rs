@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::queue::lease::FingerprintId;
+use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::{JobStatus, Stage};
 
 /// Why a pair has work to do.

@@ -5,15 +5,16 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use crate::blocks::recovery as blocks;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
-use crate::queue::checkpoint::{UPDATE_INPUTS, input_item};
 use crate::queue::counters::{Deltas, KeyedJob};
-use crate::queue::lease::InputVersions;
+use crate::queue::fail::{add_records, merged};
+use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::pair_job::{UPDATE_INPUTS, input_item};
+use crate::queue::provenance::InputVersions;
 use crate::queue::worker_lock;
 use crate::{Catalog, Result};
 use mocban_core::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
@@ -70,23 +71,26 @@ const STILL_SILENT: &str = "
 SELECT w.id FROM json_each(?1) AS seen CROSS JOIN worker AS w ON w.id = CAST(seen.value ->> 0 AS bigint)
 WHERE w.heartbeat = CAST(seen.value ->> 1 AS bigint)";
 
-/// Selects the given workers that hold leases. `died` is 1 if the worker did not end properly.
+/// Selects the given workers that hold leases, of pairs or blocks. `died` is 1 if the worker did not end properly.
 pub(crate) const LEFT_BY: &str = "
-SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
-FROM job AS j JOIN worker AS w ON w.id = j.worker
-WHERE j.status = 1 AND j.worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) GROUP BY w.id";
+SELECT w.id, w.ended IS NULL AS died, count(*) AS leases FROM (
+        SELECT worker FROM job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
+        UNION ALL
+        SELECT worker FROM block_job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))) AS lease
+    JOIN worker AS w ON w.id = lease.worker
+GROUP BY w.id";
 
 /// Recovers the leases of the workers in `?1`, a list of `[worker, died, blamed]`. `blamed` is 1 if the worker died with
-/// only one lease, so that this pair is blamed. The interrupted attempt is not counted. Pairs of a worker that died must
-/// run exclusively from now on. The condition for status 4 (quarantined) is that of `domain::is_poisoned`.
-pub(crate) const RECOVER: &str = "
-UPDATE job SET
-    status = CASE WHEN CAST(item.value ->> 2 AS bigint) = 1
-        AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2) THEN 4 ELSE 0 END,
-    worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + CAST(item.value ->> 2 AS bigint),
-    attempt = max(attempt - 1, 0), exclusive = max(exclusive, CAST(item.value ->> 1 AS bigint))
-FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = CAST(item.value ->> 0 AS bigint)
-RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
+/// only one lease, so that this pair or block is blamed. The interrupted attempt is not counted. Pairs of a worker that
+/// died must run exclusively from now on. The condition for status 4 (quarantined) is that of `domain::is_poisoned`.
+pub(crate) static RECOVER: Template = Template::new(
+    "
+UPDATE {job} SET
+    status = CASE WHEN [2] = 1 AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2) THEN 4 ELSE 0 END,
+    worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + [2], attempt = max(attempt - 1, 0){and_recover}
+FROM json_each(?1) AS item WHERE {job}.status = 1 AND {job}.worker = [0]
+RETURNING {unit} AS unit, stage, status, crashes, coalesce({fingerprint}, 0) AS fingerprint",
+);
 
 /// Marks workers as dead, unless they ended properly.
 const DIED: &str = "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
@@ -100,34 +104,23 @@ const DEATHS: &str = "
 SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) AS newest
 WHERE died = 1 AND ended IS NULL";
 
-/// Selects the leased pairs of the given workers.
-pub(crate) const AFFECTED_PAIRS: &str = "
-SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
+/// Selects the leased jobs of the given workers.
+pub(crate) static AFFECTED: Template = Template::new(
+    "
+SELECT {unit} AS unit, worker FROM {job}
+WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))",
+);
 
 /// Recovers overdue leases of workers that are not known to be dead. A lease is overdue if the worker's last heartbeat
 /// is more than `?3` after the deadline. Both times are by the worker's own clock.
-pub(crate) const OVERDUE: &str = "
-UPDATE job SET status = CASE WHEN crashes + 1 >= ?2 THEN 4 ELSE 0 END, worker = NULL, deadline = NULL,
-    token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
+pub(crate) static OVERDUE: Template = Template::new(
+    "
+UPDATE {job} SET status = CASE WHEN crashes + 1 >= ?2 THEN 4 ELSE 0 END, worker = NULL, deadline = NULL,
+    token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0){and_overdue}
 WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-    AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
-RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
-
-/// Stores the failure of a quarantined pair, with its worker's settings and the inputs as last read.
-const CRASHED: &str = "
-INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
-SELECT p.id, CAST(item.value ->> 'stage' AS bigint), item.value ->> 'class', item.value ->> 'message',
-    CAST(w.fingerprints ->> CAST(item.value ->> 'stage' AS bigint) AS bigint), p.mesh_hash, p.print_hash, p.attributes, CAST(item.value ->> 'at' AS bigint)
-FROM json_each(?1) AS item CROSS JOIN pair AS p ON p.id = CAST(item.value ->> 'pair' AS bigint)
-    LEFT JOIN worker AS w ON w.id = CAST(item.value ->> 'worker' AS bigint)
-WHERE true
-ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
-    fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
-    attributes = excluded.attributes, at = excluded.at";
-
-const CRASH_ATTEMPT: &str = "
-INSERT INTO attempt (pair, stage, worker, class, message, at)
-SELECT CAST(value ->> 'pair' AS bigint), CAST(value ->> 'stage' AS bigint), CAST(value ->> 'worker' AS bigint), value ->> 'class', value ->> 'message', CAST(value ->> 'at' AS bigint) FROM json_each(?1)";
+    AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = {job}.worker)
+RETURNING {unit} AS unit, stage, status, crashes, coalesce({fingerprint}, 0) AS fingerprint",
+);
 
 const FATAL_INPUTS: &str = "
 UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 'mesh_hash')),
@@ -141,6 +134,15 @@ struct RecoveredJob {
 }
 
 from_row! { RecoveredJob { job in row, crashes } }
+
+/// Recovered jobs of a kind.
+#[derive(Debug)]
+pub(crate) struct RecoveredJobs<K: JobKind> {
+    /// Number of jobs that are ready again.
+    pub(crate) ready: u64,
+    /// Those that killed too many workers and are now quarantined.
+    pub(crate) poisoned: Vec<K::Unit>,
+}
 
 impl Catalog {
     /// Returns the workers that hold leases.
@@ -158,36 +160,6 @@ impl Catalog {
             }
         }
         Ok(holders)
-    }
-
-    /// Recovers the leases of dead workers. Each pair becomes ready again, or is quarantined if it probably caused
-    /// several deaths.
-    ///
-    /// A pair is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned` returns true,
-    /// which also considers other recent deaths. Therefore, killing processes from outside rarely quarantines a pair.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let workers = mark_dead(conn, &dead).await?;
-                let affected = affected_pairs(conn, &workers).await?;
-                let items = left_by(conn, &workers).await?;
-                let deaths: i64 = query_scalar(DEATHS).fetch_one(&mut *conn).await?;
-                // Before the pairs: a block is blamed only if its worker holds no pair.
-                let most = u32::try_from(deaths).unwrap_or(u32::MAX);
-                let blocks = blocks::recover(conn, &workers, most, now).await?;
-                let query = query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
-                let found = query.bind(deaths).fetch_all(&mut *conn).await?;
-                let recovered = count_recovered(conn, found, &affected, now).await?;
-                Ok(Recovered {
-                    blocks,
-                    ..recovered
-                })
-            })
-        })
-        .await
     }
 
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
@@ -211,44 +183,41 @@ impl Catalog {
         })
         .await
     }
-
-    /// Recovers overdue leases of other workers that are not known to be dead. A lease is overdue if its worker's last
-    /// heartbeat is more than `margin_ms` after the deadline. This is rare, because processes enforce their own
-    /// deadlines.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
-    pub async fn recover_overdue(
-        &self,
-        me: WorkerId,
-        margin_ms: i64,
-        now: UnixMillis,
-    ) -> Result<Recovered> {
-        self.in_transaction(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
-            .await
-    }
 }
 
-async fn overdue(
+/// Recovers the jobs of dead workers, given as a JSON array and as the items of [`left_by`].
+pub(crate) async fn recover<K: StoredKind>(
     conn: &mut Conn,
-    me: WorkerId,
+    [workers, items]: [&str; 2],
+    deaths: i64,
+    now: UnixMillis,
+) -> Result<RecoveredJobs<K>> {
+    let affected = affected::<K>(conn, workers).await?;
+    let query = query_as(RECOVER.of::<K>()).bind(items).bind(CRASH_LIMIT);
+    let found = query.bind(deaths).fetch_all(&mut *conn).await?;
+    store_recovered(conn, found, &affected, now).await
+}
+
+/// Recovers the overdue jobs of living workers, given as a JSON array.
+pub(crate) async fn recover_overdue<K: StoredKind>(
+    conn: &mut Conn,
+    workers: &str,
     margin_ms: i64,
     now: UnixMillis,
-) -> Result<Recovered> {
-    let others = holders_but(conn, me).await?;
-    let affected = affected_pairs(conn, &others).await?;
-    let blocks = blocks::recover_overdue(conn, &others, margin_ms, now).await?;
-    let query = query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
+) -> Result<RecoveredJobs<K>> {
+    let affected = affected::<K>(conn, workers).await?;
+    let query = query_as(OVERDUE.of::<K>()).bind(workers).bind(CRASH_LIMIT);
     let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
-    let recovered = count_recovered(conn, found, &affected, now).await?;
-    Ok(Recovered {
-        blocks,
-        ..recovered
-    })
+    store_recovered(conn, found, &affected, now).await
+}
+
+/// Counts the recent deaths of workers.
+pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
+    query_scalar(DEATHS).fetch_one(conn).await
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
-async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
+pub(crate) async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
     let query = query_as(LEFT_BY).bind(workers);
     let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
@@ -259,7 +228,7 @@ async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
 }
 
 /// Marks workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
-async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
+pub(crate) async fn mark_dead(conn: &mut Conn, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Observed {
             workers,
@@ -311,50 +280,62 @@ async fn still_dead(conn: &mut Conn, seen: &[LeaseHolder]) -> Result<Vec<WorkerI
 }
 
 /// Returns the workers with leases except one, as a JSON array.
-async fn holders_but(conn: &mut Conn, me: WorkerId) -> Result<String> {
+pub(crate) async fn holders_but(conn: &mut Conn, me: WorkerId) -> Result<String> {
     let holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(conn).await?;
     let others = holders.iter().map(|holder| holder.worker);
     let others = others.filter(|worker| *worker != me);
     Ok(json_array(others.map(|worker| worker.0)))
 }
 
-/// Returns the leased pairs of some workers, each with its worker.
-async fn affected_pairs(conn: &mut Conn, workers: &str) -> Result<BTreeMap<i64, i64>> {
-    let query = query_as(AFFECTED_PAIRS).bind(workers);
-    let found: Vec<(i64, i64)> = query.fetch_all(conn).await?;
+/// Returns the leased jobs of some workers, each with its worker.
+async fn affected<K: StoredKind>(
+    conn: &mut Conn,
+    workers: &str,
+) -> Result<BTreeMap<i64, WorkerId>> {
+    let query = query_as(AFFECTED.of::<K>()).bind(workers);
+    let found: Vec<(i64, WorkerId)> = query.fetch_all(conn).await?;
     Ok(found.into_iter().collect())
 }
 
-/// Updates the counters for recovered pairs, and stores a failure for each quarantined pair.
-async fn count_recovered(
+/// Updates the counters for recovered pairs, and stores a failure for each quarantined job.
+async fn store_recovered<K: StoredKind>(
     conn: &mut Conn,
     found: Vec<RecoveredJob>,
-    affected: &BTreeMap<i64, i64>,
+    affected: &BTreeMap<i64, WorkerId>,
     now: UnixMillis,
-) -> Result<Recovered> {
-    let mut recovered = Recovered::default();
+) -> Result<RecoveredJobs<K>> {
+    let mut recovered = RecoveredJobs {
+        ready: 0,
+        poisoned: Vec::new(),
+    };
     let mut deltas = Deltas::default();
     let mut crashed = Vec::new();
     for RecoveredJob { job, crashes } in found {
-        let KeyedJob { pair, key } = job;
+        let KeyedJob { unit: id, key } = job;
         deltas.move_job(key.with_status(JobStatus::Leased), key);
-        match key.stage() {
+        let stage = usize::try_from(key.cursor).ok().and_then(K::stage);
+        match stage {
             Some(stage) if key.status == JobStatus::Quarantined => {
-                recovered.poisoned.push(PairId(pair));
-                crashed.push(json!({
-                    "pair": pair, "worker": affected.get(&pair), "stage": key.cursor, "class": FailureClass::Resource,
+                let (unit, worker) = (K::unit(id), affected.get(&id).copied());
+                recovered.poisoned.push(unit);
+                let fields = json!({
+                    "unit": id, "worker": worker, "stage": key.cursor, "class": FailureClass::Resource,
                     "message": format!("{crashes} workers died or hung over it at {stage}"), "at": now,
-                }));
+                    "status": key.status.code(),
+                });
+                let made_with = K::crashed(conn, unit, stage, worker).await?;
+                crashed.push(merged(fields, made_with));
             }
             _ => recovered.ready += 1,
         }
     }
+    let mut script = Script::default();
     if !crashed.is_empty() {
-        let items = json_array(crashed);
-        for sql in [CRASHED, CRASH_ATTEMPT] {
-            query(sql).bind(&items).execute(&mut *conn).await?;
-        }
+        add_records::<K>(&mut script, &crashed)?;
     }
-    deltas.apply(conn).await?;
+    if K::IS_COUNTED {
+        deltas.add_to(&mut script)?;
+    }
+    script.run(conn).await?;
     Ok(recovered)
 }

@@ -4,64 +4,69 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::db::conn::Conn;
+use crate::db::conn::{Conn, Work};
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
-use crate::db::write_connection::Work;
-use crate::queue::counters::{CounterKey, Deltas, KeyedJob};
+use crate::queue::counters::{CounterKey, Cursor, Deltas, KeyedJob, cursor};
 use crate::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
-use crate::queue::fragments::fingerprint_before;
+use crate::queue::kind::{JobKind, StoredKind, Template};
+use crate::queue::pair_job::PairJob;
 use crate::queue::plan::StaleReason;
-use crate::queue::selection::{PairSelection, select, unknown_names};
+use crate::queue::selection::{PairSelection, unknown_names};
 use crate::queue::staleness::{
     PAGE, RerunPolicy, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
 };
 use crate::{Catalog, CatalogError, Result};
-use mocban_core::domain::{FailureClass, JobStatus, PairName, Stage};
+use mocban_core::domain::{FailureClass, JobStatus, Stage};
 
-/// Which failed pairs to requeue.
+/// Which failed pairs or blocks to requeue.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RetrySelection {
-    /// These pairs, if they failed or back off.
-    Names(Vec<PairName>),
-    /// All pairs that failed or back off with this class.
+pub enum RetrySelection<K: JobKind = PairJob> {
+    /// These, if they failed or back off.
+    Names(Vec<K::Name>),
+    /// All that failed or back off with this class.
     Class(FailureClass),
-    /// All pairs that failed or back off.
+    /// All that failed or back off.
     All,
 }
 
 /// Resets jobs to a stage, with no attempts or crashes. Skips leased jobs.
-pub(crate) const REQUEUE: &str = concat!(
+pub(crate) static REQUEUE: Template = Template::new(
     "
-UPDATE job SET stage = CAST(item.value ->> 1 AS bigint), status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
-    exclusive = 0, fingerprint = ",
-    fingerprint_before!("(CAST(item.value ->> 1 AS bigint))"),
-    "
-FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint) AND job.status <> 1
-RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
+UPDATE {job} SET stage = [1], status = 0, run_at = NULL, attempt = 0, crashes = 0{and_requeue}
+FROM json_each(?1) AS item WHERE {job}.{unit} = [0] AND {job}.status <> 1
+RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
-/// Locks jobs in PostgreSQL, always in the order of pairs.
-const LOCK_JOBS: &str = "
-SELECT pair, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE";
+/// Locks jobs in PostgreSQL, always in the order of ids.
+static LOCK_JOBS: Template = Template::new(
+    "
+SELECT {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint FROM {job}
+WHERE {unit} IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY {unit} FOR UPDATE",
+);
 
 /// Selects one page of the clean jobs with one stage, status and fingerprint, sorted by pair.
 pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
 
-pub(crate) const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1))";
+pub(crate) static CLEAR_FAILURES: Template =
+    Template::new("DELETE FROM {failure} WHERE {unit} IN (SELECT [0] FROM json_each(?1) AS item)");
 
 /// Selects the jobs that failed or back off, of one failure class or of all.
-const FAILED_JOBS: &str = "
-SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint FROM job AS j JOIN failure AS f ON f.pair = j.pair
-WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
+static FAILED_JOBS: Template = Template::new(
+    "
+SELECT j.{unit} AS unit, j.stage, j.status, coalesce({fingerprint}, 0) AS fingerprint FROM {job} AS j
+WHERE j.status IN (2, 4)
+    AND (?1 IS NULL OR EXISTS (SELECT 1 FROM {failure} AS f WHERE f.{unit} = j.{unit} AND f.class = ?1))",
+);
 
-const FAILED_AMONG: &str = "
-SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
-FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint) WHERE j.status IN (2, 4)";
+static FAILED_NAMED: Template = Template::new(
+    "
+SELECT j.{unit} AS unit, j.stage, j.status, coalesce({fingerprint}, 0) AS fingerprint
+FROM {unit} AS named CROSS JOIN {job} AS j ON j.{unit} = named.id
+WHERE named.name IN (SELECT atom FROM json_each(?1)) AND j.status IN (2, 4) ORDER BY j.{unit}",
+);
 
 impl Catalog {
     /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers
@@ -137,13 +142,40 @@ impl Catalog {
     }
 }
 
-/// Requeues the selected pairs that failed or back off at the stage that failed, and returns their number.
+/// Requeues the selected pairs that failed or back off, and returns their number.
+///
+/// # Errors
+/// Returns an error if a named pair does not exist, or if a database operation fails.
 pub(crate) async fn retry_pairs(conn: &mut Conn, selection: &RetrySelection) -> Result<u64> {
-    let failed = failed_jobs(conn, selection).await?;
-    let same_stage = failed
-        .iter()
-        .filter_map(|job| Some((*job, job.key.stage()?)));
-    requeue(conn, &same_stage.collect::<Vec<_>>()).await
+    if let RetrySelection::Names(names) = selection
+        && let Some(unknown) = unknown_names(conn, names).await?.into_iter().next()
+    {
+        return Err(CatalogError::UnknownPair(unknown));
+    }
+    let mut deltas = Deltas::default();
+    let retried = retry(conn, selection, &mut deltas).await?;
+    deltas.apply(conn).await?;
+    Ok(retried)
+}
+
+/// Requeues the selected jobs that failed or back off at the stage that failed, and returns their number. Unknown names are
+/// left out.
+pub(crate) async fn retry<K: StoredKind>(
+    conn: &mut Conn,
+    selection: &RetrySelection<K>,
+    deltas: &mut Deltas,
+) -> Result<u64> {
+    let failed = match selection {
+        RetrySelection::All => query_as(FAILED_JOBS.of::<K>()).bind(None::<&str>),
+        RetrySelection::Class(class) => query_as(FAILED_JOBS.of::<K>()).bind(class.name()),
+        RetrySelection::Names(names) => {
+            let names = json_array(names.iter().map(K::text));
+            query_as(FAILED_NAMED.of::<K>()).bind(names)
+        }
+    };
+    let failed: Vec<KeyedJob> = failed.fetch_all(&mut *conn).await?;
+    let same_stage = failed.iter().map(|job| (*job, job.key.cursor));
+    requeue::<K>(conn, &same_stage.collect::<Vec<_>>(), deltas).await
 }
 
 /// Returns an error unless the groups contain all jobs. A wrong counter could hide stale jobs.
@@ -184,8 +216,10 @@ async fn requeue_group(
         .bind(PAGE as i64)
         .fetch_all(&mut *conn)
         .await?;
-    let jobs = pairs.iter().map(|pair| (KeyedJob { pair: *pair, key }, to));
-    let moved = requeue(conn, &jobs.collect::<Vec<_>>()).await?;
+    let jobs = pairs
+        .iter()
+        .map(|pair| (KeyedJob { unit: *pair, key }, cursor(to)));
+    let moved = requeue_counted(conn, &jobs.collect::<Vec<_>>()).await?;
     Ok((moved, pairs.last().copied()))
 }
 
@@ -209,65 +243,62 @@ async fn requeue_inspected(
     };
     let stale = jobs.into_iter().filter_map(|(pair, job)| {
         let to = target(&job, policy)?;
-        Some((KeyedJob { pair, key: job.key }, to))
+        let key = job.key;
+        Some((KeyedJob { unit: pair, key }, cursor(to)))
     });
-    let moved = requeue(conn, &stale.collect::<Vec<_>>()).await?;
+    let moved = requeue_counted(conn, &stale.collect::<Vec<_>>()).await?;
     if let (None, Some(last)) = (among, last) {
         clear_dirty(conn, after, last).await?;
     }
     Ok((moved, last))
 }
 
-async fn failed_jobs(conn: &mut Conn, selection: &RetrySelection) -> Result<Vec<KeyedJob>> {
-    let query = match selection {
-        RetrySelection::All => query_as(FAILED_JOBS).bind(None::<&str>),
-        RetrySelection::Class(class) => query_as(FAILED_JOBS).bind(class.name()),
-        RetrySelection::Names(names) => {
-            if let Some(unknown) = unknown_names(conn, names).await?.into_iter().next() {
-                return Err(CatalogError::UnknownPair(unknown));
-            }
-            query_as(FAILED_AMONG).bind(select(conn, names).await?.json)
-        }
-    };
-    query.fetch_all(conn).await
-}
-
 /// Returns the jobs whose key is still the given one, and locks them until the end of the transaction. In SQLite, no job
 /// changes during a transaction.
-async fn unchanged(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<Vec<(KeyedJob, Stage)>> {
+async fn unchanged<K: StoredKind>(
+    conn: &mut Conn,
+    jobs: &[(KeyedJob, Cursor)],
+) -> Result<Vec<(KeyedJob, Cursor)>> {
     if matches!(conn, Conn::Sqlite(_)) {
         return Ok(jobs.to_vec());
     }
-    let pairs = json_array(jobs.iter().map(|(job, _)| job.pair));
-    let locked: Vec<KeyedJob> = query_as(LOCK_JOBS).bind(pairs).fetch_all(conn).await?;
-    let locked: BTreeMap<i64, CounterKey> = locked.iter().map(|job| (job.pair, job.key)).collect();
+    let units = json_array(jobs.iter().map(|(job, _)| job.unit));
+    let locked = query_as(LOCK_JOBS.of::<K>()).bind(units);
+    let locked: Vec<KeyedJob> = locked.fetch_all(conn).await?;
+    let locked: BTreeMap<i64, CounterKey> = locked.iter().map(|job| (job.unit, job.key)).collect();
     let mut unchanged = jobs.to_vec();
-    unchanged.retain(|(job, _)| locked.get(&job.pair) == Some(&job.key));
+    unchanged.retain(|(job, _)| locked.get(&job.unit) == Some(&job.key));
     Ok(unchanged)
 }
 
+/// Requeues jobs of pairs, and counts them.
+async fn requeue_counted(conn: &mut Conn, jobs: &[(KeyedJob, Cursor)]) -> Result<u64> {
+    let mut deltas = Deltas::default();
+    let moved = requeue::<PairJob>(conn, jobs, &mut deltas).await?;
+    deltas.apply(conn).await?;
+    Ok(moved)
+}
+
 /// Resets each job to the given stage, except leased jobs. Returns the number of changed jobs.
-async fn requeue(conn: &mut Conn, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
+pub(crate) async fn requeue<K: StoredKind>(
+    conn: &mut Conn,
+    jobs: &[(KeyedJob, Cursor)],
+    deltas: &mut Deltas,
+) -> Result<u64> {
     if jobs.is_empty() {
         return Ok(0);
     }
-    let unchanged = unchanged(conn, jobs).await?;
-    let items = json_array(
-        unchanged
-            .iter()
-            .map(|(job, to)| json!([job.pair, to.index()])),
-    );
-    let moved = query_as(REQUEUE).bind(&items);
+    let unchanged = unchanged::<K>(conn, jobs).await?;
+    let items = json_array(unchanged.iter().map(|(job, to)| json!([job.unit, to])));
+    let moved = query_as(REQUEUE.of::<K>()).bind(&items);
     let moved: Vec<KeyedJob> = moved.fetch_all(&mut *conn).await?;
-    let clear = query(CLEAR_FAILURES).bind(&items);
-    clear.execute(&mut *conn).await?;
-    let from: BTreeMap<i64, CounterKey> = jobs.iter().map(|(job, _)| (job.pair, job.key)).collect();
-    let mut deltas = Deltas::default();
+    let clear = query(CLEAR_FAILURES.of::<K>()).bind(&items);
+    clear.execute(conn).await?;
+    let from: BTreeMap<i64, CounterKey> = jobs.iter().map(|(job, _)| (job.unit, job.key)).collect();
     for job in &moved {
-        if let Some(from) = from.get(&job.pair) {
+        if let Some(from) = from.get(&job.unit) {
             deltas.move_job(*from, job.key);
         }
     }
-    deltas.apply(conn).await?;
     Ok(moved.len() as u64)
 }

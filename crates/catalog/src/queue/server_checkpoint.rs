@@ -13,7 +13,7 @@ use crate::db::query::limited;
 use crate::db::row::{FromRow as _, Row};
 use crate::queue::checkpoint::{AdvancedJob, LeasedCheckpoints};
 use crate::queue::lease::{FencedRow, MetricResult, StageCheckpoint};
-use mocban_core::domain::InputVersion;
+use mocban_core::domain::{ContentHash, InputVersion};
 use mocban_system::failpoint::{self, Point};
 
 column_arrays! {
@@ -56,7 +56,7 @@ column_arrays! {
     stage: "bigint" = i64,
     worker: "bigint" = i64,
     fingerprint: "bigint" = i64,
-    mesh_hash: "bytea" = &'i [u8],
+    mesh_hash: "bytea" = Option<&'i [u8]>,
     print_hash: "bytea" = Option<&'i [u8]>,
     attributes: "text" = &'i str,
     outcome: "text" = &'i str,
@@ -175,7 +175,7 @@ counted AS (
         (a.stage, 1, a.counted_fingerprint, -1), (a.next, a.status, a.fingerprint, 1)) AS moved (stage, status, fingerprint, n)
     GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
     ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
-SELECT pair, token FROM advanced",
+SELECT pair AS unit, token FROM advanced",
         jobs = jobs.rows(),
         results = results.rows(),
         result_columns = result_columns.join(", "),
@@ -270,7 +270,7 @@ async fn store_with(
             results.push(result_row(position, job, one, is_last)?);
             let metrics_of_last = one.metrics.iter().filter(|_| is_last);
             for metric in metrics_of_last {
-                metrics.push(metric_row(position, lease.pair.0, metric)?);
+                metrics.push(metric_row(position, lease.unit.0, metric)?);
             }
         }
     }
@@ -303,7 +303,7 @@ fn job_row<'i>(
     let hash = |version: &'i InputVersion| version.hash.as_bytes().as_slice();
     JobRow {
         position,
-        pair: job.pair,
+        pair: job.unit,
         worker: job.worker,
         token: job.token,
         stage: job.stage,
@@ -331,16 +331,15 @@ fn result_row(
     one: &StageCheckpoint,
     is_last: bool,
 ) -> Result<ResultRow<'_>> {
-    let print_hash = one.print_hash.as_ref();
     Ok(ResultRow {
         position,
-        pair: job.pair,
+        pair: job.unit,
         stage: one.stage.index() as i64,
         worker: job.worker,
-        fingerprint: one.fingerprint.0,
-        mesh_hash: one.mesh_hash.as_bytes(),
-        print_hash: print_hash.map(|hash| hash.as_bytes().as_slice()),
-        attributes: &one.attributes,
+        fingerprint: one.made_with.fingerprint.0,
+        mesh_hash: bytes(one.made_with.mesh_hash.as_ref()),
+        print_hash: bytes(one.made_with.print_hash.as_ref()),
+        attributes: &one.made_with.attributes,
         outcome: &one.outcome,
         files: serde_json::to_string(&one.files)?,
         result_hash: one.result_hash.as_bytes(),
@@ -348,6 +347,10 @@ fn result_row(
         at: one.at,
         is_last,
     })
+}
+
+fn bytes(hash: Option<&ContentHash>) -> Option<&[u8]> {
+    hash.map(|hash| hash.as_bytes().as_slice())
 }
 
 fn metric_row(position: i64, pair: i64, result: &MetricResult) -> Result<MetricRow<'_>> {

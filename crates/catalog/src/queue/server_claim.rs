@@ -1,4 +1,4 @@
-//! Claims in PostgreSQL. One statement leases pairs and counts them, so a claim takes one round trip and commits by
+//! Claims in PostgreSQL, of pairs and blocks. One statement leases them and counts pairs, so a claim takes one round trip and commits by
 //! itself.
 
 use crate::db::conn::Conn;
@@ -6,19 +6,22 @@ use crate::db::error::Result;
 use crate::db::query::query_as;
 use crate::queue::claim::{ClaimRequest, in_order, order};
 use crate::queue::counters::{Cursor, cursor};
-use crate::queue::lease::Lease;
+use crate::queue::kind::{StoredKind, Template};
+use crate::queue::lease::{Lease, position};
+#[cfg(test)]
+use crate::queue::pair_job::PairJob;
 
 /// Builds the text that selects ready jobs from the tables, a condition and a limit. It skips jobs that another process
 /// is about to lease.
 macro_rules! ready {
     ($from:expr, $condition:literal, $limit:literal) => {
         concat!(
-            "SELECT j.pair FROM ",
+            "SELECT j.{unit} FROM ",
             $from,
             " WHERE j.status = 0 AND j.stage <= ?4",
             $condition,
             "
-        ORDER BY j.prio, j.turn DESC, j.pair LIMIT ",
+        ORDER BY {prio}j.{turn} DESC, j.{unit} LIMIT ",
             $limit,
             " FOR UPDATE OF j SKIP LOCKED"
         )
@@ -28,7 +31,7 @@ macro_rules! ready {
 /// The tables of a claim that leases only the pairs `?6`.
 macro_rules! among {
     () => {
-        "json_each(?6) AS wanted JOIN job AS j ON j.pair = CAST(wanted.atom AS bigint)"
+        "json_each(?6) AS wanted JOIN {job} AS j ON j.{unit} = CAST(wanted.atom AS bigint)"
     };
 }
 
@@ -36,56 +39,51 @@ macro_rules! among {
 /// leases on the same host do. A worker whose settings are not those of the last plan gets nothing.
 macro_rules! claim {
     ($excluded_by:literal, $($ready:tt)*) => {
-        concat!(
+        Template::new(concat!(
             "
 WITH claimed AS (
-    UPDATE job SET status = 1, worker = ?1, deadline = ?2, token = job.token + 1, attempt = job.attempt + 1
+    UPDATE {job} SET status = 1, worker = ?1, deadline = ?2, token = {job}.token + 1, attempt = {job}.attempt + 1
     FROM worker AS me
-    WHERE job.pair = ANY (ARRAY(
+    WHERE {job}.{unit} = ANY (ARRAY(
         ",
             $($ready)*,
             "))
         AND me.id = ?1 AND me.ended IS NULL AND me.heartbeat >= ?3
-        AND coalesce((SELECT fingerprints = me.fingerprints FROM run_settings), true)
+        AND coalesce((SELECT {settings} = me.{settings} FROM run_settings), true)
         AND NOT EXISTS (
             SELECT 1 FROM job AS other JOIN worker AS its ON its.id = other.worker
             WHERE other.status = 1 AND its.host = me.host",
             $excluded_by,
             ")
-    RETURNING job.pair, job.worker, job.token, job.stage, job.fingerprint, job.attempt, job.exclusive),
-counted AS (
-    INSERT INTO counter_part (stage, status, fingerprint, n)
-    SELECT c.stage, moved.status, coalesce(c.fingerprint, 0), sum(moved.n)
-    FROM claimed AS c, (VALUES (0, -1), (1, 1)) AS moved (status, n)
-    GROUP BY 1, 2, 3 ORDER BY 1, 2, 3
-    ON CONFLICT (slot, stage, status, fingerprint) DO UPDATE SET n = counter_part.n + excluded.n)
+    RETURNING {job}.{unit} AS unit, {job}.worker, {job}.token, {job}.stage, {fingerprint} AS fingerprint, {job}.attempt,
+        {exclusive} AS exclusive){and_count_claimed}
 SELECT * FROM claimed"
-        )
+        ))
     };
 }
 
 /// Leases the first ready jobs in the order of the index `job_ready`.
-const CLAIM: &str = claim!(
+static CLAIM: Template = claim!(
     " AND other.exclusive = 1",
-    ready!("job AS j", " AND j.exclusive = 0", "?5")
+    ready!("{job} AS j", " AND {exclusive} = 0", "?5")
 );
 
 /// Leases the first ready job that must run exclusively.
-const CLAIM_EXCLUSIVE: &str = claim!("", ready!("job AS j", " AND j.exclusive = 1", "?5"));
+static CLAIM_EXCLUSIVE: Template = claim!("", ready!("{job} AS j", " AND {exclusive} = 1", "?5"));
 
 /// Like [`CLAIM`], but leases only the pairs `?6`.
-const CLAIM_AMONG: &str = claim!(
+static CLAIM_AMONG: Template = claim!(
     " AND other.exclusive = 1",
-    ready!(among!(), " AND j.exclusive = 0", "?5")
+    ready!(among!(), " AND {exclusive} = 0", "?5")
 );
 
 /// Like [`CLAIM_EXCLUSIVE`], but leases only one of the pairs `?6`.
-const CLAIM_AMONG_EXCLUSIVE: &str = claim!("", ready!(among!(), " AND j.exclusive = 1", "?5"));
+static CLAIM_AMONG_EXCLUSIVE: Template = claim!("", ready!(among!(), " AND {exclusive} = 1", "?5"));
 
 /// Like [`CLAIM`], but leases jobs with the turn `?6` behind the pair `?7` first, and others only if there are too few
 /// and the limit `?8` permits it. The two conditions on `turn` are an equality that the planner does not recognize. With
 /// a plain one, it may read the primary key, which is in the same order but contains all jobs.
-const CLAIM_BEHIND: &str = claim!(
+static CLAIM_BEHIND: Template = claim!(
     " AND other.exclusive = 1",
     "WITH behind AS MATERIALIZED (
         ",
@@ -105,19 +103,24 @@ const CLAIM_BEHIND: &str = claim!(
         SELECT pair FROM behind UNION ALL SELECT pair FROM anywhere"
 );
 
-/// The statements of claims.
+/// Returns the statements of claims.
 #[cfg(test)]
-pub(crate) const TEXTS: [&str; 5] = [
-    CLAIM,
-    CLAIM_AMONG,
-    CLAIM_BEHIND,
-    CLAIM_EXCLUSIVE,
-    CLAIM_AMONG_EXCLUSIVE,
-];
+pub(crate) fn texts() -> [String; 5] {
+    [
+        &CLAIM,
+        &CLAIM_AMONG,
+        &CLAIM_BEHIND,
+        &CLAIM_EXCLUSIVE,
+        &CLAIM_AMONG_EXCLUSIVE,
+    ]
+    .map(|text| text.of::<PairJob>().postgres_query())
+}
 
-/// The statements that read the leases of the host.
+/// Returns the statements that read the leases of the host.
 #[cfg(test)]
-pub(crate) const EXCLUSIVE: [&str; 2] = [CLAIM_EXCLUSIVE, CLAIM_AMONG_EXCLUSIVE];
+pub(crate) fn exclusive_texts() -> [String; 2] {
+    [&CLAIM_EXCLUSIVE, &CLAIM_AMONG_EXCLUSIVE].map(|text| text.of::<PairJob>().postgres_query())
+}
 
 /// Where a claim on a server begins: behind this pair among those with the same next stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,47 +137,47 @@ impl Behind {
     pub(crate) const fn pair_of(lease: &Lease) -> Self {
         Self {
             turn: cursor(lease.cursor),
-            pair: lease.pair.0,
+            pair: lease.unit.0,
             or_anywhere: true,
         }
     }
 
     /// Returns whether a leased pair is behind this one and has the same next stage.
     pub(crate) const fn is_before(self, lease: &Lease) -> bool {
-        cursor(lease.cursor) == self.turn && lease.pair.0 > self.pair
+        cursor(lease.cursor) == self.turn && lease.unit.0 > self.pair
     }
 
     /// Returns whether a leased pair is behind this one in the order of claims.
     pub(crate) fn is_before_in_order(self, lease: &Lease) -> bool {
-        order(cursor(lease.cursor), lease.pair.0) > order(self.turn, self.pair)
+        order(cursor(lease.cursor), lease.unit.0) > order(self.turn, self.pair)
     }
 }
 
-/// Leases pairs, and returns the leases in the order of the claim. `behind` is only for a claim that is neither exclusive
-/// nor for selected pairs.
+/// Leases jobs, and returns the leases in the order of the claim. `behind` is only for a claim of pairs that is neither
+/// exclusive nor for selected pairs.
 ///
 /// # Errors
 /// Returns an error if a database operation fails. The leases may exist nevertheless, if the reply was lost.
-pub(crate) async fn claim(
+pub(crate) async fn claim<K: StoredKind>(
     conn: &mut Conn,
-    request: &ClaimRequest,
+    request: &ClaimRequest<K>,
     behind: Option<Behind>,
-) -> Result<Vec<Lease>> {
+) -> Result<Vec<Lease<K>>> {
     let text = match (&request.among, request.exclusive, behind) {
-        (Some(_), false, _) => CLAIM_AMONG,
-        (Some(_), true, _) => CLAIM_AMONG_EXCLUSIVE,
-        (None, true, _) => CLAIM_EXCLUSIVE,
-        (None, false, Some(_)) => CLAIM_BEHIND,
-        (None, false, None) => CLAIM,
+        (Some(_), false, _) => &CLAIM_AMONG,
+        (Some(_), true, _) => &CLAIM_AMONG_EXCLUSIVE,
+        (None, true, _) => &CLAIM_EXCLUSIVE,
+        (None, false, Some(_)) => &CLAIM_BEHIND,
+        (None, false, None) => &CLAIM,
     };
-    let mut claim = query_as(text)
+    let mut claim = query_as(text.of::<K>())
         .bind(request.worker.0)
         .bind(request.deadline)
         .bind(request.alive_since)
-        .bind(cursor(request.until))
+        .bind(position::<K>(request.until))
         .bind(request.limit());
     if let Some(among) = &request.among {
-        claim = claim.bind(&among.json);
+        claim = claim.bind(K::ids(among).into_owned());
     } else if let Some(behind) = behind.filter(|_| !request.exclusive) {
         let anywhere = if behind.or_anywhere {
             request.limit()

@@ -1,11 +1,13 @@
 //! Worker registration, due back-offs and open work.
 
-use crate::blocks::model::BlockSettings;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
-use crate::queue::counters::{CounterKey, Cursor, Deltas, cursor};
+use crate::queue::block_settings::BlockSettings;
+use crate::queue::claim::release_due;
+use crate::queue::counters::{Cursor, Deltas, cursor};
 use crate::queue::fingerprint::FingerprintIds;
+use crate::queue::pair_job::PairJob;
 use crate::queue::selection::PairSelection;
 use crate::{Catalog, Result};
 use mocban_core::domain::{JobStatus, Stage, UnixMillis, WorkerId, WorkerMetrics};
@@ -55,11 +57,6 @@ pub struct WorkLeft {
     /// Quarantined pairs.
     pub quarantined: u64,
 }
-
-/// Ends the back-offs that are due at `?1`. Also ends back-offs beyond `?2`, which only a clock jump can cause.
-pub(crate) const DUE: &str = "
-UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
-RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
 
 pub(crate) const LEFT_ALL: &str = "
 SELECT
@@ -128,14 +125,10 @@ impl Catalog {
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let query = query_as(DUE).bind(now).bind(now + longest);
-                let due: Vec<CounterKey> = query.fetch_all(&mut *conn).await?;
                 let mut deltas = Deltas::default();
-                for key in &due {
-                    deltas.move_job(key.with_status(JobStatus::Backoff), *key);
-                }
+                let due = release_due::<PairJob>(conn, now, longest, &mut deltas).await?;
                 deltas.apply(conn).await?;
-                Ok(due.len() as u64)
+                Ok(due)
             })
         })
         .await

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
-use crate::blocks::retired;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
 use crate::queue::counters::{CounterKey, Deltas};
+use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::ground_truth;

@@ -6,8 +6,10 @@ use crate::db::query::query;
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::rows::json_array;
 use crate::db::script::Script;
-use crate::queue::checkpoint;
-use crate::queue::lease::{InputVersions, Lease};
+use crate::queue::kind::StoredKind as _;
+use crate::queue::lease::Lease;
+use crate::queue::pair_job::PairJob;
+use crate::queue::provenance::InputVersions;
 use crate::queue::selection::PairSelection;
 use crate::records::model::{PairAttributes, StageRecord};
 use crate::records::stage_results;
@@ -64,10 +66,10 @@ impl Catalog {
     /// Returns an error if a database operation fails, or if a stored value is invalid.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
-        let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
+        let wanted = json_array(leases.iter().map(|lease| lease.unit.0));
         let leased = query(LEASED).bind(wanted).fetch_all(&mut conn).await?;
         let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
-        let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
+        let begun: Vec<_> = begun.map(|lease| lease.unit.0).collect();
         let mut results = BTreeMap::new();
         if !begun.is_empty() {
             results = stage_results::of_pairs(&mut conn, &begun).await?;
@@ -76,13 +78,17 @@ impl Catalog {
         for row in &leased {
             works.insert(row.get::<PairId>("id")?, PairWork::from_row(row)?);
         }
-        let each = leases.iter().map(|Lease { pair, cursor, .. }| {
-            let gone = || CatalogError::Corrupt(format!("a job has no pair {}", pair.0));
-            let mut work = works.remove(pair).ok_or_else(gone)?;
-            work.results = results.remove(&pair.0).unwrap_or_default();
-            work.results.retain(|record| record.stage < *cursor);
-            Ok(work)
-        });
+        let each = leases.iter().map(
+            |Lease {
+                 unit: pair, cursor, ..
+             }| {
+                let gone = || CatalogError::Corrupt(format!("a job has no pair {}", pair.0));
+                let mut work = works.remove(pair).ok_or_else(gone)?;
+                work.results = results.remove(&pair.0).unwrap_or_default();
+                work.results.retain(|record| record.stage < *cursor);
+                Ok(work)
+            },
+        );
         each.collect()
     }
 
@@ -119,7 +125,7 @@ impl Catalog {
             Box::pin(async move {
                 let mut script = Script::default();
                 let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
-                checkpoint::add_inputs(&mut script, inputs)?;
+                PairJob::add_inputs(&mut script, inputs)?;
                 script.run(conn).await?;
                 Ok(())
             })

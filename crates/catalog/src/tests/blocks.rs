@@ -4,13 +4,14 @@ use serde_json::json;
 
 use super::{World, register};
 use crate::{
-    BlockAttributes, BlockCheckpoint, BlockFailure, BlockFailureAction, BlockInputVersions,
-    BlockLease, BlockReason, BlockRetry, BlockSettings, BlockWork, CatalogError, CutPair, CutReply,
-    CutSummary, DeadWorker, InputVersion, MadeWith, NewCharacter, RerunPolicy, RetrySelection,
+    BlockAttributes, BlockInputVersions, BlockJob, BlockReason, BlockSettings, BlockWork,
+    CatalogError, CheckpointOutcome, CutPair, CutReply, CutSummary, DeadWorker, FailureAction,
+    InputVersion, Lease, MadeWith, NewCharacter, RerunPolicy, RetrySelection, StageCheckpoint,
+    StageFailure,
 };
 use mocban_core::domain::{
-    ArtifactSet, BlockCharacterState, BlockName, BlockStage, BlockStageRecord, ContentHash,
-    Failure, FailureClass, PairName, WorkerId,
+    ArtifactSet, BlockCharacterState, BlockName, BlockStage, ContentHash, Failure, FailureClass,
+    PairName, WorkerId,
 };
 
 pub(super) fn block(text: &str) -> BlockName {
@@ -47,16 +48,15 @@ fn inputs(texts: [&str; 3]) -> BlockInputVersions {
     }
 }
 
-pub(super) fn done(work: &BlockWork, stage: BlockStage) -> BlockCheckpoint {
+pub(super) fn done(work: &BlockWork, stage: BlockStage) -> StageCheckpoint<BlockJob> {
     let inputs = inputs(["mesh", "page", "labels"]);
     let settings = settings([1; 4]);
-    BlockCheckpoint {
-        record: BlockStageRecord {
-            stage,
-            outcome: json!({ "stage": stage }).to_string(),
-            files: ArtifactSet::new(),
-            result_hash: ContentHash::of(stage.name().as_bytes()),
-        },
+    StageCheckpoint {
+        stage,
+        outcome: json!({ "stage": stage }).to_string(),
+        files: ArtifactSet::new(),
+        result_hash: ContentHash::of(stage.name().as_bytes()),
+        metrics: Vec::new(),
         made_with: MadeWith::new(
             stage,
             settings.of(stage),
@@ -93,13 +93,24 @@ pub(super) fn character(label: &str, content: &str) -> NewCharacter {
     }
 }
 
+/// Returns the lease after a checkpoint.
+fn continued(outcome: CheckpointOutcome<BlockJob>) -> Lease<BlockJob> {
+    match outcome {
+        CheckpointOutcome::Lease(lease) => lease,
+        other => panic!("the lease ended: {other:?}"),
+    }
+}
+
 impl World {
-    pub(super) async fn claim_block(&self, worker: WorkerId) -> Option<(BlockLease, BlockWork)> {
+    pub(super) async fn claim_block(
+        &self,
+        worker: WorkerId,
+    ) -> Option<(Lease<BlockJob>, BlockWork)> {
         let claim = self.catalog.claim_block(worker, 1_000, 0, None);
         claim.await.expect("a claim")
     }
 
-    pub(super) async fn leased_block(&self) -> (BlockLease, BlockWork) {
+    pub(super) async fn leased_block(&self) -> (Lease<BlockJob>, BlockWork) {
         self.claim_block(self.worker).await.expect("a ready block")
     }
 
@@ -109,7 +120,7 @@ impl World {
         while lease.cursor() != BlockStage::Cut {
             let stage = done(&work, lease.cursor());
             let stored = self.catalog.checkpoint_block(lease, stage).await;
-            lease = stored.expect("stored").expect("a valid lease");
+            lease = continued(stored.expect("stored"));
         }
         let stage = done(&work, BlockStage::Cut);
         let cut = self.catalog.finish_cut(lease, stage, characters).await;
@@ -247,9 +258,9 @@ async fn changes_make_the_right_stages_stale() {
     assert_eq!(requeued, [(BlockStage::Face, BlockReason::Attributes)]);
 }
 
-fn failed(work: &BlockWork, stage: BlockStage, action: BlockFailureAction) -> BlockFailure {
+fn failed(work: &BlockWork, stage: BlockStage, action: FailureAction) -> StageFailure<BlockJob> {
     let done = done(work, stage);
-    BlockFailure {
+    StageFailure {
         stage,
         failure: Failure::new(
             FailureClass::NoSolution,
@@ -275,7 +286,7 @@ async fn an_earlier_stage_that_is_computed_again_continues_with_the_stage_after_
         BlockStage::Align,
     ] {
         let stored = world.catalog.checkpoint_block(lease, done(&work, stage));
-        lease = stored.await.expect("stored").expect("a lease");
+        lease = continued(stored.await.expect("stored"));
         assert_eq!(Some(lease.cursor), stage.next());
     }
 }
@@ -284,7 +295,7 @@ async fn an_earlier_stage_that_is_computed_again_continues_with_the_stage_after_
 async fn a_refused_block_stays_until_a_retry_or_another_page() {
     let world = world().await;
     let (lease, work) = world.leased_block().await;
-    let refused = failed(&work, BlockStage::Face, BlockFailureAction::Quarantine);
+    let refused = failed(&work, BlockStage::Face, FailureAction::Quarantine);
     assert!(
         world
             .catalog
@@ -324,13 +335,13 @@ async fn a_refused_block_stays_until_a_retry_or_another_page() {
     let requeued = world.requeue_blocks([1; 4]).await;
     assert_eq!(requeued, [(BlockStage::Face, BlockReason::FailedBefore)]);
     let (lease, work) = world.leased_block().await;
-    let refused = failed(&work, BlockStage::Face, BlockFailureAction::Quarantine);
+    let refused = failed(&work, BlockStage::Face, FailureAction::Quarantine);
     world
         .catalog
         .fail_block(lease, refused)
         .await
         .expect("stored");
-    let names = BlockRetry::Names(vec![block("b")]);
+    let names = RetrySelection::Names(vec![block("b")]);
     let unknown = RetrySelection::Names(vec![PairName::new("none").expect("a name")]);
     let refused = world.catalog.retry_pairs_and_blocks(&unknown, &names).await;
     assert!(matches!(refused, Err(CatalogError::UnknownPair(_))));
@@ -347,7 +358,7 @@ async fn a_block_backs_off_and_becomes_due() {
     let waits = failed(
         &work,
         BlockStage::Face,
-        BlockFailureAction::BackOff { run_at: 500 },
+        FailureAction::BackOff { run_at: 500 },
     );
     assert!(
         world
@@ -399,17 +410,17 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
     assert_eq!(recovered.expect("a recovery").blocks, 1);
     let stage = done(&work, BlockStage::Face);
     let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
-    assert_eq!(late.expect("a reply"), None);
+    assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
     let (lease, _) = world.claim_block(other).await.expect("a ready block");
     let advanced = world
         .catalog
         .checkpoint_block(lease.clone(), stage.clone())
         .await;
-    let advanced = advanced.expect("a reply").expect("a valid lease");
+    let advanced = continued(advanced.expect("a reply"));
     assert_eq!(advanced.cursor(), BlockStage::Align);
     // The reply was lost, and the worker sends the same checkpoint again.
     let again = world.catalog.checkpoint_block(lease, stage).await;
-    assert_eq!(again.expect("a reply"), Some(advanced));
+    assert_eq!(again.expect("a reply"), CheckpointOutcome::Lease(advanced));
 }
 
 #[tokio::test]

@@ -32,8 +32,8 @@ pub(crate) use self::place::Place;
 use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
-    InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, RerunPolicy, StageCheckpoint,
-    WorkerInfo, WorkerSettings,
+    InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, PairProvenance, RerunPolicy,
+    StageCheckpoint, WorkerInfo, WorkerSettings,
 };
 use mocban_core::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
@@ -225,10 +225,11 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     });
     StageCheckpoint {
         stage,
-        fingerprint: fingerprints.of(stage),
-        mesh_hash: ContentHash::of(b"mesh"),
-        print_hash: (stage >= Stage::Normalize).then(|| ContentHash::of(b"print")),
-        attributes: json!({ "scanned_face_down": null, "unit": null }).to_string(),
+        made_with: PairProvenance::new(
+            fingerprints.of(stage),
+            &inputs(stage),
+            json!({ "scanned_face_down": null, "unit": null }).to_string(),
+        ),
         outcome: if last {
             json!(register).to_string()
         } else {

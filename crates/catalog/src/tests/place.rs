@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::db::commit_delay::CommitDelay;
 use crate::db::conn::{Conn, Held};
 use crate::db::open;
 use crate::db::postgres_address::PostgresAddress;
 use crate::postgres_server;
+use crate::queue::commit::commit_delay::CommitDelay;
 use crate::{Catalog, Result};
 
 /// Where a catalog is.

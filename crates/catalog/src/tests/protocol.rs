@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use super::{World, blocks, done, name, register, row};
 use crate::db::query::query;
 use crate::{
-    BlockCheckpoint, Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction,
-    RerunPolicy, RetrySelection, StageCheckpoint, StageFailure,
+    Catalog, CatalogError, CheckpointOutcome, ClaimRequest, FailureAction, RerunPolicy,
+    RetrySelection, StageCheckpoint, StageFailure,
 };
 use mocban_core::domain::{
     BlockStage, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage, ThresholdMetric,
@@ -17,8 +17,7 @@ fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
         stage,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
         action,
-        fingerprint: world.fingerprints.of(stage),
-        attributes: super::done(world.fingerprints, stage).attributes,
+        made_with: done(world.fingerprints, stage).made_with,
         inputs: super::inputs(stage),
         ms: Some(3),
         at: 50,
@@ -349,17 +348,17 @@ async fn a_worker_without_heartbeats_or_with_old_files_stores_no_stage_of_a_bloc
     // Files without a row for 31 minutes may have been removed.
     for (alive_since, minutes) in [(50, 0), (0, 31)] {
         let written = Instant::now().checked_sub(Duration::from_mins(minutes));
-        let refused = BlockCheckpoint {
+        let refused = StageCheckpoint {
             alive_since,
             written: written.expect("the clock began before"),
             ..blocks::done(&work, BlockStage::Face)
         };
         let stored = world.catalog.checkpoint_block(lease.clone(), refused).await;
-        assert_eq!(stored.expect("a reply"), None);
+        assert_eq!(stored.expect("a reply"), CheckpointOutcome::LeaseLost);
     }
     let ended = world.catalog.end_worker(world.worker, 60, None).await;
     ended.expect("ended");
     let stage = blocks::done(&work, BlockStage::Face);
     let stored = world.catalog.checkpoint_block(lease, stage).await;
-    assert_eq!(stored.expect("a reply"), None);
+    assert_eq!(stored.expect("a reply"), CheckpointOutcome::LeaseLost);
 }

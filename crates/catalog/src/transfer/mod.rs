@@ -2,8 +2,9 @@
 //!
 //! All rows are copied and compared in one transaction of the target, which also creates a missing catalog. So there is no
 //! half-finished copy that another process could use: a target holds no rows, or all rows of a moment. A catalog that
-//! holds rows is only compared.
+//! holds rows is only compared. `backup.rs` copies a file as a whole.
 
+pub(crate) mod backup;
 mod rows;
 mod tables;
 

@@ -80,7 +80,7 @@ macro_rules! table_by_two {
 
 /// Every table, in an order in which no row refers to a later table. The counters are counted anew, and the settings of
 /// the last plan are not copied.
-pub(super) const TABLES: [CopyTable; 25] = [
+pub(super) const TABLES: [CopyTable; 26] = [
     table!("review_key", 2, "id", "key"),
     table!("worker", 11, "id", "host", "pid", "boot_id", "started", "heartbeat", "ended", "fingerprints", "block_settings",
         "died", "metrics"; numbered),
@@ -189,7 +189,7 @@ pub(super) const TABLES: [CopyTable; 25] = [
         "control_points"; numbered),
     table!(
         "block_job",
-        14,
+        9,
         "block",
         "stage",
         "status",
@@ -198,12 +198,17 @@ pub(super) const TABLES: [CopyTable; 25] = [
         "crashes",
         "token",
         "worker",
-        "deadline",
+        "deadline"
+    ),
+    table!(
+        "block_failure",
+        6,
+        "block",
+        "stage",
         "class",
         "message",
-        "failed_stage",
-        "failed_at",
-        "failed_with"
+        "made_with",
+        "at"
     ),
     table_by_two!("block_result", 9, "block", "stage", "made_with", "outcome", "files", "result_hash", "ms", "worker", "at"; false),
     table!("block_attempt", 8, "id", "block", "stage", "worker", "class", "message", "ms", "at"; numbered),

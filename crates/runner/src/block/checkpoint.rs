@@ -10,12 +10,12 @@ use crate::compute_thread::run_blocking;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::folder_check::check_folders;
-use crate::policy;
+use crate::policy::{self, FailedAttempt};
 use crate::run_context::RunContext;
 use crate::stage_output::result_hash;
 use mocban_catalog::{
-    BlockCheckpoint, BlockFailure, BlockFailureAction, CutPair, CutReply, CutSummary, InputVersion,
-    NewCharacter,
+    BlockJob, CheckpointOutcome, CutPair, CutReply, CutSummary, FailureAction, InputVersion,
+    NewCharacter, StageCheckpoint, StageFailure,
 };
 use mocban_core::domain::{ArtifactRef, BlockName, BlockStage, BlockStageRecord, FailureClass};
 use mocban_store::{Project, stat_input};
@@ -50,12 +50,6 @@ pub(crate) async fn store_stage(
         characters,
     } = output;
     let outcome = outcome.to_string();
-    let record = BlockStageRecord {
-        stage,
-        result_hash: result_hash(&outcome, &files),
-        outcome,
-        files,
-    };
     let (project, inner) = (context.project.clone(), name.clone());
     let characters = run_blocking(move || {
         failpoint::hit(stage, Point::Synced, Some(&inner));
@@ -66,9 +60,13 @@ pub(crate) async fn store_stage(
         Err(error) => return store_failure(context, block, stage, error, Some(ms)).await,
     };
     let settings = context.blocks.settings(stage);
-    let checkpoint = BlockCheckpoint {
+    let checkpoint = StageCheckpoint {
+        stage,
         made_with: block.made_with(stage, &settings),
-        record: record.clone(),
+        result_hash: result_hash(&outcome, &files),
+        outcome,
+        files,
+        metrics: Vec::new(),
         inputs: block.inputs.clone(),
         ms,
         at: context.clock.now(),
@@ -77,7 +75,7 @@ pub(crate) async fn store_stage(
         written: Instant::now(),
     };
     match stage.next() {
-        Some(next) => advance(context, block, record, checkpoint, next).await,
+        Some(next) => advance(context, block, checkpoint, next).await,
         None => finish_cut(context, block, checkpoint, characters).await,
     }
 }
@@ -95,8 +93,7 @@ fn finished(context: &RunContext, block: &BlockName, stage: BlockStage, ms: u64)
 async fn advance(
     context: &RunContext,
     mut block: Box<BlockInProgress>,
-    record: BlockStageRecord,
-    checkpoint: BlockCheckpoint,
+    checkpoint: StageCheckpoint<BlockJob>,
     next: BlockStage,
 ) -> Result<AfterStage, RunError> {
     let (catalog, lease) = (&context.catalog, &block.lease);
@@ -104,21 +101,26 @@ async fn advance(
         catalog,
         catalog.checkpoint_block(lease.clone(), checkpoint.clone())
     );
-    let Some(lease) = stored? else {
+    let CheckpointOutcome::Lease(lease) = stored? else {
         return Ok(AfterStage::End(BlockEnd::LeaseLost));
     };
-    let stage = record.stage;
+    let stage = checkpoint.stage;
     finished(context, &block.work.attributes.name, stage, checkpoint.ms);
     block.lease = lease;
     block.work.results.retain(|earlier| earlier.stage < stage);
-    block.work.results.push(record);
+    block.work.results.push(BlockStageRecord {
+        stage,
+        outcome: checkpoint.outcome,
+        files: checkpoint.files,
+        result_hash: checkpoint.result_hash,
+    });
     Ok(AfterStage::Continue(block, next))
 }
 
 async fn finish_cut(
     context: &RunContext,
     block: Box<BlockInProgress>,
-    checkpoint: BlockCheckpoint,
+    checkpoint: StageCheckpoint<BlockJob>,
     characters: Vec<NewCharacter>,
 ) -> Result<AfterStage, RunError> {
     let (catalog, lease) = (&context.catalog, &block.lease);
@@ -174,11 +176,17 @@ pub(crate) async fn store_failure(
         return Err(error);
     }
     let (failure, is_transient) = as_failure(error);
-    let (id, attempt) = (block.lease.block(), block.lease.attempt());
     let now = context.clock.now();
-    let action = policy::block_failure_action(id, failure.class, is_transient, attempt, now);
+    let attempt = FailedAttempt {
+        id: block.lease.id(),
+        class: failure.class,
+        is_transient,
+        attempt: block.lease.attempt(),
+        exclusive: true,
+    };
+    let action = policy::failure_action(attempt, now);
     let settings = context.blocks.settings(stage);
-    let failed = BlockFailure {
+    let failed = StageFailure {
         stage,
         failure: failure.clone(),
         action,
@@ -193,7 +201,7 @@ pub(crate) async fn store_failure(
     }
     let block = block.work.attributes.name;
     let end = match action {
-        BlockFailureAction::Quarantine => {
+        FailureAction::Quarantine => {
             context.emit(RunEvent::BlockFailed {
                 block,
                 stage,
@@ -201,12 +209,12 @@ pub(crate) async fn store_failure(
             });
             BlockEnd::Failed
         }
-        BlockFailureAction::BackOff { run_at } => {
+        FailureAction::BackOff { .. } | FailureAction::RetryExclusive => {
             context.emit(RunEvent::BlockBackingOff {
                 block,
                 stage,
                 failure,
-                wait_ms: (run_at - now).unsigned_abs(),
+                wait_ms: action.wait_ms(now),
             });
             BlockEnd::Retry
         }

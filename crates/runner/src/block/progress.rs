@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::inputs::BlockSources;
 use crate::block_stages::BlockStageOutput;
-use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork, MadeWith};
+use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease, MadeWith};
 use mocban_core::domain::{ArtifactSet, BlockStage};
 
 /// How a block's task ended.
@@ -24,7 +24,7 @@ pub(crate) enum BlockEnd {
 
 /// A block in progress.
 pub(crate) struct BlockInProgress {
-    pub(crate) lease: BlockLease,
+    pub(crate) lease: Lease<BlockJob>,
     pub(crate) work: BlockWork,
     pub(crate) sources: BlockSources,
     /// Versions of the input files, as far as they are known.

@@ -18,7 +18,7 @@ use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::run_context::RunContext;
 use crate::stop::StopLevel;
-use mocban_catalog::{BlockInputVersions, BlockLease, BlockWork};
+use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
 use mocban_core::domain::cancel::{CancelToken, Cancelled};
 use mocban_core::domain::{BlockStage, BlockStageRecord, FailureClass};
 use mocban_store::ArtifactError;
@@ -34,7 +34,7 @@ pub(crate) type BlockReport = Result<BlockEnd, RunError>;
 /// Runs the remaining stages of a leased block.
 pub(crate) async fn process_block(
     context: Arc<RunContext>,
-    lease: BlockLease,
+    lease: Lease<BlockJob>,
     work: BlockWork,
 ) -> BlockReport {
     let name = work.attributes.name.clone();
@@ -85,7 +85,7 @@ pub(crate) async fn process_block(
 /// again later. Any other error, such as refused credentials, concerns all blocks and ends the run.
 async fn end_without_store(
     context: &RunContext,
-    lease: BlockLease,
+    lease: Lease<BlockJob>,
     error: ArtifactError,
 ) -> BlockReport {
     let end = release(context, lease).await?;
@@ -96,7 +96,7 @@ async fn end_without_store(
     Err(error.into())
 }
 
-async fn release(context: &RunContext, lease: BlockLease) -> Result<BlockEnd, RunError> {
+async fn release(context: &RunContext, lease: Lease<BlockJob>) -> Result<BlockEnd, RunError> {
     context.catalog.release_block(lease).await?;
     Ok(BlockEnd::Released)
 }

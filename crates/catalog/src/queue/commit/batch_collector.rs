@@ -3,9 +3,9 @@
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
-use crate::db::commit_delay::CommitDelay;
-use crate::db::group_commit::Batch;
-use crate::db::request::Message;
+use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::group_commit::Batch;
+use crate::queue::commit::request::Message;
 
 /// Most requests in one commit.
 const BATCH: usize = 256;
@@ -83,10 +83,10 @@ mod tests {
 
     use super::{BATCH, collect};
     use crate::Catalog;
-    use crate::db::commit_delay::CommitDelay;
-    use crate::db::request::Message;
-    use crate::db::request::Request;
     use crate::queue::claim::Heartbeat;
+    use crate::queue::commit::commit_delay::CommitDelay;
+    use crate::queue::commit::request::Message;
+    use crate::queue::commit::request::Request;
     use mocban_core::domain::WorkerId;
 
     fn request() -> Request {

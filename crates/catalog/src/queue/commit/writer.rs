@@ -5,15 +5,15 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
-use crate::db::batch_collector::collect;
 use crate::db::busy_retry::retry_while_busy;
-use crate::db::commit_delay::CommitDelay;
 use crate::db::error::{CatalogError, Result};
 use crate::db::error_kind::CatalogErrorKind;
-use crate::db::group_commit::{Batch, BatchReply};
-use crate::db::request::Message;
-use crate::db::server_commit;
-use crate::db::write_connection::{WriteConnection, rollback};
+use crate::queue::commit::batch_collector::collect;
+use crate::queue::commit::commit_delay::CommitDelay;
+use crate::queue::commit::group_commit::{Batch, BatchReply};
+use crate::queue::commit::request::Message;
+use crate::queue::commit::server_commit;
+use crate::queue::commit::write_connection::{WriteConnection, rollback};
 
 /// Number of commits, with about 4 MiB of log, after which the log is checkpointed even if requests are pending.
 const COMMITS_PER_CHECKPOINT: u32 = 128;

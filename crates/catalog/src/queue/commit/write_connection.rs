@@ -2,23 +2,22 @@
 //! replaced or cut the write-ahead log. In PostgreSQL, it reconnects when the server was unavailable.
 
 use std::path::Path;
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use sqlx::{Connection as _, PgConnection};
 
 use crate::db::busy_retry::retry_while_busy;
-use crate::db::conn::{Conn, Held};
+use crate::db::conn::{Conn, Held, Work};
 use crate::db::dialect::Sql;
 use crate::db::error::{CatalogError, Result};
-use crate::db::known_leases::KnownLeases;
 use crate::db::log_watch::LogWatch;
 use crate::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::query;
 use crate::db::retry_wait::RetryWait;
 use crate::queue::claim_start::ClaimStart;
+use crate::queue::commit::known_leases::KnownLeases;
 use crate::queue::worker_lock::WorkerLock;
 use mocban_core::domain::WorkerId;
 
@@ -27,9 +26,6 @@ const PAUSE_AFTER_GIVING_UP: Duration = Duration::from_secs(10);
 
 /// Begins a transaction.
 pub(crate) const BEGIN: Sql = Sql::pair("BEGIN IMMEDIATE", "BEGIN");
-
-/// A future that borrows the write connection.
-pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 
 /// The write connection.
 pub(crate) struct WriteConnection {

@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use crate::db::conn::Conn;
 use crate::db::error::{CatalogError, Result};
-use crate::db::known_leases::stored_before;
-use crate::db::request::{Reply, Request};
 use crate::db::script::{Script, ScriptRows, Statement};
-use crate::db::write_connection::BEGIN;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::claim::{self, ClaimRequest, Heartbeat};
+use crate::queue::commit::known_leases::stored_before;
+use crate::queue::commit::request::{Reply, Request};
+use crate::queue::commit::write_connection::BEGIN;
 use crate::queue::counters::Deltas;
-use crate::queue::fail::{self, FailedRow};
-use crate::queue::lease::{FencedRow, Lease, StageFailure};
+use crate::queue::fail::{self, FailedRow, LeasedFailure};
+use crate::queue::lease::{FencedRow, Lease};
 
 /// Requests of one kind, and where the reply to each goes.
 pub(crate) struct Pending<I, R>(Vec<(I, Reply<R>)>);
@@ -51,7 +51,7 @@ impl<I, R> Default for Pending<I, R> {
 pub(crate) struct Batch {
     pub(crate) heartbeats: Pending<Heartbeat, bool>,
     pub(crate) checkpoints: Pending<Box<LeasedCheckpoints>, bool>,
-    pub(crate) failures: Pending<Box<(Lease, StageFailure)>, bool>,
+    pub(crate) failures: Pending<Box<LeasedFailure>, bool>,
     pub(crate) releases: Pending<Lease, bool>,
     pub(crate) claims: Pending<ClaimRequest, Vec<Lease>>,
 }

@@ -10,16 +10,14 @@ use crate::db::query::query_as;
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::queue::checkpoint::{LeasedCheckpoints, position_after};
+use crate::queue::claim::leases;
 use crate::queue::lease::{FencedRow, Lease};
+use crate::queue::pair_job::PairJob;
 use mocban_core::domain::{JobStatus, PairId, WorkerId};
 
 /// Time after a reconnection or a failed claim during which unknown leases are searched for. A server may execute a commit
 /// of the broken connection until it notices that the connection is broken.
 const SEARCH_TIME: Duration = Duration::from_mins(2);
-
-/// Selects the leases of a worker.
-const LEASES: &str = "
-SELECT pair, worker, token, stage, fingerprint, attempt, exclusive FROM job WHERE status = 1 AND worker = ?1";
 
 /// Selects jobs by pair.
 const JOBS: &str = "
@@ -58,14 +56,14 @@ impl KnownLeases {
 
     /// Adds leases that a claim returned.
     pub(crate) fn add(&mut self, leases: &[Lease]) {
-        let tokens = leases.iter().map(|lease| (lease.pair, lease.token));
+        let tokens = leases.iter().map(|lease| (lease.unit, lease.token));
         self.tokens.extend(tokens);
     }
 
     /// Removes a lease that has ended. A later lease of the same pair stays.
     pub(crate) fn remove(&mut self, lease: &Lease) {
-        if self.tokens.get(&lease.pair) == Some(&lease.token) {
-            self.tokens.remove(&lease.pair);
+        if self.tokens.get(&lease.unit) == Some(&lease.token) {
+            self.tokens.remove(&lease.unit);
         }
     }
 
@@ -75,8 +73,8 @@ impl KnownLeases {
         if !self.is_searching() {
             return Ok(Vec::new());
         }
-        let mut leases: Vec<Lease> = query_as(LEASES).bind(worker.0).fetch_all(conn).await?;
-        leases.retain(|lease| self.tokens.get(&lease.pair) != Some(&lease.token));
+        let mut leases = leases::<PairJob>(conn, worker).await?;
+        leases.retain(|lease| self.tokens.get(&lease.unit) != Some(&lease.token));
         Ok(leases)
     }
 }
@@ -88,9 +86,9 @@ pub(crate) async fn stored_before<'i>(
     ended: impl Iterator<Item = &'i Lease>,
 ) -> Result<Vec<FencedRow>> {
     let checkpoints: BTreeMap<_, _> = checkpoints
-        .filter_map(|(lease, stages)| Some((lease.pair.0, (lease, position_after(stages)?))))
+        .filter_map(|(lease, stages)| Some((lease.unit.0, (lease, position_after(stages)?))))
         .collect();
-    let ended: BTreeMap<_, _> = ended.map(|lease| (lease.pair.0, lease)).collect();
+    let ended: BTreeMap<_, _> = ended.map(|lease| (lease.unit.0, lease)).collect();
     let pairs = checkpoints.keys().chain(ended.keys());
     let pairs: Vec<_> = pairs.copied().collect();
     if pairs.is_empty() {
@@ -111,7 +109,7 @@ pub(crate) async fn stored_before<'i>(
     let stored = jobs.into_iter().filter(is_stored);
     Ok(stored
         .map(|job| FencedRow {
-            pair: job.pair,
+            unit: job.pair,
             token: job.token,
         })
         .collect())

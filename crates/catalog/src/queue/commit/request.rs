@@ -2,11 +2,13 @@
 
 use tokio::sync::oneshot;
 
+use crate::db::conn::Work;
 use crate::db::error::Result;
-use crate::db::write_connection::{Work, WriteConnection};
 use crate::queue::checkpoint::LeasedCheckpoints;
 use crate::queue::claim::{ClaimRequest, Heartbeat};
-use crate::queue::lease::{Lease, StageFailure};
+use crate::queue::commit::write_connection::WriteConnection;
+use crate::queue::fail::LeasedFailure;
+use crate::queue::lease::Lease;
 
 /// Where a reply goes.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
@@ -15,7 +17,7 @@ pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 pub(crate) enum Request {
     Heartbeat(Heartbeat, Reply<bool>),
     Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),
-    Fail(Box<(Lease, StageFailure)>, Reply<bool>),
+    Fail(Box<LeasedFailure>, Reply<bool>),
     Release(Lease, Reply<bool>),
     Claim(ClaimRequest, Reply<Vec<Lease>>),
 }

@@ -15,7 +15,7 @@ use mocban_core::domain::{JobStatus, PairId, PairName, UnixMillis};
 /// Removes jobs. Their leases end, because no fenced statement finds them any more.
 const REMOVE: &str = "
 DELETE FROM job WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint, token, low_confidence";
+RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint, token, low_confidence";
 
 const INSERT: &str = "
 INSERT INTO retired_pair (pair, stage, is_quarantined, token, fingerprint, low_confidence, at)
@@ -37,7 +37,7 @@ FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair LEFT JOIN failure AS f ON
 WHERE EXISTS (SELECT 1 FROM retired_pair) AND ",
             $has_name,
             "
-RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint"
+RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint"
         )
     };
 }
@@ -53,9 +53,9 @@ DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_ea
 
 /// Selects jobs with their keys. In PostgreSQL, locks them in the order of pairs.
 const LOCK: Sql = Sql::pair(
-    "SELECT pair, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
+    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
     WHERE pair IN (SELECT atom FROM json_each(?1)) ORDER BY pair",
-    "SELECT pair, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
+    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
     WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE",
 );
 
@@ -64,7 +64,7 @@ const RESET: &str = "
 UPDATE job SET stage = 0, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0, exclusive = 0, worker = NULL,
     deadline = NULL, token = token + 1, fingerprint = NULL
 WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-RETURNING pair, stage, status, coalesce(fingerprint, 0) AS fingerprint";
+RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint";
 
 const CLEAR_FAILURES: &str =
     "DELETE FROM failure WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
@@ -106,7 +106,7 @@ pub(crate) async fn retire(
     let removed: Vec<RemovedJob> = removed.fetch_all(&mut *conn).await?;
     let mut items = Vec::new();
     for one in &removed {
-        let KeyedJob { pair, key } = one.job;
+        let KeyedJob { unit: pair, key } = one.job;
         deltas.add(key, -1);
         let is_quarantined = i64::from(key.status == JobStatus::Quarantined);
         let fingerprint = (key.fingerprint != 0).then_some(key.fingerprint);
@@ -136,7 +136,7 @@ pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -
         deltas.add(job.key, 1);
     }
     if !restored.is_empty() {
-        let ids = json_array(restored.iter().map(|job| job.pair));
+        let ids = json_array(restored.iter().map(|job| job.unit));
         query(CLEAR).bind(ids).execute(conn).await?;
     }
     Ok(restored.len() as u64)

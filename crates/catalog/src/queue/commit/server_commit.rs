@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use crate::db::conn::Conn;
 use crate::db::error::Result;
-use crate::db::group_commit::{Batch, BatchReply};
-use crate::db::known_leases::stored_before;
-use crate::db::write_connection::CatalogServerState;
 use crate::queue::checkpoint::{LeasedCheckpoints, position_after};
 use crate::queue::claim::ClaimRequest;
+use crate::queue::commit::group_commit::{Batch, BatchReply};
+use crate::queue::commit::known_leases::stored_before;
+use crate::queue::commit::write_connection::CatalogServerState;
 use crate::queue::counters::{self, DONE, cursor};
 use crate::queue::lease::{Lease, was_written_long_ago};
 use crate::queue::{server_checkpoint, server_claim};
@@ -137,7 +137,7 @@ async fn claim(
 
 /// Returns leases without those of a pair that was leased again meanwhile.
 fn without_pairs_of(mut leases: Vec<Lease>, later: &[Lease]) -> Vec<Lease> {
-    leases.retain(|lease| later.iter().all(|other| other.pair != lease.pair));
+    leases.retain(|lease| later.iter().all(|other| other.unit != lease.unit));
     leases
 }
 
