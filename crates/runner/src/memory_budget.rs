@@ -5,10 +5,10 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use super::input_reads::ReadItem;
+use mocban_align::stages::depth::DepthParams;
 use mocban_catalog::PairAttributes;
 use mocban_core::domain::Stage;
 use mocban_core::raster;
-use mocban_align::stages::depth::DepthParams;
 use mocban_store::{Input, Project};
 
 /// Bytes reserved for each pair's maps and masks, in addition to its mesh and print, with a depth map of up to
@@ -177,11 +177,11 @@ mod tests {
         EstimatedPair, MAP_PIXEL_BYTES, MemoryBudget, PAIR_BYTES, PIXEL_BYTES, input_bytes,
         map_bytes, print_bytes,
     };
-    use mocban_core::domain::Stage;
-    use mocban_core::raster;
     use crate::input_reads::ReadItem as _;
     use crate::tests::values;
     use mocban_align::stages::depth::{DepthParams, ResolutionBy};
+    use mocban_core::domain::Stage;
+    use mocban_core::raster;
     use mocban_store::{Input, Project};
 
     #[test]
