@@ -153,6 +153,19 @@ pub(super) fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyh
     write_atomic(path, bytes).with_context(failed)
 }
 
+/// Adds what to do if an output could not be written to its place in the project because no other was named.
+pub(super) fn or_elsewhere(
+    written: anyhow::Result<()>,
+    named: Option<&Path>,
+) -> anyhow::Result<()> {
+    match written {
+        Err(error) if named.is_none() && !error.is::<Refusal>() => {
+            Err(error.context("name a file elsewhere with -o"))
+        }
+        written => written,
+    }
+}
+
 /// Lists the files of a directory, without its subdirectories and links to directories.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| match error.kind() {

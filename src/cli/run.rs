@@ -11,7 +11,7 @@ use super::failures::Failures;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::progress::ProgressReporter;
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use super::{missing_results, select, signals};
+use super::{error_text, missing_results, select, signals};
 use crate::config::Config;
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_core::domain::Stage;
@@ -73,7 +73,13 @@ pub(super) async fn execute(
 ) -> anyhow::Result<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
     let config = context.settings()?.config;
-    let (project, catalog) = context.open_for_run().await?;
+    let (project, catalog) = match context.open_for_run().await {
+        Err(error) if args.dry_run && error_text::is_not_writable(&error) => {
+            context.warn("the project cannot be written to, so input files that changed since the last run are not noticed");
+            context.open_read_only().await?
+        }
+        opened => opened?,
+    };
     let options = options(&args, &config, &catalog, part).await?;
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
