@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use mocban::domain::Stage;
+use mocban::domain::{ContentHash, Stage};
 use serde_json::json;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
@@ -99,13 +99,20 @@ async fn checkpoint(
     token: i64,
 ) -> anyhow::Result<()> {
     let (done, at) = (fake.done(stage), stage.index() as i64);
-    let mesh = done.mesh_hash.as_bytes().to_vec();
-    let print = done.print_hash.map(|hash| hash.as_bytes().to_vec());
+    let made_with = done.made_with;
+    let bytes = |hash: ContentHash| hash.as_bytes().to_vec();
+    let (mesh, print) = (
+        made_with.mesh_hash.map(bytes),
+        made_with.print_hash.map(bytes),
+    );
     sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
     let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(token);
     anyhow::ensure!(step.execute(&mut *conn).await?.rows_affected() == 1);
     let result = sqlx::query(RESULT).bind(pair).bind(at).bind(&mesh);
-    let result = result.bind(&print).bind(done.attributes).bind(done.outcome);
+    let result = result
+        .bind(&print)
+        .bind(made_with.attributes)
+        .bind(done.outcome);
     let result = result.bind(done.result_hash.as_bytes().to_vec());
     result.bind(fake.worker.0).execute(&mut *conn).await?;
     let attempt = sqlx::query(ATTEMPT).bind(pair).bind(at);

@@ -325,6 +325,38 @@ fn a_disk_fault_of_the_catalog_is_reported_and_loses_nothing() {
     RUN.check_all(OF_THE_CATALOG, fault_points());
 }
 
+/// Without any room, the file that processes share beside the catalog cannot be made.
+#[test]
+fn a_disk_without_room_is_named_and_results_can_still_be_read() {
+    let comparison = Comparison::new("1");
+    let (root, notes) = (comparison.folder("full"), comparison.folder("notes"));
+    copy_completed(&comparison, &root);
+    let full = Fault::once("write", INDEX, ENOSPC).and_later();
+    let on_full_disk = |args: &[&str]| {
+        let mut command = binary();
+        command.arg("-C").arg(root.join("p")).args(args);
+        call(full.inject(1, &root, &notes, &mut command))
+    };
+    for args in [
+        &["status"][..],
+        &["report"],
+        &["show", "upright-0000"],
+        &["check"],
+    ] {
+        on_full_disk(args).expect(0);
+    }
+    assert!(Fault::injected(&notes) > 0);
+    let set = ["verdict", "set", "upright-0000", "pass"];
+    let refused = on_full_disk(&[&set[..], &["--reviewer", "lan"]].concat()).expect(1);
+    assert!(
+        refused
+            .err
+            .contains("because the disk is full; free some space"),
+        "{}",
+        refused.err
+    );
+}
+
 #[test]
 fn a_disk_fault_of_other_files_is_reported_and_loses_nothing() {
     RUN.check_all(OF_THE_FILES, fault_points());

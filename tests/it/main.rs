@@ -105,6 +105,7 @@ mod review_page;
 mod roles;
 #[cfg(unix)]
 mod roles_in_sql;
+mod run_log;
 #[path = "../support/s3_server.rs"]
 mod s3_server;
 mod same_output;

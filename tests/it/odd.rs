@@ -185,8 +185,23 @@ fn read_only_project_can_be_read() {
     as_nobody(&project, &["check"]).expect(0);
     for command in [&["run"][..], &["check", "--repair"], &["verdict", "undo"]] {
         let refused = as_nobody(&project, command).expect(1);
-        plain(&refused.err, "cannot be written to; status, show, report");
+        plain(
+            &refused.err,
+            "cannot be written to; commands that only read",
+        );
     }
+    let refused = as_nobody(&project, &["check", "--collect"]).expect(1);
+    plain(
+        &refused.err,
+        "cannot be written to; commands that only read",
+    );
+    let listed = as_nobody(&project, &["run", "--dry-run"]).expect(0);
+    plain(
+        &listed.err,
+        "input files that changed since the last run are not",
+    );
+    let refused = as_nobody(&project, &["contact-sheet"]).expect(1);
+    plain(&refused.err, "name a file elsewhere with -o");
 
     // If the write-ahead log was never checkpointed, it must not be ignored silently.
     set_writable(project.dir(), true);

@@ -149,6 +149,11 @@ impl Catalog {
         matches!(self.readers, ReaderPool::Postgres(_))
     }
 
+    /// Returns whether the catalog was opened read-only.
+    pub const fn is_read_only(&self) -> bool {
+        self.inbox.is_none()
+    }
+
     /// Closes the catalog. The writer task first handles all earlier requests and checkpoints the write-ahead log.
     pub async fn close(self) {
         // ReaderPool first: an open reader prevents a complete checkpoint.

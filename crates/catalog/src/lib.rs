@@ -89,6 +89,7 @@ pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
 pub use queue::worker_list::{WorkerRecord, WorkerState};
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
+pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::checksums::ChecksummedTable;
 pub use records::faulty_rows::{FaultyRow, RowFault};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};

@@ -203,6 +203,15 @@ pub fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
     error.chain().find_map(|cause| cause.downcast_ref())
 }
 
+/// Returns whether the catalog's file or folder cannot be written to.
+pub fn is_not_writable(error: &anyhow::Error) -> bool {
+    use CatalogErrorKind::{CannotOpen, Full, ReadOnly};
+    catalog_error(error).is_some_and(|error| {
+        matches!(error, CatalogError::NotWritable(_))
+            || !error.is_of_server() && matches!(error.kind(), Some(CannotOpen | Full | ReadOnly))
+    })
+}
+
 /// Returns whether the catalog's content is damaged, empty or not a catalog.
 pub fn is_damage(error: &CatalogError) -> bool {
     use CatalogError::{Corrupt, Empty, Foreign, ForeignSchema, Json};
@@ -247,7 +256,16 @@ pub fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
             "a connection pooler such as PgBouncer changes the connection between transactions; set pool_mode = session there, or connect to PostgreSQL directly".to_owned(),
         );
     }
-    Some(match error.kind() {
+    let kind = match error.kind() {
+        // SQLite does not say why it could not create or write one of its files.
+        Some(CatalogErrorKind::CannotOpen | CatalogErrorKind::Disk)
+            if !error.is_of_server() && platform::is_disk_full(project) =>
+        {
+            Some(CatalogErrorKind::Full)
+        }
+        kind => kind,
+    };
+    Some(match kind {
         Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
             CatalogError::Damaged(path.into()).to_string()
         }

@@ -177,6 +177,16 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Res
     write_atomic(path, bytes).with_context(failed)
 }
 
+/// Adds what to do if an output could not be written to its place in the project because no other was named.
+pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow::Result<()> {
+    match written {
+        Err(error) if named.is_none() && !error.is::<Refusal>() => {
+            Err(error.context("name a file elsewhere with -o"))
+        }
+        written => written,
+    }
+}
+
 /// Lists the files of a directory, without its subdirectories and links to directories.
 ///
 /// # Errors

@@ -51,7 +51,10 @@ impl StoredStages {
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let stages = self.stages;
         let end = match (self.lease, self.unwritten) {
-            (CheckpointOutcome::LeaseLost, _) => Ok(PairEnd::LeaseLost),
+            (CheckpointOutcome::LeaseLost, _) => {
+                tracing::info!(pair = %self.pair, "the lease is lost; another worker may have the pair");
+                Ok(PairEnd::LeaseLost)
+            }
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
                 let failed = PairFailure {
                     name: self.pair,

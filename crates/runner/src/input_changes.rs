@@ -58,6 +58,11 @@ pub(super) async fn store_inputs_of_quarantined(
     if pairs.is_empty() {
         return Ok(());
     }
+    let number = pairs.len();
+    tracing::info!(
+        number,
+        "pairs failed because their workers died or hung, several times or alone"
+    );
     let among = PairSelection::of(pairs);
     let known = catalog.retry_while_unavailable(async || {
         catalog.known_inputs(None, pairs.len(), Some(&among)).await

@@ -51,6 +51,7 @@ mod checkpointer;
 mod claim_size;
 mod compute_thread;
 mod error;
+mod event_log;
 mod events;
 mod folder_check;
 mod free_memory;

@@ -56,6 +56,7 @@ impl PairFailure {
             alive_since: context.alive_since(),
         };
         if !context.catalog.fail(lease, record).await? {
+            tracing::info!(pair = %self.name, "the lease is lost, so its failure is not stored");
             return Ok(PairEnd::LeaseLost);
         }
         let pair = self.name;

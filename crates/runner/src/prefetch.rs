@@ -295,6 +295,10 @@ impl Prefetch {
         let waited = begun.elapsed() * waiting;
         context.metrics.add_wait(WaitReason::Database, waited);
         let leased: Vec<_> = leases.into_iter().zip(works).collect();
+        for (lease, work) in &leased {
+            let (pair, stage) = (&work.attributes.name, lease.cursor());
+            tracing::debug!(%pair, %stage, attempt = lease.attempt(), exclusive, "a pair is leased");
+        }
         let estimates = tokio::spawn(self.estimates(&leased));
         self.arriving.push_back(ArrivingPairs { leased, estimates });
         if !self.context.project.has_remote_inputs() {

@@ -13,6 +13,7 @@ use super::block::pipeline::BlockPipeline;
 use super::block::plan;
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
+use super::event_log::{log_end, log_event};
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
 use super::input_reads::read_limits;
@@ -45,7 +46,7 @@ pub(super) struct Executors {
     pub(super) blocks: Arc<dyn BlockStages>,
 }
 
-/// Runs every stage that has no current result. Passes each event of the run to `on_event`.
+/// Runs every stage that has no current result. Passes each event of the run to `on_event` and to the log.
 ///
 /// # Errors
 /// Returns an error if a named pair or block does not exist, or if the catalog or the disk cannot be used. Returns an
@@ -56,7 +57,7 @@ pub async fn run(
     settings: &Settings,
     options: &RunOptions,
     stop: &Stop,
-    on_event: impl FnMut(RunEvent) + Send,
+    mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
     let executors = Executors {
@@ -64,16 +65,21 @@ pub async fn run(
         blocks: Arc::new(BlockPipeline::new(options)),
     };
     let fingerprints = fingerprints(settings);
-    run_with(
+    let ended = run_with(
         project,
         catalog,
         &fingerprints,
         executors,
         options,
         stop,
-        on_event,
+        |event| {
+            log_event(&event);
+            on_event(event);
+        },
     )
-    .await
+    .await;
+    log_end(&ended);
+    ended
 }
 
 /// Like [`run`], with any executors.

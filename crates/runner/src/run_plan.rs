@@ -23,7 +23,8 @@ pub struct RunPlan {
     pub blocks: Vec<BlockPlanEntry>,
 }
 
-/// Returns what `run` would do, for `--dry-run`. Stores in the catalog which input files have changed.
+/// Returns what `run` would do, for `--dry-run`. Stores in the catalog which input files have changed. A read-only catalog
+/// cannot take this, so the plan is then one without these changes.
 ///
 /// # Errors
 /// Returns an error if a named pair or block does not exist, or the catalog or the files cannot be used.
@@ -37,11 +38,15 @@ pub async fn plan(
     let pairs = selection.as_ref().map(|selection| &selection.pairs);
     let blocks = selection.as_ref().map(|selection| &selection.blocks);
     let limits = read_limits(options, &Stop::new());
-    input_changes::store_changes(project, catalog, pairs, &limits).await?;
+    if !catalog.is_read_only() {
+        input_changes::store_changes(project, catalog, pairs, &limits).await?;
+    }
     let planned = catalog
         .plan(&fingerprints(settings), pairs, options.rerun)
         .await?;
-    inputs::store_changes(project, catalog, blocks, &limits).await?;
+    if !catalog.is_read_only() {
+        inputs::store_changes(project, catalog, blocks, &limits).await?;
+    }
     let settings = block_settings(&BlockPipeline::new(options));
     let blocks = catalog.plan_blocks(&settings, options.rerun, blocks);
     Ok(RunPlan {

@@ -47,7 +47,7 @@ pub(crate) async fn write(
     drop(busy);
     let (png, characters) = drawn?;
     catalog.close().await;
-    files::write_output(&path, &png, true)?;
+    files::or_elsewhere(files::write_output(&path, &png, true), options.output)?;
     report(&path, characters, context)?;
     Ok(ExitCode::Done)
 }

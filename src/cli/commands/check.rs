@@ -86,7 +86,9 @@ pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
 /// Checks the project. Without `--repair`, nothing is changed and a run may be active. A repair holds the run's lock,
 /// and fails if another process works on the project.
 async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
-    let (project, catalog) = if args.repair {
+    // What removes files or names an owner needs a project that can be written to, and says so at once.
+    let writes = args.repair || args.take_over || args.collect.is_some();
+    let (project, catalog) = if writes {
         context.open().await?
     } else {
         context.open_read_only().await?

@@ -138,6 +138,7 @@ pub(crate) async fn write(
         ));
     }
     let is_complete = args.allow_missing || sheet.problems.is_empty();
-    files::write_output(&path, &png_rgb8(&sheet.picture), is_complete)?;
+    let written = files::write_output(&path, &png_rgb8(&sheet.picture), is_complete);
+    files::or_elsewhere(written, args.output.as_deref())?;
     Ok((path, sheet))
 }

@@ -16,6 +16,7 @@ use crate::cli::output::progress::ProgressReporter;
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_config::Config;
 use mocban_core::domain::Stage;
+use mocban_project::error_text;
 use mocban_project::exit::ExitCode;
 use mocban_project::location::now;
 use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
@@ -76,7 +77,13 @@ pub(crate) async fn execute(
 ) -> anyhow::Result<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
     let config = context.settings()?.config;
-    let (project, catalog) = context.open_for_run().await?;
+    let (project, catalog) = match context.open_for_run().await {
+        Err(error) if args.dry_run && error_text::is_not_writable(&error) => {
+            context.warn("the project cannot be written to, so input files that changed since the last run are not noticed");
+            context.open_read_only().await?
+        }
+        opened => opened?,
+    };
     let options = options(&args, &config, &catalog, part).await?;
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;

@@ -111,7 +111,7 @@ impl ProjectStatus {
         self.jobs(JobStatus::Leased) - self.interrupted()
     }
 
-    /// Returns the number of leased pairs whose process died. The next run continues these pairs.
+    /// Returns the number of leased pairs whose run died or ended with an error. The next run continues these pairs.
     fn interrupted(&self) -> u64 {
         u64::from(!self.running) * self.jobs(JobStatus::Leased)
     }
@@ -186,7 +186,7 @@ fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
         parts.push(status.failures.text());
     }
     if status.interrupted() > 0 {
-        let text = "their process died; the next run continues them";
+        let text = "their run ended before it finished them; the next run continues them";
         parts.push(line("interrupted", text));
     }
     if status.counts.stale > 0 {

@@ -1,5 +1,6 @@
 //! `verdict`: people's verdicts on the results, in an append-only log.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
@@ -11,8 +12,8 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{
-    Catalog, FaultyRow, InvalidVerdict, NewVerdict, ReviewContext, SetApart, VerdictEvent,
-    check_reviewer,
+    CatalogError, FaultyRow, ImportedVerdicts, InvalidVerdict, NewVerdict, ReviewContext, SetApart,
+    VerdictEvent, check_reviewer,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::exit::{ExitCode, Refusal};
@@ -20,7 +21,7 @@ use mocban_project::files::{self, RefusedLine};
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::time_text::{duration, local};
-use mocban_project::verdict_file::{self, VerdictRow};
+use mocban_project::verdict_file::{self, VerdictList};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]
@@ -159,28 +160,35 @@ fn verdict_text(new: &NewVerdict) -> String {
 async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let bytes = files::read(&args.file)?;
     let (_project, catalog) = context.open().await?;
-    let parse = if files::is_jsonl(&args.file, &bytes) {
-        verdict_file::parse_jsonl
-    } else {
-        verdict_file::parse_csv
-    };
     let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
-    let rows = parse(&bytes).map_err(refused)?;
-    verdict_file::check_values(&rows, now()).map_err(refused)?;
-    let rights = catalog.review_rights().await?;
-    for row in &rows {
-        rights.require_verdicts(&row.verdict.reviewer)?;
+    let is_jsonl = files::is_jsonl(&args.file, &bytes);
+    let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
+    let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
+    for row in list.rows() {
+        let row = row.map_err(refused)?;
+        verdict_file::check_values(&row, now()).map_err(refused)?;
+        let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
+        first_lines.entry(pair).or_insert(row.line);
+        reviewers.insert(reviewer);
     }
-    let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
+    let rights = catalog.review_rights().await?;
+    for reviewer in &reviewers {
+        rights.require_verdicts(reviewer)?;
+    }
+    let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
-    verdict_file::refuse_unknown(&rows, &unknown).map_err(refused)?;
-    let all = rows.len() as u64;
-    let rows = on_current_results(&catalog, rows).await?;
-    let current = rows.len() as u64;
-    let verdicts = rows.into_iter().map(|row| row.verdict).collect();
-    let number = catalog.verdict_set(verdicts, now()).await?;
+    verdict_file::refuse_unknown(&first_lines, &unknown).map_err(refused)?;
+    // All rows were valid in the first pass.
+    let rows = list.rows().map(|row| match row {
+        Ok(row) => Ok(row.listed),
+        Err(_) => Err(CatalogError::CutShort),
+    });
+    let ImportedVerdicts {
+        recorded: number,
+        known,
+        left_out,
+    } = catalog.import_verdicts(rows, now()).await?;
     catalog.close().await;
-    let (left_out, known) = (all - current, current - number);
     context.print_json(
         &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
     )?;
@@ -196,30 +204,6 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     context.info(&format!("{} recorded", count(number, "verdict")));
     context.next("report");
     Ok(ExitCode::Done)
-}
-
-/// Keeps rows that name the current result of their pair, and rows that name no result.
-async fn on_current_results(
-    catalog: &Catalog,
-    rows: Vec<VerdictRow>,
-) -> anyhow::Result<Vec<VerdictRow>> {
-    let mut current = Vec::with_capacity(rows.len());
-    for row in rows {
-        let Some(judged) = row.judged else {
-            current.push(row);
-            continue;
-        };
-        let detail = catalog.pair(&row.verdict.pair).await?;
-        let metrics = detail.map_or_else(Vec::new, |detail| detail.results.metrics);
-        let is_current = metrics.iter().any(|metric| {
-            let named = row.verdict.metric;
-            metric.result_hash == judged && named.is_none_or(|named| named == metric.outcome.metric)
-        });
-        if is_current {
-            current.push(row);
-        }
-    }
-    Ok(current)
 }
 
 async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {

@@ -39,7 +39,7 @@ pub(crate) struct Global {
     /// Print only warnings and errors
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
-    /// Log more; -vv logs everything
+    /// Log more: -v also what a run does, such as failures and retries, as every log file has; -vv also claims, stages and waits
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub(crate) verbose: u8,
     /// Print the result as JSON on stdout

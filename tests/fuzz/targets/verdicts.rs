@@ -19,8 +19,9 @@ mod truth_file;
 mod verdict_file;
 
 fuzz_target!(|bytes: &[u8]| {
-    for parsed in [verdict_file::parse_csv(bytes), verdict_file::parse_jsonl(bytes)] {
-        if let Err(error) = parsed {
+    for is_jsonl in [false, true] {
+        let list = verdict_file::VerdictList::new(bytes.to_vec(), is_jsonl);
+        if let Err(error) = list.and_then(|list| list.rows().try_for_each(|row| row.map(|_| ()))) {
             mocban_fuzz::one_sentence(&error.to_string());
         }
     }

@@ -7,24 +7,35 @@ use tokio::time::{Sleep, sleep};
 
 use crate::db::error::Result;
 use crate::db::error_kind::CatalogErrorKind;
-use crate::db::lock_owner::lock_owner;
+use crate::db::lock_owner::{OwnerWork, lock_owner, owner_work};
 use mocban_system::platform::ActiveClock;
 
-/// Longest wait.
+/// Longest wait while the process that holds the lock does not work.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);
 /// Wait after which the lock's owner is logged.
 const QUIET_WAIT: Duration = Duration::from_secs(5);
+/// Time between two looks at the process that holds the lock.
+const LOOK_EVERY: Duration = Duration::from_secs(5);
+/// Least share of a processor that a working process uses: it writes a long list, for example. A program with an open
+/// transaction that waits for a person uses less.
+const WORKING_PERCENT: u64 = 1;
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
 /// Longest time of one attempt: SQLite's busy timeout and a margin. If more time passes, the process was suspended.
 const LONGEST_ATTEMPT: Duration = Duration::from_secs(15);
 
-/// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
+/// Retries an operation while the catalog is locked: as long as the process that holds the lock works, and for
+/// `LONGEST_WAIT` while it does not, or is unknown.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     clock: ActiveClock,
     is_logged: bool,
+    look: fn(&Path) -> Option<OwnerWork>,
+    /// The last look, and when it was.
+    seen: (Duration, Option<OwnerWork>),
+    /// Until when the process that held the lock worked.
+    worked_until: Duration,
 }
 
 impl<'p> BusyRetry<'p> {
@@ -34,15 +45,40 @@ impl<'p> BusyRetry<'p> {
             catalog,
             clock: ActiveClock::start(LONGEST_ATTEMPT),
             is_logged: false,
+            look: owner_work,
+            seen: (Duration::ZERO, None),
+            worked_until: Duration::ZERO,
+        }
+    }
+
+    /// Looks from time to time whether the process that holds the lock works.
+    fn observe_owner(&mut self, now: Duration) {
+        let (looked_at, before) = self.seen;
+        if now < looked_at + LOOK_EVERY {
+            return;
+        }
+        let found = (self.look)(self.catalog);
+        self.seen = (now, found);
+        let Some((found, before)) = found.zip(before) else {
+            return;
+        };
+        let cpu_cs = found.cpu_cs.saturating_sub(before.cpu_cs);
+        let passed_cs = now.saturating_sub(looked_at).as_millis() as u64 / 10;
+        if found.pid != before.pid || cpu_cs * 100 >= passed_cs * WORKING_PERCENT {
+            self.worked_until = now;
         }
     }
 
     /// Returns the pause before the next attempt. Returns `None` if the outcome is not a lock error, or if
-    /// `LONGEST_WAIT` has passed.
+    /// `LONGEST_WAIT` has passed since the process that holds the lock worked.
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
         let waited = self.clock.now();
-        if error.kind() != Some(CatalogErrorKind::Busy) || waited >= LONGEST_WAIT {
+        if error.kind() != Some(CatalogErrorKind::Busy) {
+            return None;
+        }
+        self.observe_owner(waited);
+        if waited >= self.worked_until + LONGEST_WAIT {
             return None;
         }
         tracing::debug!(%error, "the catalog is busy, waiting");
@@ -57,8 +93,8 @@ impl<'p> BusyRetry<'p> {
     }
 }
 
-/// Evaluates a fallible expression again while it fails with a lock error, for at most `LONGEST_WAIT`. The value is the
-/// last result.
+/// Evaluates a fallible expression again while it fails with a lock error, for as long as [`BusyRetry`] waits. The value is
+/// the last result.
 macro_rules! retry_while_busy {
     ($catalog:expr, $attempt:expr) => {{
         let mut retry = $crate::db::busy_retry::BusyRetry::begin($catalog);
@@ -85,7 +121,9 @@ mod tests {
     use tracing::span::{Attributes, Id, Record};
     use tracing::{Event, Level, Metadata, Subscriber, subscriber};
 
-    use super::{ActiveClock, BusyRetry, LONGEST_ATTEMPT, LONGEST_WAIT, QUIET_WAIT};
+    use super::{
+        ActiveClock, BusyRetry, LONGEST_ATTEMPT, LONGEST_WAIT, LOOK_EVERY, OwnerWork, QUIET_WAIT,
+    };
     use crate::{CatalogError, Result};
 
     async fn connect(path: &Path) -> SqliteConnection {
@@ -153,6 +191,37 @@ mod tests {
             assert_eq!(logged.load(Ordering::SeqCst), 1);
         }
         assert!(after(LONGEST_WAIT).wait(&busy).is_none());
+    }
+
+    #[tokio::test]
+    async fn a_wait_lasts_as_long_as_the_owner_of_the_lock_works() {
+        static CPU_CS: AtomicUsize = AtomicUsize::new(0);
+        let busy = busy().await;
+        let mut retry = BusyRetry::begin(Path::new("catalog.sqlite"));
+        // The other test counts the warnings of this process.
+        retry.is_logged = true;
+        retry.look = |_| {
+            Some(OwnerWork {
+                pid: 7,
+                cpu_cs: CPU_CS.load(Ordering::SeqCst) as u64,
+            })
+        };
+        let waits_until = |retry: &mut BusyRetry<'_>, waited, cpu_cs| {
+            CPU_CS.fetch_add(cpu_cs, Ordering::SeqCst);
+            retry.clock = ActiveClock::continued(LONGEST_ATTEMPT, waited);
+            retry.wait(&busy).is_some()
+        };
+        let mut now = LOOK_EVERY;
+        while now < 10 * LONGEST_WAIT {
+            assert!(waits_until(&mut retry, now, 100), "{now:?}");
+            now += LOOK_EVERY;
+        }
+        let idle_from = now;
+        while now + 2 * LOOK_EVERY < idle_from + LONGEST_WAIT {
+            assert!(waits_until(&mut retry, now, 0), "{now:?}");
+            now += LOOK_EVERY;
+        }
+        assert!(!waits_until(&mut retry, idle_from + LONGEST_WAIT, 0));
     }
 
     #[tokio::test]

@@ -74,7 +74,7 @@ pub enum CatalogError {
     LogAlone(PathBuf),
     /// The file or its directory is read-only.
     #[error(
-        "{0} cannot be written to; status, show, report and export still work, other commands need a writable copy"
+        "{0} cannot be written to; commands that only read still work, such as status, show, report, check, export -o and backup, other commands need a writable copy"
     )]
     NotWritable(PathBuf),
     /// The write-ahead log was not checkpointed, and cannot be here.

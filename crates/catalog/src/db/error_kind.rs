@@ -7,6 +7,9 @@ use sqlx::postgres::PgDatabaseError;
 
 use crate::db::error::CatalogError;
 
+/// `SQLITE_IOERR_SHMSIZE`: the file that processes share beside the catalog could not grow, which a full disk causes.
+const IOERR_SHMSIZE: i64 = 0x130a;
+
 /// The kind of a database error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CatalogErrorKind {
@@ -34,9 +37,11 @@ pub enum CatalogErrorKind {
 }
 
 impl CatalogErrorKind {
-    /// Returns the kind of a SQLite result code, if it has one. An extended code has the kind of its primary code.
+    /// Returns the kind of a SQLite result code, if it has one. An extended code has the kind of its primary code, with one
+    /// exception.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
+            _ if code == IOERR_SHMSIZE => Some(Self::Full),
             1 => Some(Self::Statement),
             // SQLITE_PROTOCOL: a reader lost the race for the log's locks too often.
             5 | 6 | 15 => Some(Self::Busy),
@@ -256,5 +261,13 @@ mod tests {
             Some(CatalogErrorKind::Statement)
         );
         assert_eq!(CatalogErrorKind::of_code(2), None);
+    }
+
+    #[test]
+    fn a_shared_file_that_cannot_grow_means_a_full_disk() {
+        assert_eq!(
+            CatalogErrorKind::of_code(4874),
+            Some(CatalogErrorKind::Full)
+        );
     }
 }

@@ -46,6 +46,35 @@ pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
     })
 }
 
+/// How much a process has computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct OwnerWork {
+    pub(crate) pid: u32,
+    /// Time on the processors, in hundredths of a second.
+    pub(crate) cpu_cs: u64,
+}
+
+/// Returns how much the process that holds the write lock has computed. Returns `None` if no such process is found, if it
+/// is stopped, or if it is this process.
+pub(crate) fn owner_work(catalog: &Path) -> Option<OwnerWork> {
+    let LockOwner { pid, is_stopped } = lock_owner(catalog)?;
+    if is_stopped || pid == std::process::id() {
+        return None;
+    }
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let cpu_cs = cpu_cs(&stat)?;
+    Some(OwnerWork { pid, cpu_cs })
+}
+
+/// Returns the sum of the times in user and system mode from a text of `/proc/PID/stat`: its fields 14 and 15. The name
+/// in parentheses is the second.
+fn cpu_cs(stat: &str) -> Option<u64> {
+    let (_, after_name) = stat.rsplit_once(") ")?;
+    let mut times = after_name.split(' ').skip(11);
+    let [user, system] = [times.next()?, times.next()?];
+    Some(user.parse::<u64>().ok()? + system.parse::<u64>().ok()?)
+}
+
 /// Returns the path of a file that SQLite keeps next to the catalog, such as `-wal`.
 pub(crate) fn sidecar(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -70,7 +99,7 @@ fn is_stopped(stat: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{is_stopped, writer};
+    use super::{cpu_cs, is_stopped, writer};
 
     #[test]
     fn only_the_lock_for_writing_to_this_file_tells_who_writes() {
@@ -86,6 +115,13 @@ mod tests {
         ] {
             assert_eq!(writer(other, file), None, "{other}");
         }
+    }
+
+    #[test]
+    fn computing_time_is_read_whatever_the_name() {
+        let stat = "12 (a) R 7) S 1 12 12 0 -1 4194560 1 0 0 0 250 31 9 9 20 0 1 0 5";
+        assert_eq!(cpu_cs(stat), Some(281));
+        assert_eq!(cpu_cs("12 (a) S 1"), None);
     }
 
     #[test]

@@ -84,11 +84,11 @@ async fn connect(path: &Path) -> Result<SqliteConnection> {
 }
 
 /// Opens read connections. In WAL mode, readers and the writer do not block each other. If the catalog's directory
-/// seems to be read-only, opens the catalog as an immutable file.
+/// seems to be read-only, or its disk is full, opens the catalog as an immutable file.
 pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
     check_file(path, false)?;
     let (pool, found) = match shared(path).await {
-        Err(error) if is_read_only(&error) => frozen(path, error).await?,
+        Err(error) if is_read_only(&error) || is_full(&error) => frozen(path, error).await?,
         outcome => outcome.map_err(|error| unreadable(path, error))?,
     };
     match found {
@@ -112,6 +112,7 @@ async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
+        Ok(meta) if meta.len() > 0 && is_full(&error) => Err(error),
         Ok(meta) if meta.len() > 0 => Err(CatalogError::NotCheckpointed(log)),
         // Results that are only in a log that cannot be looked at would be missing.
         Err(source) if source.kind() != ErrorKind::NotFound => {
@@ -238,6 +239,11 @@ fn is_read_only(error: &CatalogError) -> bool {
         error.kind(),
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen)
     )
+}
+
+/// Returns whether the disk has no room for the file that processes share beside the catalog.
+fn is_full(error: &CatalogError) -> bool {
+    error.kind() == Some(CatalogErrorKind::Full)
 }
 
 /// Replaces the error if the file is not a database or is corrupt.

@@ -128,18 +128,6 @@ impl Catalog {
         }
         Ok(requeued)
     }
-
-    /// Requeues the selected pairs that failed or back off, and returns their number.
-    ///
-    /// # Errors
-    /// Returns an error if a named pair does not exist, or if a database operation fails. In that case nothing changes.
-    pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
-        let selection = selection.clone();
-        self.in_transaction(move |conn| {
-            Box::pin(async move { retry_pairs(conn, &selection).await })
-        })
-        .await
-    }
 }
 
 /// Requeues the selected pairs that failed or back off, and returns their number.

@@ -1,5 +1,6 @@
 //! Data of pairs: imports, results, verdicts, review answers and counts.
 
+pub(crate) mod append_verdicts;
 pub(crate) mod checksums;
 pub(crate) mod faulty_rows;
 pub(crate) mod ground_truth;

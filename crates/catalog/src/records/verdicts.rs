@@ -98,12 +98,6 @@ pub(crate) struct ResultVerdict {
 
 from_row! { ResultVerdict { pair, metric, result_hash, verdict in row } }
 
-/// Selects the current results of a pair. If the pair is not done, selects one row whose metric is NULL.
-const JUDGED: &str = "
-SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
-WHERE p.name = ?1 ORDER BY m.metric";
-
 /// Begins an action, unless a verdict with the same event and metric exists.
 const NEW_ACT: &str = "
 INSERT INTO review_act (reviewer) SELECT ?1
@@ -116,24 +110,6 @@ INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, 
 SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING id";
-
-/// Returns whether a verdict with an id up to `?9` has the same values, and was not undone or set apart.
-const IS_STORED: &str = "
-SELECT EXISTS (SELECT 1 FROM verdict AS v
-    WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
-    AND v.verdict = ?5 AND v.reason IS NOT DISTINCT FROM ?6 AND v.note IS NOT DISTINCT FROM ?7
-    AND v.at = ?8 AND v.id <= ?9
-    AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
-    AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id))";
-
-/// Returns whether the reviewer's newest verdict on a result that was not undone or set apart has the same values.
-const IS_NEWEST: &str = "
-SELECT EXISTS (SELECT 1 FROM (SELECT v.verdict, v.reason, v.note FROM verdict AS v
-        WHERE v.pair = ?1 AND v.metric = ?2 AND v.reviewer = ?3 AND v.result_hash = ?4
-        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
-        AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id)
-        ORDER BY v.id DESC LIMIT 1) AS last
-    WHERE last.verdict = ?5 AND last.reason IS NOT DISTINCT FROM ?6 AND last.note IS NOT DISTINCT FROM ?7)";
 
 /// Selects the verdict log. If not NULL, `?1` limits it to one action, `?2` to one pair, `?3` to larger ids, and `?4` to
 /// that many rows. Leaves out the verdicts of `?5` and the undos of `?6`.
@@ -168,29 +144,6 @@ ORDER BY v.pair, v.metric, v.reviewer, v.id"
 );
 
 impl Catalog {
-    /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
-    /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
-    /// this call. Skips a verdict without `at` and context if it equals the reviewer's newest one. Returns the number of
-    /// verdicts of which a row was appended.
-    ///
-    /// # Errors
-    /// Returns an error if a pair or the judged result does not exist, or if a database operation fails. In that case
-    /// nothing is stored.
-    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
-                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
-                let mut stored = 0;
-                for verdict in &verdicts {
-                    stored += u64::from(append(conn, verdict, newest, now).await?);
-                }
-                Ok(stored)
-            })
-        })
-        .await
-    }
-
     /// Undoes the newest action that is not undone yet, and returns its verdicts. If `reviewer` is given, only actions
     /// of this reviewer count. The log keeps the action and records the undo.
     ///
@@ -245,66 +198,6 @@ impl Catalog {
             .fetch_all(&mut conn)
             .await
     }
-}
-
-/// Appends a verdict. Returns `false` if all its rows are already stored. Compares a verdict with a time only with rows up
-/// to the id `newest`, so that two equal ones of one call are both stored.
-async fn append(conn: &mut Conn, new: &NewVerdict, newest: i64, now: UnixMillis) -> Result<bool> {
-    let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = query_as(JUDGED)
-        .bind(new.pair.as_str())
-        .fetch_all(&mut *conn)
-        .await?;
-    if judged.is_empty() {
-        return Err(CatalogError::UnknownPair(new.pair.clone()));
-    }
-    let mut act: Option<i64> = None;
-    let mut found = false;
-    for (pair, metric, hash) in judged {
-        let Some((metric, hash)) = metric.zip(hash) else {
-            return Err(CatalogError::NoResult(new.pair.clone()));
-        };
-        if new.metric.is_none_or(|wanted| wanted == metric) {
-            found = true;
-            let judged = (pair, metric, hash);
-            if is_stored(conn, new, judged, newest).await? {
-                continue;
-            }
-            act = insert(conn, new, judged, act, now).await?.or(act);
-        }
-    }
-    match new.metric {
-        Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
-        Some(_) | None => Ok(act.is_some()),
-    }
-}
-
-/// Returns whether a verdict is stored already: one with the same values and time among the rows up to `newest`, or, if it
-/// has no time, the reviewer's newest one on the result. Without a time, a verdict with a context, such as an angle, is
-/// always new.
-async fn is_stored(
-    conn: &mut Conn,
-    new: &NewVerdict,
-    (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
-    newest: i64,
-) -> Result<bool> {
-    let sql = match new.at {
-        Some(_) => IS_STORED,
-        None if new.look != ReviewContext::default() => return Ok(false),
-        None => IS_NEWEST,
-    };
-    let stored = query_scalar(sql)
-        .bind(pair)
-        .bind(metric.name())
-        .bind(&new.reviewer)
-        .bind(&result_hash.as_bytes()[..])
-        .bind(new.verdict.name())
-        .bind(new.reason.map(Reason::name))
-        .bind(&new.note);
-    let stored = match new.at {
-        Some(at) => stored.bind(at).bind(newest),
-        None => stored,
-    };
-    stored.fetch_one(conn).await
 }
 
 /// Appends a verdict row for one metric. Returns the row's action number. Returns `None`, and appends nothing, if a row

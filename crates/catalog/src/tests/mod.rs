@@ -33,7 +33,7 @@ use super::db::query::query_scalar;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
     InputVersion, InputVersions, Lease, LeaseHolder, MetricResult, PairProvenance, RerunPolicy,
-    StageCheckpoint, WorkerInfo, WorkerSettings,
+    Result, RetrySelection, StageCheckpoint, WorkerInfo, WorkerSettings,
 };
 use mocban_core::domain::{
     Affine2, ArtifactSet, ContentHash, Disagreement, MetricOutcome, PairName, RegisterOutcome,
@@ -150,6 +150,13 @@ impl World {
 }
 
 impl World {
+    /// Lets failed pairs run again, and no blocks. Returns the number of pairs.
+    async fn retry(&self, pairs: &RetrySelection) -> Result<u64> {
+        let blocks = RetrySelection::Names(Vec::new());
+        let retried = self.catalog.retry_pairs_and_blocks(pairs, &blocks).await;
+        retried.map(|[pairs, _]| pairs)
+    }
+
     /// Asserts that a plan for all pairs, made from counters, equals a plan that inspects each named pair. Asserts the
     /// same of the number of stale pairs.
     async fn assert_plans_agree(&self) {

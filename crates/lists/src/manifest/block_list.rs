@@ -7,6 +7,7 @@ use super::column_names::{missing_column, similar_column};
 use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
 use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
+use crate::quotes::check_quotes;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
 
 /// The columns of a list of blocks. The first three are required.
@@ -63,6 +64,8 @@ fn reader(bytes: &[u8]) -> ::csv::Reader<&[u8]> {
 /// the lines of invalid rows.
 pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
     let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
+    check_quotes(bytes, delimiter(bytes))
+        .map_err(|error| at_line(error.line, &error.to_string()))?;
     let mut reader = reader(bytes);
     let mut lines = LineCounter::new(bytes);
     let mut record = ::csv::ByteRecord::new();

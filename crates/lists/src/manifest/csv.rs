@@ -7,6 +7,7 @@ use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
 use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
 use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
+use crate::quotes::check_quotes;
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
 /// ignored.
@@ -28,8 +29,10 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 /// the lines of invalid rows.
 pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
     let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
+    let delimiter = delimiter(bytes);
+    check_quotes(bytes, delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
     let mut reader = ::csv::ReaderBuilder::new()
-        .delimiter(delimiter(bytes))
+        .delimiter(delimiter)
         .trim(::csv::Trim::All)
         .flexible(true)
         .has_headers(false)
@@ -271,10 +274,16 @@ mod tests {
         let rest = "b,m,p,\n".repeat(1 << 18);
         let text = format!("id,mesh,print,note\n\n\na/b,m,p,\n\nc,m,p,\"open\n{rest}");
         assert_eq!(
+            refusal(&text),
+            "line 6: a quote is opened here and never closed"
+        );
+        let long = "x".repeat(1 << 21);
+        let text = format!("id,mesh,print,note\na/b,m,p,\nc,m,p,\"{long}\"\n");
+        assert_eq!(
             refusal(&text).lines().collect::<Vec<_>>(),
             [
-                "line 4: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
-                "line 6: the row has more than 1048576 bytes; a closing quotation mark may be missing",
+                "line 2: id \"a/b\" holds '/'; an id has no slashes, control or invisible characters",
+                "line 3: the row has more than 1048576 bytes; a closing quotation mark may be missing",
             ]
         );
         // The limit applies to each row, not to the list.

@@ -99,15 +99,15 @@ pub fn delimiter(bytes: &[u8]) -> u8 {
 /// Finds the line on which each record of a CSV list starts. The position from the CSV parser is not enough: a line
 /// feed or blank lines may lie between that position and the record.
 #[derive(Debug)]
-pub struct LineCounter<'a> {
-    bytes: &'a [u8],
+pub struct LineCounter<B> {
+    bytes: B,
     at: usize,
     line: usize,
 }
 
-impl<'a> LineCounter<'a> {
+impl<B: AsRef<[u8]>> LineCounter<B> {
     /// Starts at the beginning of a list.
-    pub const fn new(bytes: &'a [u8]) -> Self {
+    pub const fn new(bytes: B) -> Self {
         Self {
             bytes,
             at: 0,
@@ -118,11 +118,12 @@ impl<'a> LineCounter<'a> {
     /// Returns the line of the next record after `position`, counted from 1. Positions must be in ascending order.
     pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
         let from = position.map_or(0, ::csv::Position::byte) as usize;
-        let blank = self.bytes[from..]
+        let bytes = self.bytes.as_ref();
+        let blank = bytes[from..]
             .iter()
             .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
             .count();
-        let passed = &self.bytes[self.at..from + blank];
+        let passed = &bytes[self.at..from + blank];
         self.line += passed.split(|byte| *byte == b'\n').count() - 1;
         self.at = from + blank;
         self.line

@@ -145,7 +145,8 @@ impl BlockSlot {
         match ended? {
             BlockEnd::Done => self.counts.done += 1,
             BlockEnd::Failed => self.counts.failed += 1,
-            BlockEnd::Retry | BlockEnd::Released | BlockEnd::LeaseLost => {}
+            BlockEnd::LeaseLost => tracing::info!("the lease of the block is lost"),
+            BlockEnd::Retry | BlockEnd::Released => {}
         }
         Ok(())
     }

@@ -84,6 +84,14 @@ pub fn file_system_magic(_folder: &Path) -> Option<u64> {
     None
 }
 
+/// Returns whether the disk of a folder has no room for another file or for more bytes.
+pub fn is_disk_full(folder: &Path) -> bool {
+    rustix::fs::statvfs(folder).is_ok_and(|disk| {
+        // Some file systems do not count their files.
+        disk.f_bavail == 0 || disk.f_files > 0 && disk.f_favail == 0
+    })
+}
+
 /// Returns `false`: only Windows names the shares of other machines in paths.
 pub const fn is_share(_folder: &Path) -> bool {
     false

@@ -234,6 +234,11 @@ pub fn is_out_of_files(error: &io::Error) -> bool {
     error.raw_os_error() == Some(ERROR_TOO_MANY_OPEN_FILES)
 }
 
+/// Returns `false`: Windows names a full disk in its errors.
+pub const fn is_disk_full(_folder: &Path) -> bool {
+    false
+}
+
 /// Returns `false`: Windows has no limit for all processes.
 pub const fn is_system_out_of_files(_error: &io::Error) -> bool {
     false

@@ -136,7 +136,7 @@ impl Game {
     }
 
     pub(super) async fn retry(&mut self) {
-        let retried = self.world.catalog.retry(&RetrySelection::All).await;
+        let retried = self.world.retry(&RetrySelection::All).await;
         assert_eq!(retried.expect("retried"), self.model.retry());
     }
 

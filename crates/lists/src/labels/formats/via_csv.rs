@@ -12,6 +12,7 @@ use crate::labels::model::PageFile;
 use crate::labels::page_choice::{PageEntry, choose_page};
 use crate::labels::page_fit::check_count;
 use crate::labels::region::PageRegions;
+use crate::quotes::check_quotes;
 use mocban_core::domain::cancel::polled;
 
 /// Column of shapes, by which the format is recognized.
@@ -40,9 +41,12 @@ pub(in crate::labels) fn read(
     let delimiter = [b';', b'\t']
         .into_iter()
         .find(|c| header.contains(char::from(*c)));
+    let delimiter = delimiter.unwrap_or(b',');
+    check_quotes(text.as_bytes(), delimiter)
+        .map_err(|error| LabelsProblem::at(format!("line {}", error.line), error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
-        .delimiter(delimiter.unwrap_or(b','))
+        .delimiter(delimiter)
         .from_reader(text.as_bytes());
     let columns = columns(reader.headers().map_err(|error| damaged(&error))?)?;
     let mut images: Vec<PageEntry> = Vec::new();

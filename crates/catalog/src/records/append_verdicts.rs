@@ -1,0 +1,391 @@
+//! Appends verdicts on current results, with a few statements for many verdicts.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+
+use crate::db::conn::Conn;
+use crate::db::dialect::Sql;
+use crate::db::query::{query_as, query_scalar};
+use crate::db::rows::json_array;
+use crate::records::checksums::{self, ChecksummedTable};
+use crate::records::review_context::ReviewContext;
+use crate::records::verdicts::NewVerdict;
+use crate::{Catalog, CatalogError, Result};
+use mocban_core::domain::{
+    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
+};
+
+/// Number of verdicts that are appended together.
+const CHUNK: usize = 1_000;
+
+/// A verdict of a list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ListedVerdict {
+    /// The verdict.
+    pub verdict: NewVerdict,
+    /// The judged result, if the list names it.
+    pub judged: Option<ContentHash>,
+}
+
+/// Counts of an import of verdicts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ImportedVerdicts {
+    /// Number of verdicts of which a row was appended.
+    pub recorded: u64,
+    /// Number of verdicts that were stored already.
+    pub known: u64,
+    /// Number of verdicts that name another result than the current one.
+    pub left_out: u64,
+}
+
+/// Selects the current results of pairs. A pair that is not done has one row whose metric is NULL.
+const JUDGED: Sql = Sql::pair(
+    "
+SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
+    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id, m.metric",
+    "
+SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
+    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+WHERE p.name = ANY (ARRAY(SELECT atom FROM json_each(?1))) ORDER BY p.id, m.metric",
+);
+
+/// Builds the condition that a row of `verdict` is on the result and by the reviewer of an item, and was not undone or
+/// set apart. The first elements of an item are its number, pair, metric, reviewer and result.
+macro_rules! is_of_item {
+    () => {
+        "v.pair = CAST(value ->> 1 AS bigint) AND v.metric = value ->> 2 AND v.reviewer = value ->> 3
+        AND v.result_hash = unhex(value ->> 4)
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+        AND NOT EXISTS (SELECT 1 FROM set_apart AS s WHERE s.record = 2 AND s.row = v.id)"
+    };
+}
+
+/// Selects the numbers of items of which a verdict with the same values and an id up to `?2` is stored.
+const STORED: &str = concat!(
+    "
+SELECT CAST(value ->> 0 AS bigint) FROM json_each(?1) AS item WHERE EXISTS (SELECT 1 FROM verdict AS v
+    WHERE ",
+    is_of_item!(),
+    "
+        AND v.verdict = value ->> 5 AND v.reason IS NOT DISTINCT FROM value ->> 6
+        AND v.note IS NOT DISTINCT FROM value ->> 7 AND v.at = CAST(value ->> 8 AS bigint) AND v.id <= ?2)"
+);
+
+/// Selects the reviewer's newest verdict on the result of each item.
+const NEWEST: &str = concat!(
+    "
+SELECT CAST(value ->> 0 AS bigint), last.verdict, last.reason, last.note FROM json_each(?1) AS item
+    JOIN verdict AS last ON last.id = (SELECT v.id FROM verdict AS v WHERE ",
+    is_of_item!(),
+    " ORDER BY v.id DESC LIMIT 1)"
+);
+
+/// Selects which of some events are stored for which metrics.
+const EVENTS: &str =
+    "SELECT event, metric FROM verdict WHERE event IN (SELECT atom FROM json_each(?1))";
+
+/// Begins an action of each reviewer of a list.
+const ACTS: &str = "
+INSERT INTO review_act (reviewer) SELECT atom FROM json_each(?1) ORDER BY key RETURNING id, reviewer";
+
+const INSERT: &str = "
+INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, note, at,
+    event, seen, shown_ms, angle_read_deg, review_order)
+SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), value ->> 2, unhex(value ->> 4), value ->> 5, value ->> 3,
+    value ->> 6, value ->> 7, CAST(value ->> 8 AS bigint), value ->> 9, unhex(value ->> 10),
+    CAST(value ->> 11 AS bigint), CAST(value ->> 12 AS double precision), value ->> 13
+FROM json_each(?1) ORDER BY key
+RETURNING id";
+
+/// A result that a verdict judges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct JudgedResult {
+    pair: i64,
+    metric: ThresholdMetric,
+    hash: ContentHash,
+}
+
+/// What a verdict says.
+type Content = (Verdict, Option<Reason>, Option<String>);
+
+/// A verdict on one result.
+struct VerdictRowDraft<'v> {
+    /// Position of the verdict in its part of the list.
+    row: usize,
+    new: &'v NewVerdict,
+    result: JudgedResult,
+}
+
+impl VerdictRowDraft<'_> {
+    /// Returns what two verdicts share if one of them can replace the other.
+    fn key(&self) -> (JudgedResult, &str) {
+        (self.result, &self.new.reviewer)
+    }
+
+    fn content(&self) -> Content {
+        let new = self.new;
+        (new.verdict, new.reason, new.note.clone())
+    }
+
+    /// Returns whether the verdict counts as stored if it equals the reviewer's newest one. Without a time, a verdict with
+    /// a context, such as an angle, is always new.
+    fn is_compared_with_newest(&self) -> bool {
+        self.new.at.is_none() && self.new.look == ReviewContext::default()
+    }
+
+    /// Returns the item for a statement. `first` is its number, or the number of its action.
+    fn item(&self, first: i64, now: UnixMillis) -> Value {
+        let Self { new, result, .. } = self;
+        let look = &new.look;
+        json!([
+            first,
+            result.pair,
+            result.metric.name(),
+            new.reviewer,
+            result.hash,
+            new.verdict.name(),
+            new.reason.map(Reason::name),
+            new.note,
+            new.at.unwrap_or(now),
+            look.event,
+            look.seen,
+            look.shown_ms,
+            look.angle_read_deg,
+            look.review_order.map(ReviewOrder::name),
+        ])
+    }
+}
+
+impl Catalog {
+    /// Appends verdicts on the current results in one transaction. Skips a verdict whose `event` is already stored for
+    /// the metric. Skips a verdict with `at` if a verdict with the same values, which was not undone, was stored before
+    /// this call. Skips a verdict without `at` and context if it equals the reviewer's newest one. Returns the number of
+    /// verdicts of which a row was appended.
+    ///
+    /// # Errors
+    /// As for [`Self::import_verdicts`].
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
+        let listed = verdicts.into_iter().map(|verdict| {
+            Ok(ListedVerdict {
+                verdict,
+                judged: None,
+            })
+        });
+        Ok(self.import_verdicts(listed, now).await?.recorded)
+    }
+
+    /// Appends the verdicts of a list as [`Self::verdict_set`] does. Leaves out a verdict that names another result than the
+    /// current one. Reads the list in parts, so that it need not be in memory.
+    ///
+    /// # Errors
+    /// Returns an error if a pair or the judged result does not exist, or if a database operation fails; also the first
+    /// error of the list. In these cases nothing is stored.
+    pub async fn import_verdicts<I>(&self, mut list: I, now: UnixMillis) -> Result<ImportedVerdicts>
+    where
+        I: Iterator<Item = Result<ListedVerdict>> + Send + 'static,
+    {
+        self.in_transaction(move |conn| {
+            Box::pin(async move {
+                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
+                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
+                let mut counts = ImportedVerdicts::default();
+                loop {
+                    let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
+                    if part.is_empty() {
+                        return Ok(counts);
+                    }
+                    let of_part = append(conn, &part, newest, now).await?;
+                    counts.recorded += of_part.recorded;
+                    counts.known += of_part.known;
+                    counts.left_out += of_part.left_out;
+                }
+            })
+        })
+        .await
+    }
+}
+
+/// Appends verdicts on the current results. Compares a verdict with a time only with rows up to the id `newest`, so that two
+/// equal ones of one list are both stored.
+///
+/// # Errors
+/// Returns an error if a pair or the judged result does not exist, or if a database operation fails.
+async fn append(
+    conn: &mut Conn,
+    rows: &[ListedVerdict],
+    newest: i64,
+    now: UnixMillis,
+) -> Result<ImportedVerdicts> {
+    let results = current_results(conn, rows).await?;
+    let mut counts = ImportedVerdicts::default();
+    let mut candidates = Vec::with_capacity(rows.len());
+    for (row, listed) in rows.iter().enumerate() {
+        let of_pair = results.get(&listed.verdict.pair);
+        let results = judged(listed, of_pair.map(Vec::as_slice))?;
+        counts.left_out += u64::from(results.is_none());
+        let results = results.into_iter().flatten();
+        candidates.extend(results.map(|result| VerdictRowDraft {
+            row,
+            new: &listed.verdict,
+            result,
+        }));
+    }
+    let new = without_stored(conn, candidates, newest, now).await?;
+    let acts = begin_acts(conn, &new).await?;
+    counts.recorded = acts.len() as u64;
+    counts.known = rows.len() as u64 - counts.left_out - counts.recorded;
+    let items = new
+        .iter()
+        .filter_map(|new| Some(new.item(*acts.get(&new.row)?, now)));
+    let mut ids: Vec<i64> = query_scalar(INSERT)
+        .bind(json_array(items))
+        .fetch_all(&mut *conn)
+        .await?;
+    ids.sort_unstable();
+    checksums::store(conn, ChecksummedTable::Verdict, &ids).await?;
+    Ok(counts)
+}
+
+/// Returns the current results of the pairs, by name. A pair that is not done has none.
+async fn current_results(
+    conn: &mut Conn,
+    rows: &[ListedVerdict],
+) -> Result<BTreeMap<PairName, Vec<JudgedResult>>> {
+    let names: BTreeSet<_> = rows.iter().map(|row| row.verdict.pair.as_str()).collect();
+    let found: Vec<(PairName, i64, Option<ThresholdMetric>, Option<ContentHash>)> =
+        query_as(JUDGED)
+            .bind(json_array(names))
+            .fetch_all(conn)
+            .await?;
+    let mut results: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (name, pair, metric, hash) in found {
+        let of_pair = results.entry(name).or_default();
+        of_pair.extend(
+            metric
+                .zip(hash)
+                .map(|(metric, hash)| JudgedResult { pair, metric, hash }),
+        );
+    }
+    Ok(results)
+}
+
+/// Returns the results that a verdict judges, or `None` if it names a result that is not current. `current` are the results
+/// of its pair, if there is such a pair.
+fn judged(
+    listed: &ListedVerdict,
+    current: Option<&[JudgedResult]>,
+) -> Result<Option<Vec<JudgedResult>>> {
+    let new = &listed.verdict;
+    let Some(current) = current else {
+        return Err(CatalogError::UnknownPair(new.pair.clone()));
+    };
+    let is_wanted =
+        |result: &&JudgedResult| new.metric.is_none_or(|wanted| wanted == result.metric);
+    let wanted: Vec<_> = current.iter().filter(is_wanted).copied().collect();
+    if let Some(named) = listed.judged {
+        let is_current = wanted.iter().any(|result| result.hash == named);
+        return Ok(is_current.then_some(wanted));
+    }
+    match new.metric {
+        _ if current.is_empty() => Err(CatalogError::NoResult(new.pair.clone())),
+        Some(metric) if wanted.is_empty() => {
+            Err(CatalogError::NoMetricResult(new.pair.clone(), metric))
+        }
+        Some(_) | None => Ok(Some(wanted)),
+    }
+}
+
+/// Removes the verdicts that are stored already: those whose event is stored for the metric; those with a time if the same
+/// values are stored; those without a time and a context that equal the reviewer's newest verdict on the result.
+async fn without_stored<'v>(
+    conn: &mut Conn,
+    candidates: Vec<VerdictRowDraft<'v>>,
+    newest: i64,
+    now: UnixMillis,
+) -> Result<Vec<VerdictRowDraft<'v>>> {
+    let mut events = stored_events(conn, &candidates).await?;
+    let with_time = (0..).zip(&candidates);
+    let with_time = with_time.filter(|(_, new)| new.new.at.is_some());
+    let items = json_array(with_time.map(|(number, new)| new.item(number, now)));
+    let stored = query_scalar(STORED).bind(items).bind(newest);
+    let stored: BTreeSet<i64> = stored.fetch_all(&mut *conn).await?.into_iter().collect();
+    let mut last = newest_contents(conn, &candidates, now).await?;
+    let mut new = Vec::with_capacity(candidates.len());
+    for (number, candidate) in (0..).zip(candidates) {
+        let of_result = (candidate.result, candidate.new.reviewer.clone());
+        let content = candidate.content();
+        let is_known = stored.contains(&number)
+            || candidate.is_compared_with_newest() && last.get(&of_result) == Some(&content);
+        let event = candidate.new.look.event.clone();
+        if !is_known && event.is_none_or(|event| events.insert((event, candidate.result.metric))) {
+            last.insert(of_result, content);
+            new.push(candidate);
+        }
+    }
+    Ok(new)
+}
+
+/// Returns which events of the candidates are stored for which metrics.
+async fn stored_events(
+    conn: &mut Conn,
+    candidates: &[VerdictRowDraft<'_>],
+) -> Result<BTreeSet<(String, ThresholdMetric)>> {
+    let events = candidates.iter();
+    let events: BTreeSet<_> = events
+        .filter_map(|new| new.new.look.event.as_deref())
+        .collect();
+    if events.is_empty() {
+        return Ok(BTreeSet::new());
+    }
+    let found = query_as(EVENTS).bind(json_array(events));
+    Ok(found.fetch_all(conn).await?.into_iter().collect())
+}
+
+/// Returns the newest verdicts by the reviewers on the results that need a comparison with them.
+async fn newest_contents(
+    conn: &mut Conn,
+    candidates: &[VerdictRowDraft<'_>],
+    now: UnixMillis,
+) -> Result<BTreeMap<(JudgedResult, String), Content>> {
+    let compared = candidates.iter();
+    let compared: BTreeMap<_, _> = compared
+        .filter(|new| new.is_compared_with_newest())
+        .map(|new| (new.key(), new))
+        .collect();
+    let compared: Vec<_> = compared.into_values().collect();
+    let items = (0..).zip(&compared);
+    let items = json_array(items.map(|(number, new)| new.item(number, now)));
+    let found: Vec<(i64, Verdict, Option<Reason>, Option<String>)> =
+        query_as(NEWEST).bind(items).fetch_all(conn).await?;
+    let found = found.into_iter().map(|(number, verdict, reason, note)| {
+        let new = compared[number as usize];
+        let of_result = (new.result, new.new.reviewer.clone());
+        (of_result, (verdict, reason, note))
+    });
+    Ok(found.collect())
+}
+
+/// Begins an action for each verdict with a new row. Returns the actions by position of the verdict.
+async fn begin_acts(conn: &mut Conn, new: &[VerdictRowDraft<'_>]) -> Result<BTreeMap<usize, i64>> {
+    let reviewers: BTreeMap<usize, &str> = new
+        .iter()
+        .map(|new| (new.row, new.new.reviewer.as_str()))
+        .collect();
+    let begun = query_as(ACTS).bind(json_array(reviewers.values().copied()));
+    let mut begun: Vec<(i64, String)> = begun.fetch_all(conn).await?;
+    begun.sort_unstable();
+    // The database may return the actions in any order.
+    let mut of_reviewer: BTreeMap<String, std::vec::IntoIter<i64>> = BTreeMap::new();
+    let mut ids: BTreeMap<String, Vec<i64>> = BTreeMap::new();
+    for (id, reviewer) in begun {
+        ids.entry(reviewer).or_default().push(id);
+    }
+    of_reviewer.extend(ids.into_iter().map(|(name, ids)| (name, ids.into_iter())));
+    let acts = reviewers.into_iter().filter_map(|(row, reviewer)| {
+        let act = of_reviewer.get_mut(reviewer)?.next()?;
+        Some((row, act))
+    });
+    Ok(acts.collect())
+}

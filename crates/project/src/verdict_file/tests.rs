@@ -1,0 +1,210 @@
+//! Tests of the parsers of verdict files.
+
+use super::{RefusedLine, VerdictList, VerdictRow, check_values, refuse_unknown};
+use mocban_core::domain::{PairName, Reason, ThresholdMetric, Verdict};
+
+fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+    VerdictList::new(bytes.to_vec(), false)?.rows().collect()
+}
+
+fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+    VerdictList::new(bytes.to_vec(), true)?.rows().collect()
+}
+
+fn error(text: &str) -> String {
+    parse_csv(text.as_bytes()).expect_err("refused").to_string()
+}
+
+#[test]
+fn columns_may_be_in_any_order_and_optional_ones_missing() {
+    let text = "reviewer,pair,verdict,metric,reason,note\n\
+                lan,0001,pass,,,\n\
+                lan,0002,fail,density,strokes_lost,\"thin, broken\"\n";
+    let rows = parse_csv(text.as_bytes()).expect("valid");
+    assert_eq!(rows[0].listed.verdict.verdict, Verdict::Pass);
+    assert_eq!(rows[0].listed.verdict.metric, None);
+    assert_eq!(rows[1].line, 3);
+    assert_eq!(
+        rows[1].listed.verdict.metric,
+        Some(ThresholdMetric::Density)
+    );
+    assert_eq!(rows[1].listed.verdict.reason, Some(Reason::StrokesLost));
+    assert_eq!(rows[1].listed.verdict.note.as_deref(), Some("thin, broken"));
+    assert_eq!(parse_csv(b"pair,verdict,reviewer\n").expect("valid"), []);
+}
+
+#[test]
+fn times_are_parsed_and_other_texts_refused() {
+    let rows =
+        parse_csv(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
+    let rows = rows.expect("valid");
+    assert_eq!(rows[0].listed.verdict.at, Some(1_795_234_203_000));
+    assert_eq!(rows[1].listed.verdict.at, None);
+    let refused = error("pair,verdict,reviewer,at\n1,pass,lan,yesterday\n");
+    assert!(
+        refused.starts_with("line 2: at is \"yesterday\""),
+        "{refused}"
+    );
+}
+
+#[test]
+fn files_of_spreadsheets_are_read() {
+    let plain = parse_csv(b"pair,verdict,reviewer,note\n1,pass,lan,\"a, b\"\n").expect("valid");
+    let semicolons = "pair;verdict;reviewer;note\r\n1;pass;lan;a, b\r\n";
+    let tabs = semicolons.replace(';', "\t");
+    let utf16: Vec<u8> = "\u{feff}"
+        .chars()
+        .chain(tabs.chars())
+        .flat_map(|c| (c as u16).to_le_bytes())
+        .collect();
+    for bytes in [semicolons.as_bytes(), tabs.as_bytes(), &utf16] {
+        assert_eq!(parse_csv(bytes).expect("valid"), plain);
+    }
+    let cut = parse_csv(&utf16[..utf16.len() - 1]).expect_err("truncated");
+    assert!(cut.to_string().contains("UTF-16"), "{cut}");
+    let latin = parse_csv(b"pair;verdict;reviewer\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
+    assert!(latin.to_string().contains("CSV UTF-8"), "{latin}");
+}
+
+#[test]
+fn invalid_line_is_reported_by_number() {
+    assert_eq!(
+        error("pair,verdict,reviewer\n1,pass,lan\n2,maybe,lan\n"),
+        "line 3: \"maybe\" is not a verdict (pass, fail, unsure)"
+    );
+    assert!(error("pair,verdict,reviewer\n1,pass,\n").starts_with("line 2: reviewer is empty"));
+    let rude = error("pair,ver\u{1b}[2J\n");
+    assert!(!rude.contains('\u{1b}'), "{rude}");
+    assert!(error("pair,verdict\n").starts_with("line 1: column reviewer is missing"));
+    assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
+    assert!(error("pair,verdict,reviewer\n1,pass\n").starts_with("line 2: 2 cells"));
+    assert!(error("pair,verdict,reviewer\na/b,pass,lan\n").starts_with("line 2: id"));
+}
+
+#[test]
+fn values_that_no_verdict_has_are_refused_by_line() {
+    const NOW: i64 = 1_800_000_000_000;
+    let refused = |rows: Result<Vec<_>, RefusedLine>| {
+        let rows: Vec<VerdictRow> = rows.expect("a list");
+        rows.iter()
+            .try_for_each(|row| check_values(row, NOW))
+            .map_err(|error| error.to_string())
+    };
+    let good = "1,pass,lan,,,\n";
+    for (row, why) in [
+        (
+            "1,pass,\"lan\nminh\",,,\n",
+            "the reviewer's name must be one line",
+        ),
+        (
+            "1,pass,lan\u{1b}[2J,,,\n",
+            "the reviewer's name must be one line",
+        ),
+        ("1,pass,lan,angle,,\n", "only a fail has a reason"),
+        ("1,pass,lan,,a\0b,\n", "a note is text of at most 2000"),
+        (
+            "1,pass,lan,,,2999-01-01\n",
+            "the time of a verdict is from 1970",
+        ),
+        (
+            "1,pass,lan,,,1815-01-01\n",
+            "the time of a verdict is from 1970",
+        ),
+    ] {
+        let text = format!("pair,verdict,reviewer,reason,note,at\n{good}{row}");
+        let error = refused(parse_csv(text.as_bytes())).expect_err(row);
+        assert!(error.starts_with(&format!("line 3: {why}")), "{error}");
+    }
+    let good = r#""pair":"1","verdict":"pass","reviewer":" lan ""#;
+    for (field, why) in [
+        ("", ""),
+        (r#","at":9223372036854775807"#, "the time of a verdict"),
+        (r#","angle_read_deg":900"#, "an angle is from"),
+        (r#","shown_ms":18446744073709551615"#, "the display time"),
+        (r#","event":"a\u0000""#, "an event is 1 to 64"),
+    ] {
+        let text = format!("{{{good}{field}}}\n");
+        let checked = refused(parse_jsonl(text.as_bytes()));
+        let error = checked.err().unwrap_or_default();
+        assert!(
+            error.trim_start_matches("line 1: ").starts_with(why),
+            "{error}"
+        );
+        assert_eq!(error.is_empty(), why.is_empty(), "{field}");
+    }
+    let twice = error("pair,verdict,reviewer,pair\n1,pass,lan,2\n");
+    assert!(
+        twice.starts_with("line 1: column pair is there twice"),
+        "{twice}"
+    );
+}
+
+#[test]
+fn unknown_pair_is_reported_by_line() {
+    let id = |text: &str| text.parse::<PairName>().expect("valid id");
+    let lines = [("1", 2), ("2", 3), ("0", 4)].map(|(pair, line)| (id(pair), line));
+    let unknown = ["0", "2"].map(id);
+    let error = refuse_unknown(&lines.into(), &unknown).expect_err("refused");
+    assert!(
+        error.to_string().starts_with("line 3: there is no pair 2"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_quote_that_takes_in_further_verdicts_is_refused() {
+    let text = "pair,verdict,reviewer,note\n1,pass,lan,ok\n2,fail,lan,\"thin\n3,fail,lan,ok\n";
+    assert_eq!(
+        error(text),
+        "line 3: a quote is opened here and never closed"
+    );
+    let closed = format!("{text}4,pass,lan,\"ok\"\n");
+    let closed = error(&closed);
+    assert!(
+        closed.starts_with("line 3: a quote is opened here, and the next one, on line 5,"),
+        "{closed}"
+    );
+}
+
+#[test]
+fn json_lines_are_read_back_without_undone_verdicts() {
+    let text = r#"{"id":1,"act":1,"pair":"0001","metric":"density","verdict":"fail","reviewer":"lan","reason":"angle","note":"a, b","at":5,"undone_at":null,"current":true}
+
+{"pair":"0001","verdict":"pass","reviewer":"lan","undone_at":7}
+{"pair":"0002","verdict":"pass","reviewer":"lan"}
+"#;
+    let rows = parse_jsonl(text.as_bytes()).expect("valid");
+    assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [1, 4]);
+    let first = &rows[0].listed.verdict;
+    assert_eq!(first.metric, Some(ThresholdMetric::Density));
+    assert_eq!(first.verdict, Verdict::Fail);
+    assert_eq!(first.reason, Some(Reason::Angle));
+    assert_eq!(first.note.as_deref(), Some("a, b"));
+    assert_eq!(rows[1].listed.verdict.metric, None);
+}
+
+#[test]
+fn invalid_json_line_is_reported_by_number() {
+    let good = r#"{"pair":"1","verdict":"pass","reviewer":"lan"}"#;
+    for (line, why) in [
+        (
+            r#"{"pair":"1","verdict":"maybe","reviewer":"lan"}"#,
+            "maybe",
+        ),
+        (
+            r#"{"pair":"1","verdict":"pass","reviewer":" "}"#,
+            "reviewer is empty",
+        ),
+        (r#"{"pair":"1","verdict":"pass"}"#, "reviewer"),
+        ("pass", "expected"),
+    ] {
+        let text = format!("{good}\n{line}\n");
+        let error = parse_jsonl(text.as_bytes())
+            .expect_err("refused")
+            .to_string();
+        assert!(
+            error.starts_with("line 2: ") && error.contains(why),
+            "{error}"
+        );
+    }
+}
