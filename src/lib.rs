@@ -30,11 +30,11 @@
 //!     stroke maps, scores, confidence)
 //! 11. `crates/runner/src/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `crates/store/src/artifacts.rs`: writes artifact files by content hash
-//! 13. `crates/catalog/src/queue/commit/group_commit.rs`: stores up to 256 requests that wait for the writer task of this process in one
-//!     transaction; all other writes, such as import, registration and recovery, have their own; several processes take
-//!     turns by SQLite's lock (`busy_retry.rs`)
-//! 14. `crates/catalog/src/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a finished
-//!     stage and renew or end the lease
+//! 13. `crates/catalog/src/queue/commit/group_commit.rs`: stores up to 256 requests that wait for the writer task of this
+//!     process in one transaction; all other writes, such as import, registration and recovery, have their own; several
+//!     processes take turns by SQLite's lock (`busy_retry.rs`)
+//! 14. `crates/catalog/src/queue/checkpoint.rs` (`server_checkpoint.rs` for PostgreSQL): the statements that record a
+//!     finished stage and renew or end the lease
 //! 15. `crates/catalog/src/records/pair_results.rs`: reads results back, with the verdicts of `verdicts.rs` beside it; the
 //!     scores come from `stage_result.outcome`, the hash that verdicts refer to from `metric_result`
 //! 16. `crates/report/src/build.rs`: iterates over all pairs
@@ -46,9 +46,9 @@
 //!
 //! Smaller files on the way: `cli/import.rs` and `cli/manifest_file.rs` (the command that imports), `manifest/draft.rs`
 //! (checks the values of a row), `cli/run.rs` (the command that runs), `runner/pair_context.rs` (the data of a pair
-//! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `queue/commit/writer.rs` (the task that owns
-//! the write connection), `queue/commit/batch_collector.rs` (collects the requests of a commit), `records/stage_results.rs` (the
-//! SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
+//! between its stages), `stage_inputs.rs` and `stage_output.rs` beside the executor, `queue/commit/writer.rs` (the task that
+//! owns the write connection), `queue/commit/batch_collector.rs` (collects the requests of a commit),
+//! `records/stage_results.rs` (the SQL that reads results), `catalog/new_catalog.rs` (a new project is durable when its catalog gets its name),
 //! `runner/run_metrics.rs` (counts and times, which heartbeats store for `status --hosts`),
 //! `records/pair_work.rs` (attributes and earlier results of leased pairs), `records/checksums.rs` (checksums of the
 //! rows that no run can compute again), `cli/report.rs`, `report/headline.rs` (the answer in three
@@ -59,7 +59,9 @@
 //! ## Whole blocks
 //!
 //! A whole **block** is the scan of a carved face with the image of its page. Its job has the stages `face`, `align`,
-//! `boxes` and `cut`, and rows of its own in the catalog (`catalog/blocks`). A process works on one block at a time, and on
+//! `boxes` and `cut`. It is one of two kinds of job: the queue is written once for both, with statements in which the names
+//! of a kind are filled in (`catalog/queue/kind.rs`); `queue/pair_job.rs` and `blocks/block_job.rs` have these names and
+//! what a kind stores besides, and `blocks/queue.rs` the operations on blocks. A process works on one block at a time, and on
 //! pairs only while it has no block: `block_slot.rs` in `runner` leases it, `block_task.rs` reads the versions of its
 //! files and computes a stage on a thread, and `block_checkpoint.rs` stores the result before the next stage begins.
 //! `run_selection.rs` selects the blocks and pairs of a run that names some. The
@@ -90,10 +92,10 @@
 //! SQLite that it uses. All writes except group commits hold one lock, so they run one after another in both databases.
 //! Every test of the catalog runs on both.
 //!
-//! Claims and checkpoints have statements for each database. In SQLite, a group commit is one transaction
-//! (`queue/commit/group_commit.rs`). In PostgreSQL, each claim, and the checkpoints of a batch, are one statement that commits by
-//! itself (`queue/commit/server_commit.rs`, `queue/server_claim.rs`, `queue/server_checkpoint.rs`). Its rows are one array per column
-//! (`db/column_arrays.rs`), and settings of the write connection keep the planner to indexes (`db/postgres.rs`).
+//! Claims, and checkpoints of pairs, have statements for each database. In SQLite, a group commit is one transaction
+//! (`queue/commit/group_commit.rs`). In PostgreSQL, each claim, and the checkpoints of a batch, are one statement that
+//! commits by itself (`queue/commit/server_commit.rs`, `queue/server_claim.rs`, `queue/server_checkpoint.rs`). Its rows are
+//! one array per column (`db/column_arrays.rs`), and settings of the write connection keep the planner to indexes (`db/postgres.rs`).
 //!
 //! In PostgreSQL, claims begin behind the last claimed pair (`queue/claim_start.rs`), because they would otherwise pass over
 //! all pairs claimed before while another session holds a snapshot. So they do not always lease the most advanced pairs
@@ -104,11 +106,11 @@
 //! database refuses what a role may not do, such as a verdict under another name. `records/review_rights.rs` asks for these
 //! rights first, so that `review` and `verdict` can say what is missing.
 //!
-//! If the server is unavailable, the writer task reconnects and repeats its commit (`queue/commit/write_connection.rs`); if the
-//! server refuses the connection for good, the run ends. If an earlier attempt was stored but its reply was lost, the
+//! If the server is unavailable, the writer task reconnects and repeats its commit (`queue/commit/write_connection.rs`); if
+//! the server refuses the connection for good, the run ends. If an earlier attempt was stored but its reply was lost, the
 //! fencing token and the position of the job show it; leases whose claim had no reply are searched for too
-//! (`queue/commit/known_leases.rs`). The write connection of each worker holds a lock (`queue/worker_lock.rs`): a worker whose
-//! lock is free for about 7 seconds and that sends no heartbeat is dead, except after an outage (`runner/liveness.rs`).
+//! (`queue/commit/known_leases.rs`). The write connection of each worker holds a lock (`queue/worker_lock.rs`): a worker
+//! whose lock is free for about 7 seconds and that sends no heartbeat is dead, except after an outage (`runner/liveness.rs`).
 //! The transaction that recovers its pairs looks again first (`queue/recovery.rs`). `Catalog::retry_while_unavailable`
 //! repeats the reads and other writes of a run. `runner/run_guard.rs` refuses runs with other settings.
 //!
@@ -136,8 +138,8 @@
 //! Each of them increases the job's fencing token.
 //!
 //! All writes under a lease are fenced; a release checks only worker and token. The statements in
-//! `crates/catalog/src/queue/checkpoint.rs`, `server_checkpoint.rs` and `fail.rs` change a job only if the worker and the token
-//! equal those of the lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock.
+//! `crates/catalog/src/queue/checkpoint.rs`, `server_checkpoint.rs` and `fail.rs`, for pairs and blocks, change a job only
+//! if the worker and the token equal those of the lease, the worker has not ended, and its last heartbeat is at most one lease old by its own clock.
 //! If a statement returns no row for a job, nothing of that job's request is stored, and the worker learns it from the
 //! reply of `crates/catalog/src/queue/api.rs`:
 //!
