@@ -11,12 +11,7 @@ const COPIES: [&str; 5] = [
     SELECT j.pair, r.stage, r.fingerprint, r.mesh_hash, r.print_hash, r.attributes, r.outcome, r.files, r.result_hash, r.ms,
         r.worker, r.at
     FROM job AS j CROSS JOIN stage_result AS r ON r.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
-    "INSERT INTO metric_result (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale,
-        shift_x_px, shift_y_px, ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth,
-        disagreements, missing_ink, missing_wood, margin, confidence, at_bound, result_hash)
-    SELECT j.pair, m.metric, m.threshold_level, m.threshold_depth, m.print_from_depth, m.angle_deg, m.scale,
-        m.shift_x_px, m.shift_y_px, m.ssim, m.nl_ssim, m.iou, m.iou_box, m.dice, m.density_print, m.density_depth,
-        m.disagreements, m.missing_ink, m.missing_wood, m.margin, m.confidence, m.at_bound, m.result_hash
+    "INSERT INTO metric_result (pair, metric, result_hash) SELECT j.pair, m.metric, m.result_hash
     FROM job AS j CROSS JOIN metric_result AS m ON m.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
     "INSERT INTO attempt (pair, stage, worker, ms, at)
     SELECT j.pair, a.stage, a.worker, a.ms, a.at

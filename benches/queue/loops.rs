@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use mocban::domain::{ContentHash, Stage};
-use serde_json::json;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
@@ -32,12 +31,7 @@ const INPUTS: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id =
 const COUNTER: &str = "
 UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2
     AND fingerprint = coalesce((SELECT id FROM fingerprint WHERE stage = ?1 - 1), 0)";
-const METRIC: &str = "
-INSERT INTO metric_result
-    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
-     missing_wood, margin, confidence, at_bound, result_hash)
-VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0, 0.0, 0.0, 0.5, 0.75, 0, ?4)";
+const METRIC: &str = "INSERT INTO metric_result (pair, metric, result_hash) VALUES (?1, ?2, ?3)";
 
 /// Runs `pairs` pairs through all stages. Each worker has its own connection.
 pub(super) async fn work(
@@ -99,19 +93,16 @@ async fn checkpoint(
     token: i64,
 ) -> anyhow::Result<()> {
     let (done, at) = (fake.done(stage), stage.index() as i64);
-    let made_with = done.made_with;
-    let bytes = |hash: ContentHash| hash.as_bytes().to_vec();
-    let (mesh, print) = (
-        made_with.mesh_hash.map(bytes),
-        made_with.print_hash.map(bytes),
-    );
+    let hash = |hash: Option<ContentHash>| hash.map(|hash| hash.as_bytes().to_vec());
+    let mesh = hash(done.made_with.mesh_hash);
+    let print = hash(done.made_with.print_hash);
     sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
     let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(token);
     anyhow::ensure!(step.execute(&mut *conn).await?.rows_affected() == 1);
     let result = sqlx::query(RESULT).bind(pair).bind(at).bind(&mesh);
     let result = result
         .bind(&print)
-        .bind(made_with.attributes)
+        .bind(done.made_with.attributes)
         .bind(done.outcome);
     let result = result.bind(done.result_hash.as_bytes().to_vec());
     result.bind(fake.worker.0).execute(&mut *conn).await?;
@@ -122,7 +113,6 @@ async fn checkpoint(
     for metric in done.metrics {
         let row = sqlx::query(METRIC).bind(pair);
         let row = row.bind(metric.outcome.metric.name());
-        let row = row.bind(json!(metric.outcome.print_from_depth).to_string());
         let row = row.bind(metric.result_hash.as_bytes().to_vec());
         row.execute(&mut *conn).await?;
     }

@@ -125,31 +125,11 @@ CREATE TABLE stage_result (
     CHECK (stage < 2 OR print_hash IS NOT NULL)
 ) STRICT;
 
--- The scores of each threshold metric, and where its mask and the ink disagree: the number of pieces, and their areas as
--- shares. A verdict refers to a result by its result_hash.
+-- The hash of the current result of each threshold metric, by which verdicts refer to it. The scores are in the outcome of
+-- the last stage.
 CREATE TABLE metric_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
-    threshold_level INTEGER NOT NULL,
-    threshold_depth REAL NOT NULL,
-    print_from_depth TEXT NOT NULL CHECK (json_valid(print_from_depth)),
-    angle_deg REAL NOT NULL,
-    scale REAL NOT NULL,
-    shift_x_px REAL NOT NULL,
-    shift_y_px REAL NOT NULL,
-    ssim REAL NOT NULL,
-    nl_ssim REAL NOT NULL,
-    iou REAL NOT NULL,
-    iou_box REAL NOT NULL,
-    dice REAL NOT NULL,
-    density_print REAL NOT NULL,
-    density_depth REAL NOT NULL,
-    disagreements INTEGER NOT NULL,
-    missing_ink REAL NOT NULL,
-    missing_wood REAL NOT NULL,
-    margin REAL NOT NULL,
-    confidence REAL CHECK (confidence BETWEEN 0 AND 1),
-    at_bound INTEGER NOT NULL CHECK (at_bound IN (0, 1)),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
     PRIMARY KEY (pair, metric)
 ) STRICT;

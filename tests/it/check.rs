@@ -202,10 +202,6 @@ fn rows_and_counters_that_disagree_are_found_and_repaired() {
             "metrics",
             "UPDATE metric_result SET result_hash = zeroblob(32) WHERE pair = 1 AND metric = 'relief'",
         ),
-        (
-            "metrics",
-            "UPDATE metric_result SET ssim = ssim * 0.999 WHERE pair = 1 AND metric = 'relief'",
-        ),
         ("schema", "DROP TRIGGER verdict_no_delete"),
         ("schema", "DROP INDEX job_ready"),
         // A pair without a job, and one that failed without a reason.

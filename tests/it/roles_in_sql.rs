@@ -24,7 +24,7 @@ const FORBIDDEN: [&str; 31] = [
     "DELETE FROM checksum",
     "INSERT INTO checksum VALUES (0, 1000, 0)",
     "INSERT INTO checksum VALUES (2, 1000, 0)",
-    "UPDATE metric_result SET ssim = 1",
+    "UPDATE metric_result SET pair = 1",
     "UPDATE pair SET mesh_path = ''",
     "UPDATE job SET status = 0",
     "UPDATE counter_part SET n = 0",

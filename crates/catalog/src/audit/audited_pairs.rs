@@ -6,13 +6,10 @@ use crate::db::conn::Conn;
 use crate::db::query::query;
 use crate::db::row::{FromRow as _, Row, from_row};
 use crate::db::rows::json_array;
-use crate::queue::lease::MetricResult;
 use crate::records::pair_work::{self, KnownInputs};
+use crate::records::stage_results::METRIC_HASHES;
 use crate::{Catalog, Result};
-use mocban_core::domain::{
-    ContentHash, Disagreement, JobStatus, MetricOutcome, PairId, PairName, Scores, Stage,
-    ThresholdMetric,
-};
+use mocban_core::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
 
 /// A pair as stored, with unparsed results.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +26,8 @@ pub struct AuditedPair {
     pub has_failure: bool,
     /// Every stored result, also of stages that are to run again. Results with invalid values are left out.
     pub results: BTreeMap<Stage, AuditedResult>,
-    /// The rows of the metrics. Rows with invalid values are left out.
-    pub metrics: BTreeMap<ThresholdMetric, MetricResult>,
+    /// Hashes of the results of the metrics. Rows with invalid values are left out.
+    pub metrics: BTreeMap<ThresholdMetric, ContentHash>,
 }
 
 /// Pairs that a check has read.
@@ -68,9 +65,6 @@ pub(crate) const RESULTS: &str = "
 SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = CAST(wanted.atom AS bigint)";
 
-const METRICS: &str = "
-SELECT m.* FROM json_each(?1) AS wanted CROSS JOIN metric_result AS m ON m.pair = CAST(wanted.atom AS bigint)";
-
 impl Catalog {
     /// Reads up to `limit` pairs with ids above `after`.
     ///
@@ -91,7 +85,7 @@ impl Catalog {
         }
         let ids = json_array(page.pairs.iter().map(|pair| pair.inputs.pair.0));
         let mut results = by_pair(&mut conn, RESULTS, &ids, result).await?;
-        let mut metrics = by_pair(&mut conn, METRICS, &ids, metric).await?;
+        let mut metrics = by_pair(&mut conn, METRIC_HASHES, &ids, metric).await?;
         for pair in &mut page.pairs {
             let id = pair.inputs.pair.0;
             pair.results = results.remove(&id).unwrap_or_default();
@@ -135,36 +129,6 @@ fn result(row: &Row) -> Result<(Stage, AuditedResult)> {
     Ok((row.get("stage")?, AuditedResult::from_row(row)?))
 }
 
-fn metric(row: &Row) -> Result<(ThresholdMetric, MetricResult)> {
-    let metric = row.get("metric")?;
-    let result = MetricResult {
-        outcome: MetricOutcome {
-            metric,
-            threshold_level: row.get("threshold_level")?,
-            threshold_depth: row.get("threshold_depth")?,
-            print_from_depth: row.get("print_from_depth")?,
-            angle_deg: row.get("angle_deg")?,
-            scale: row.get("scale")?,
-            shift_px: [row.get("shift_x_px")?, row.get("shift_y_px")?],
-            scores: Scores {
-                ssim: row.get("ssim")?,
-                nl_ssim: row.get("nl_ssim")?,
-                iou: row.get("iou")?,
-                iou_box: row.get("iou_box")?,
-                dice: row.get("dice")?,
-                density_print: row.get("density_print")?,
-                density_depth: row.get("density_depth")?,
-            },
-            disagreement: Disagreement {
-                pieces: row.get("disagreements")?,
-                missing_ink: row.get("missing_ink")?,
-                missing_wood: row.get("missing_wood")?,
-            },
-            margin: row.get("margin")?,
-            confidence: row.get("confidence")?,
-            at_bound: row.get("at_bound")?,
-        },
-        result_hash: row.get("result_hash")?,
-    };
-    Ok((metric, result))
+fn metric(row: &Row) -> Result<(ThresholdMetric, ContentHash)> {
+    Ok((row.get("metric")?, row.get("result_hash")?))
 }

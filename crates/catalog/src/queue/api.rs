@@ -6,7 +6,7 @@ use crate::queue::commit::request::{Message, Reply, Request};
 use crate::queue::counters::{JobCounts, by_status, counters};
 use crate::queue::job_counts::count_jobs;
 use crate::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
-use crate::{Catalog, Result};
+use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{UnixMillis, WorkerId, WorkerMetrics};
 
 impl Catalog {
@@ -75,8 +75,8 @@ impl Catalog {
     /// share it. Call [`Catalog::waiting`] to turn the delay off.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is stored, unless a server stored it and the
-    /// reply was lost. The lease remains until it is recovered.
+    /// Returns an error if a score is not a finite number, or if a database operation fails. In that case nothing is stored,
+    /// unless a server stored it and the reply was lost. The lease remains until it is recovered.
     pub async fn checkpoint(
         &self,
         lease: Lease,
@@ -85,6 +85,12 @@ impl Catalog {
         let Some(last) = stages.last() else {
             return Ok(CheckpointOutcome::Lease(lease));
         };
+        let mut metrics = stages.iter().flat_map(|stage| &stage.metrics);
+        if let Some(invalid) = metrics.find(|metric| !metric.is_finite()) {
+            let metric = invalid.outcome.metric;
+            let text = format!("a score of {metric} is not a finite number");
+            return Err(CatalogError::Corrupt(text));
+        }
         let advanced = lease.after(last);
         let item = Box::new((lease, stages));
         let stored = self

@@ -16,7 +16,7 @@ use crate::queue::pair_job::PairJob;
 use crate::queue::pair_job::UPDATE_INPUTS;
 use crate::queue::provenance::FingerprintId;
 use mocban_core::domain::{
-    ArtifactSet, ContentHash, JobStatus, MetricOutcome, ThresholdMetric, UnixMillis, WorkerId,
+    ArtifactSet, ContentHash, JobStatus, ThresholdMetric, UnixMillis, WorkerId,
 };
 use mocban_system::failpoint::{self, Point};
 
@@ -51,21 +51,10 @@ ON CONFLICT ({unit}, stage) DO UPDATE SET {made_with_updates}, outcome = exclude
 const CLEAR_METRICS: &str = "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
-/// Items: [`MetricItem`].
+/// Items: pair, metric, hash of its result.
 const METRICS: &str = "
-INSERT INTO metric_result
-    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, disagreements, missing_ink,
-     missing_wood, margin, confidence, at_bound, result_hash)
-SELECT value ->> 'pair', value ->> 'metric', value ->> 'threshold_level',
-    value ->> 'threshold_depth', value -> 'print_from_depth', value ->> 'angle_deg',
-    value ->> 'scale', value ->> '$.shift_px[0]', value ->> '$.shift_px[1]',
-    value ->> '$.scores.ssim', value ->> '$.scores.nl_ssim', value ->> '$.scores.iou',
-    value ->> '$.scores.iou_box', value ->> '$.scores.dice', value ->> '$.scores.density_print',
-    value ->> '$.scores.density_depth', value ->> '$.disagreement.pieces',
-    value ->> '$.disagreement.missing_ink', value ->> '$.disagreement.missing_wood',
-    value ->> 'margin', value ->> 'confidence', value ->> 'at_bound', unhex(value ->> 'hash')
-FROM jsonb_each(?)";
+INSERT INTO metric_result (pair, metric, result_hash)
+SELECT value ->> 0, value ->> 1, unhex(value ->> 2) FROM jsonb_each(?)";
 
 /// Items: unit, index of the stage, worker, milliseconds, time.
 static ATTEMPT: Template = Template::new(
@@ -153,14 +142,10 @@ pub(crate) fn add_results<K: StoredKind>(
     let metrics = || {
         each().flat_map(|(lease, one)| {
             let metrics = one.metrics.iter();
-            metrics.map(|metric| MetricItem {
-                pair: lease.id(),
-                hash: metric.result_hash,
-                outcome: &metric.outcome,
-            })
+            metrics.map(|result| (lease.id(), result.outcome.metric.name(), result.result_hash))
         })
     };
-    script.execute_over(CLEAR_METRICS, metrics().map(|metric| [metric.pair]))?;
+    script.execute_over(CLEAR_METRICS, metrics().map(|(pair, ..)| [pair]))?;
     script.execute_over(METRICS, metrics())?;
     let inputs = advanced.iter().filter_map(|(lease, stages)| {
         // The last stage with inputs also lists the inputs of all earlier stages.
@@ -202,15 +187,6 @@ impl<'i> ResultItem<'i, ()> {
             at: result.at,
         })
     }
-}
-
-/// An item of [`METRICS`].
-#[derive(Serialize)]
-struct MetricItem<'i> {
-    pair: i64,
-    hash: ContentHash,
-    #[serde(flatten)]
-    outcome: &'i MetricOutcome,
 }
 
 /// Returns the counter key of a job after a stage is stored.

@@ -138,6 +138,34 @@ pub struct MetricResult {
     pub result_hash: ContentHash,
 }
 
+impl MetricResult {
+    /// Returns whether all numbers except the confidence are finite. Others have no JSON, so they could not be read back.
+    pub(crate) fn is_finite(&self) -> bool {
+        let outcome = &self.outcome;
+        let scores = &outcome.scores;
+        let lost = &outcome.disagreement;
+        [
+            outcome.threshold_depth,
+            outcome.angle_deg,
+            outcome.scale,
+            outcome.shift_px[0],
+            outcome.shift_px[1],
+            outcome.margin,
+            scores.ssim,
+            scores.nl_ssim,
+            scores.iou,
+            scores.iou_box,
+            scores.dice,
+            scores.density_print,
+            scores.density_depth,
+            lost.missing_ink,
+            lost.missing_wood,
+        ]
+        .into_iter()
+        .all(f64::is_finite)
+    }
+}
+
 /// A finished stage: everything that its checkpoint stores.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageCheckpoint<K: JobKind = PairJob> {

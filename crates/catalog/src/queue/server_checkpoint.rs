@@ -69,33 +69,13 @@ column_arrays! {
 }
 
 column_arrays! {
-    /// A result of a metric.
+    /// The hash of a metric's result.
     MetricRow,
-    /// Results of metrics.
+    /// Hashes of metrics' results.
     MetricRows<'i>:
     position: "bigint" = i64,
     pair: "bigint" = i64,
     metric: "text" = &'static str,
-    threshold_level: "bigint" = i64,
-    threshold_depth: "double precision" = Option<f64>,
-    print_from_depth: "text" = String,
-    angle_deg: "double precision" = Option<f64>,
-    scale: "double precision" = Option<f64>,
-    shift_x_px: "double precision" = Option<f64>,
-    shift_y_px: "double precision" = Option<f64>,
-    ssim: "double precision" = Option<f64>,
-    nl_ssim: "double precision" = Option<f64>,
-    iou: "double precision" = Option<f64>,
-    iou_box: "double precision" = Option<f64>,
-    dice: "double precision" = Option<f64>,
-    density_print: "double precision" = Option<f64>,
-    density_depth: "double precision" = Option<f64>,
-    disagreements: "bigint" = i64,
-    missing_ink: "double precision" = Option<f64>,
-    missing_wood: "double precision" = Option<f64>,
-    margin: "double precision" = Option<f64>,
-    confidence: "double precision" = Option<f64>,
-    at_bound: "bigint" = i64,
     result_hash: "bytea" = &'i [u8],
 }
 
@@ -270,7 +250,7 @@ async fn store_with(
             results.push(result_row(position, job, one, is_last)?);
             let metrics_of_last = one.metrics.iter().filter(|_| is_last);
             for metric in metrics_of_last {
-                metrics.push(metric_row(position, lease.unit.0, metric)?);
+                metrics.push(metric_row(position, lease.unit.0, metric));
             }
         }
     }
@@ -353,39 +333,11 @@ fn bytes(hash: Option<&ContentHash>) -> Option<&[u8]> {
     hash.map(|hash| hash.as_bytes().as_slice())
 }
 
-fn metric_row(position: i64, pair: i64, result: &MetricResult) -> Result<MetricRow<'_>> {
-    let outcome = &result.outcome;
-    let scores = outcome.scores;
-    Ok(MetricRow {
+fn metric_row(position: i64, pair: i64, result: &MetricResult) -> MetricRow<'_> {
+    MetricRow {
         position,
         pair,
-        metric: outcome.metric.name(),
-        threshold_level: outcome.threshold_level.into(),
-        threshold_depth: finite(outcome.threshold_depth),
-        print_from_depth: serde_json::to_string(&outcome.print_from_depth)?,
-        angle_deg: finite(outcome.angle_deg),
-        scale: finite(outcome.scale),
-        shift_x_px: finite(outcome.shift_px[0]),
-        shift_y_px: finite(outcome.shift_px[1]),
-        ssim: finite(scores.ssim),
-        nl_ssim: finite(scores.nl_ssim),
-        iou: finite(scores.iou),
-        iou_box: finite(scores.iou_box),
-        dice: finite(scores.dice),
-        density_print: finite(scores.density_print),
-        density_depth: finite(scores.density_depth),
-        disagreements: outcome.disagreement.pieces.into(),
-        missing_ink: finite(outcome.disagreement.missing_ink),
-        missing_wood: finite(outcome.disagreement.missing_wood),
-        margin: finite(outcome.margin),
-        confidence: outcome.confidence.and_then(finite),
-        at_bound: outcome.at_bound.into(),
+        metric: result.outcome.metric.name(),
         result_hash: result.result_hash.as_bytes(),
-    })
-}
-
-/// Returns a number, or `None` if it is not finite, as in SQLite, where rows are JSON. The database refuses a row without a
-/// number, except the confidence.
-fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
+    }
 }

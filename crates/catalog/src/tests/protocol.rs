@@ -326,6 +326,19 @@ async fn one_failing_request_does_not_fail_its_batch() {
 }
 
 #[tokio::test]
+async fn a_score_that_is_not_a_number_is_not_stored() {
+    let world = World::new(1).await;
+    let lease = world.claim(1).await.remove(0);
+    let mut last = world.done(Stage::Register);
+    last.metrics[0].outcome.scores.dice = f64::NAN;
+    let stages = [Stage::Fit, Stage::Depth, Stage::Normalize].map(|stage| world.done(stage));
+    let stages = stages.into_iter().chain([last]).collect();
+    let refused = world.catalog.checkpoint(lease, stages).await;
+    assert!(matches!(refused, Err(CatalogError::Corrupt(_))));
+    assert_eq!(status(&world, "p0").await, JobStatus::Leased);
+}
+
+#[tokio::test]
 async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);

@@ -34,7 +34,7 @@ async fn check_constraints_and_enums_agree() {
         (event, pair, metric, result_hash, kind, attention_check, seen, verdict, reviewer, at)
         VALUES ('1', 1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'mirrored', '{}', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1)";
     let scored_metric = "INSERT INTO metric_result VALUES
-        (1, ?1, 1, 0, '{}', 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, unhex('0000000000000000000000000000000000000000000000000000000000000000'))";
+        (1, ?1, unhex('0000000000000000000000000000000000000000000000000000000000000000'))";
     let queue =
         "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)
         VALUES (1, 1, 'density', unhex('0000000000000000000000000000000000000000000000000000000000000000'), 'fail', 'me', 1, ?1)";

@@ -4,15 +4,12 @@ use std::collections::BTreeMap;
 
 use super::finding::{Finding, Kind};
 use crate::{metric_results, result_hash};
-use mocban_catalog::{AuditedPair, AuditedResult, InputVersion, MetricResult};
+use mocban_catalog::{AuditedPair, AuditedResult, InputVersion};
 use mocban_core::domain::{
-    ArtifactRef, ArtifactSet, JobStatus, MetricOutcome, PairId, RegisterOutcome, Stage,
+    ArtifactRef, ArtifactSet, ContentHash, JobStatus, PairId, RegisterOutcome, Stage,
     ThresholdMetric,
 };
 use mocban_store::{ArtifactError, InputError, Project, hash_input, stat_input};
-
-/// Largest relative difference between a number and its copy in a column.
-const ROUNDING: f64 = 1e-12;
 
 /// Result of the check of one pair.
 #[derive(Debug)]
@@ -155,7 +152,7 @@ fn state(pair: &AuditedPair) -> Vec<Finding> {
     // If the depth row is missing, a repair reruns the depth stage and replaces the metrics, so they need no check.
     if let (JobStatus::Done, Some(last)) = (status, last)
         && pair.results.contains_key(&Stage::Depth)
-        && metrics_of(pair, last).is_none_or(|metrics| !agree(&metrics, &pair.metrics))
+        && metrics_of(pair, last).is_none_or(|metrics| metrics != pair.metrics)
     {
         add(
             Kind::Metrics,
@@ -181,66 +178,19 @@ fn has_its_hash(result: &AuditedResult) -> bool {
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
 }
 
-/// Returns the result of each metric, derived from the results of the register and depth stages.
+/// Returns the hash of each metric's result, derived from the results of the register and depth stages.
 fn metrics_of(
     pair: &AuditedPair,
     register: &AuditedResult,
-) -> Option<BTreeMap<ThresholdMetric, MetricResult>> {
+) -> Option<BTreeMap<ThresholdMetric, ContentHash>> {
     let outcome: RegisterOutcome = serde_json::from_str(&register.outcome).ok()?;
     let files = serde_json::from_str(&register.files).ok()?;
     let depth = pair.results.get(&Stage::Depth);
     let depth: Option<ArtifactSet> =
         depth.and_then(|depth| serde_json::from_str(&depth.files).ok());
     let results = metric_results(&outcome.metrics, &files, depth.as_ref()).into_iter();
-    Some(
-        results
-            .map(|result| (result.outcome.metric, result))
-            .collect(),
-    )
-}
-
-/// Returns whether the rows of the metrics agree with the results of the stages. SQLite converts the rows' numbers from
-/// text and guarantees only 15 digits, so small differences are allowed.
-fn agree(
-    computed: &BTreeMap<ThresholdMetric, MetricResult>,
-    stored: &BTreeMap<ThresholdMetric, MetricResult>,
-) -> bool {
-    let is_close = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
-    computed.len() == stored.len()
-        && computed.iter().zip(stored).all(|((_, one), (_, other))| {
-            let (a, b) = (&one.outcome, &other.outcome);
-            let numbers = numbers(a).into_iter().zip(numbers(b));
-            one.result_hash == other.result_hash
-                && (a.metric, a.threshold_level, a.at_bound)
-                    == (b.metric, b.threshold_level, b.at_bound)
-                && a.print_from_depth == b.print_from_depth
-                && a.confidence.is_some() == b.confidence.is_some()
-                && numbers.into_iter().all(|(a, b)| is_close(a, b))
-        })
-}
-
-/// Returns the numbers of a metric's result that are stored in columns of their own.
-fn numbers(outcome: &MetricOutcome) -> [f64; 17] {
-    let scores = &outcome.scores;
-    [
-        outcome.threshold_depth,
-        outcome.angle_deg,
-        outcome.scale,
-        outcome.shift_px[0],
-        outcome.shift_px[1],
-        outcome.margin,
-        outcome.confidence.unwrap_or(0.0),
-        scores.ssim,
-        scores.nl_ssim,
-        scores.iou,
-        scores.iou_box,
-        scores.dice,
-        scores.density_print,
-        scores.density_depth,
-        f64::from(outcome.disagreement.pieces),
-        outcome.disagreement.missing_ink,
-        outcome.disagreement.missing_wood,
-    ]
+    let hashes = results.map(|result| (result.outcome.metric, result.result_hash));
+    Some(hashes.collect())
 }
 
 /// Lists input files that are missing, unreadable or changed since they were read. They are not damage, because a run
@@ -278,8 +228,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::{Kind, result_hash, state};
-    use mocban_catalog::{AuditedPair, AuditedResult, KnownInputs, MetricResult};
-    use mocban_core::domain::test_values::metric_outcome;
+    use mocban_catalog::{AuditedPair, AuditedResult, KnownInputs};
     use mocban_core::domain::{
         ArtifactSet, ContentHash, JobStatus, PairId, Stage, ThresholdMetric,
     };
@@ -347,12 +296,8 @@ mod tests {
         failed.has_failure = true;
         assert_eq!(found(&failed), []);
         let mut done = pair(JobStatus::Done, 4);
-        let metric = metric_outcome(ThresholdMetric::Ensemble, 0.9);
-        let result = MetricResult {
-            result_hash: ContentHash::of(b""),
-            outcome: metric,
-        };
-        done.metrics.insert(ThresholdMetric::Ensemble, result);
+        done.metrics
+            .insert(ThresholdMetric::Ensemble, ContentHash::of(b""));
         assert_eq!(found(&done), [(Kind::Metrics, Stage::Register)]);
     }
 }
