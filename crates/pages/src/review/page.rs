@@ -23,7 +23,6 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
     let head = html! {
         link rel="stylesheet" href="assets/review.css";
         link rel="stylesheet" href="assets/scan-viewer.css";
-        link rel="icon" href="assets/icon.svg";
         script type="module" src="assets/main.js" {}
     };
     let body = html! {
