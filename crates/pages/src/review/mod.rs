@@ -6,6 +6,7 @@
 mod alignment_editor;
 mod alignment_inputs;
 mod answer;
+mod api_error;
 mod assets;
 mod cache_slots;
 mod check_items;

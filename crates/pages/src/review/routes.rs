@@ -12,20 +12,18 @@ use axum::{Json, Router};
 use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
-use super::answer::{AnswerBody, InvalidInput, UndoBody};
+use super::answer::{AnswerBody, UndoBody};
+use super::api_error::ApiError;
 use super::history::ReviewerHistory;
 use super::i18n::Language;
-use super::image_error::ImageError;
 use super::item::ReviewItem;
 use super::item_images::ImageLayer;
 use super::page;
-use super::review_queue::QueueError;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
 use super::{assets, examples};
-use mocban_catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
+use mocban_catalog::{CatalogError, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
-use mocban_report::pair_artifacts::PairArtifactsError;
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
@@ -45,65 +43,6 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/align", post(align))
         .with_state(Arc::clone(state));
     state.access.guarded(pages)
-}
-
-/// Why a request fails.
-#[derive(Debug, thiserror::Error)]
-enum ApiError {
-    #[error("there is no such item")]
-    NoItem,
-    #[error("answer it first")]
-    NotAnswered,
-    #[error("answer every image first")]
-    NotFinished,
-    #[error("{0}")]
-    Body(#[from] JsonRejection),
-    #[error(transparent)]
-    Input(#[from] InvalidInput),
-    #[error(transparent)]
-    Catalog(#[from] CatalogError),
-    #[error(transparent)]
-    Queue(#[from] QueueError),
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    #[error(transparent)]
-    PairArtifacts(#[from] PairArtifactsError),
-}
-
-impl ApiError {
-    fn status(&self) -> StatusCode {
-        match self {
-            Self::NoItem | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
-            Self::NotAnswered | Self::NotFinished => StatusCode::FORBIDDEN,
-            Self::Body(rejection) => rejection.status(),
-            Self::Input(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::Image(ImageError::Gone) => StatusCode::GONE,
-            // The page resends what the server could not store.
-            Self::Catalog(_) | Self::Queue(_) | Self::Image(_) | Self::PairArtifacts(_) => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
-        }
-    }
-
-    /// Returns the message for the page, which shows it and sends the request again.
-    fn text(&self) -> String {
-        match self {
-            Self::Catalog(error) if error.kind() == Some(CatalogErrorKind::Full) => {
-                "the disk with the catalog is full; free some space there".to_owned()
-            }
-            error => error.to_string(),
-        }
-    }
-}
-
-impl IntoResponse for ApiError {
-    fn into_response(self) -> Response {
-        let status = self.status();
-        if status.is_server_error() {
-            tracing::warn!(error = %self, "a request of the review page failed");
-        }
-        (status, Json(json!({ "error": self.text() }))).into_response()
-    }
 }
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
