@@ -125,6 +125,12 @@ export function hint(text) {
   byId("hint").hidden = text === "";
 }
 
+/** Shows that fewer attention checks could be made than wanted. */
+export function faultShortage(shortage) {
+  byId("fault-shortage").hidden = !shortage;
+  if (shortage) byId("fault-shortage").textContent = translate("fault_shortage", shortage);
+}
+
 /** Announces a text in the live region, for screen readers too. */
 export const announce = (text) => (byId("live").textContent = text);
 

@@ -17,7 +17,8 @@ use mocban_catalog::{SetApart, StatusCounts};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_pages::review::{
-    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
+    self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
+    ReviewServer,
 };
 use mocban_runner::{Stop, StopLevel};
 
@@ -237,6 +238,16 @@ pub(super) fn review_step(counts: &StatusCounts) -> Option<String> {
     is_unjudged.then(|| review_command(user_name().as_deref()))
 }
 
+    if let Some(FaultShortage {
+        wanted,
+        planted,
+        example,
+    }) = page.shortage()
+    {
+        context.warn(&format!(
+            "only {planted} of {wanted} attention checks could be planted, because files of results cannot be read ({example}); `check` lists them"
+        ));
+    }
 /// Returns the `review` command with the user's name as the reviewer.
 fn review_command(user: Option<&str>) -> String {
     let name = user.and_then(|user| reviewer_name(user).ok());

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::answer::InvalidInput;
 use super::image_error::ImageError;
-use super::review_queue::QueueError;
+use super::planted_faults::QueueError;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
 use mocban_report::pair_artifacts::PairArtifactsError;
 

@@ -67,6 +67,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             span #progress {}
             progress #bar value="0" max="1" aria-label=(language.translate("progress_bar")) {}
             @if let Some(label) = label { strong.label { (label) } }
+            strong #fault-shortage .label hidden {}
             span.spacer {}
             span #pace {}
             span #saved .saved role="status" { (language.translate("saved")) }

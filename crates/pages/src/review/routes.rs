@@ -116,6 +116,9 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
 async fn summary(State(state): State<Arc<ServerState>>) -> ApiResult {
     let queue = state.load_queue().await?;
     let summary = ReviewSummary::read(&state, &queue).await?;
+        "fault_shortage": queue.shortage.as_ref().map(|shortage| {
+            json!({ "made": shortage.planted, "wanted": shortage.wanted })
+        }),
     Ok(Json(json!(summary.ok_or(ApiError::NotFinished)?)))
 }
 
