@@ -9,6 +9,7 @@ use super::browser::open;
 use super::context::{Context, now, shell_quoted};
 use super::exit::{ExitCode, Refusal};
 use super::files::input_file_limits;
+use super::error_text;
 use super::output;
 use super::signals;
 use super::table::count;
@@ -125,6 +126,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     if page.counts().items == 0 {
         drop(page);
         catalog.close().await;
+        explain: error_text::catalog_text,
         if args.adjudicate {
             return no_conflict(&args, context);
         }

@@ -1,6 +1,9 @@
-//! Why a request of the page fails.
+//! Why a request of the page fails, and what the page shows then.
+
+use std::sync::Arc;
 
 use axum::Json;
+use axum::extract::State;
 use axum::extract::rejection::JsonRejection;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
@@ -9,6 +12,7 @@ use serde_json::json;
 use super::answer::InvalidInput;
 use super::image_error::ImageError;
 use super::planted_faults::QueueError;
+use super::state::ServerState;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
 use mocban_report::pair_artifacts::PairArtifactsError;
 
@@ -50,23 +54,57 @@ impl ApiError {
         }
     }
 
-    /// Returns the message for the page, which shows it and sends the request again.
-    fn text(&self) -> String {
+    fn catalog_error(&self) -> Option<&CatalogError> {
         match self {
-            Self::Catalog(error) if error.kind() == Some(CatalogErrorKind::Full) => {
+            Self::Catalog(error)
+            | Self::Queue(QueueError::Catalog(error))
+            | Self::Image(ImageError::Catalog(error)) => Some(error),
+            _ => None,
+        }
+    }
+
+    /// Returns the message that the page shows. Errors of the catalog are explained as in commands, except where a page
+    /// is used otherwise.
+    fn text(&self, state: &ServerState) -> String {
+        let Some(error) = self.catalog_error() else {
+            return self.to_string();
+        };
+        match error.kind() {
+            Some(CatalogErrorKind::Full) => {
                 "the disk with the catalog is full; free some space there".to_owned()
             }
-            error => error.to_string(),
+            Some(CatalogErrorKind::Unavailable) if state.catalog.is_shared() => {
+                "the database server of the catalog is not available; check that it runs, then try again: nothing stored is lost".to_owned()
+            }
+            // SQLite has no server: all its connections of this process are in use.
+            Some(CatalogErrorKind::Unavailable) => {
+                "too many requests use the catalog at the moment; try again".to_owned()
+            }
+            _ => (state.options.explain)(error, state.project.dir()),
         }
     }
 }
 
 impl IntoResponse for ApiError {
+    /// Returns a response whose text [`explain`] writes.
     fn into_response(self) -> Response {
-        let status = self.status();
-        if status.is_server_error() {
-            tracing::warn!(error = %self, "a request of the review page failed");
-        }
-        (status, Json(json!({ "error": self.text() }))).into_response()
+        let mut response = self.status().into_response();
+        response.extensions_mut().insert(Arc::new(self));
+        response
     }
+}
+
+/// Writes the text of a failed request into its response.
+pub(super) async fn explain(
+    State(state): State<Arc<ServerState>>,
+    mut response: Response,
+) -> Response {
+    let Some(error) = response.extensions_mut().remove::<Arc<ApiError>>() else {
+        return response;
+    };
+    let status = error.status();
+    if status.is_server_error() {
+        tracing::warn!(%error, "a request of the review page failed");
+    }
+    (status, Json(json!({ "error": error.text(&state) }))).into_response()
 }

@@ -8,12 +8,12 @@ use axum::extract::{Path, RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Json, Router};
+use axum::{Json, Router, middleware};
 use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
 use super::answer::{AnswerBody, UndoBody};
-use super::api_error::ApiError;
+use super::api_error::{self, ApiError};
 use super::history::ReviewerHistory;
 use super::i18n::Language;
 use super::item::ReviewItem;
@@ -42,6 +42,10 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
         .with_state(Arc::clone(state));
+        .layer(middleware::map_response_with_state(
+            Arc::clone(state),
+            api_error::explain,
+        ))
     state.access.guarded(pages)
 }
 
