@@ -9,6 +9,7 @@ mod block_status;
 mod browser;
 mod busy;
 mod check;
+mod closing;
 mod compare;
 mod completions;
 mod config;

@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::closing::close;
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::failures::Failures;
@@ -182,7 +183,6 @@ pub(super) async fn drive(
     })
     .await;
     progress.end();
-    watch.abort();
     // After an error, the catalog may not reply any more.
     let ended = match ended {
         Ok(summary) => {
@@ -191,7 +191,8 @@ pub(super) async fn drive(
         }
         Err(error) => Err(error.into()),
     };
-    catalog.close().await;
+    close(catalog, &stop).await;
+    watch.abort();
     ended
 }
 

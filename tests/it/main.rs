@@ -115,6 +115,8 @@ mod semi_real;
 mod session_browser;
 mod shim;
 #[cfg(unix)]
+#[cfg(target_os = "linux")]
+mod silent_review;
 mod silent_server;
 mod small_block;
 mod snapshots;

@@ -13,6 +13,7 @@ use super::answer::InvalidInput;
 use super::image_error::ImageError;
 use super::planted_faults::QueueError;
 use super::state::ServerState;
+use super::unstored::Unconfirmed;
 use mocban_catalog::{CatalogError, CatalogErrorKind};
 use mocban_report::pair_artifacts::PairArtifactsError;
 
@@ -30,6 +31,8 @@ pub(super) enum ApiError {
     #[error(transparent)]
     Input(#[from] InvalidInput),
     #[error(transparent)]
+    Unconfirmed(#[from] Unconfirmed),
+    #[error(transparent)]
     Catalog(#[from] CatalogError),
     #[error(transparent)]
     Queue(#[from] QueueError),
@@ -42,21 +45,25 @@ pub(super) enum ApiError {
 impl ApiError {
     fn status(&self) -> StatusCode {
         match self {
-            Self::NoItem | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
+            Self::NoItem => StatusCode::NOT_FOUND,
+            Self::Unconfirmed(error) if !error.is_temporary() => StatusCode::NOT_FOUND,
             Self::NotAnswered | Self::NotFinished => StatusCode::FORBIDDEN,
             Self::Body(rejection) => rejection.status(),
             Self::Input(_) => StatusCode::UNPROCESSABLE_ENTITY,
             Self::Image(ImageError::Gone) => StatusCode::GONE,
             // The page resends what the server could not store.
-            Self::Catalog(_) | Self::Queue(_) | Self::Image(_) | Self::PairArtifacts(_) => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
+            Self::Unconfirmed(_)
+            | Self::Catalog(_)
+            | Self::Queue(_)
+            | Self::Image(_)
+            | Self::PairArtifacts(_) => StatusCode::SERVICE_UNAVAILABLE,
         }
     }
 
     fn catalog_error(&self) -> Option<&CatalogError> {
         match self {
             Self::Catalog(error)
+            | Self::Unconfirmed(Unconfirmed::Catalog(error))
             | Self::Queue(QueueError::Catalog(error))
             | Self::Image(ImageError::Catalog(error)) => Some(error),
             _ => None,

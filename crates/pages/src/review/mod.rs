@@ -27,6 +27,7 @@ mod routes;
 mod server;
 mod state;
 mod summary;
+mod unstored;
 
 pub use check_items::CheckRates;
 pub use i18n::Language;

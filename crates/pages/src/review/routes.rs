@@ -21,6 +21,7 @@ use super::item_images::ImageLayer;
 use super::page;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
+use super::unstored::confirmation_limit;
 use super::{assets, examples};
 use mocban_catalog::{CatalogError, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
@@ -41,11 +42,11 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
-        .with_state(Arc::clone(state));
         .layer(middleware::map_response_with_state(
             Arc::clone(state),
             api_error::explain,
         ))
+        .with_state(Arc::clone(state));
     state.access.guarded(pages)
 }
 
@@ -85,6 +86,8 @@ async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
         "keys": state.options.keys,
         "review_order": state.options.queue.order,
         "min_view_ms": state.options.min_view_ms,
+        // Longer than the server waits for the catalog.
+        "send_limit_ms": 3 * confirmation_limit().as_millis() as u64 / 2,
         "examples": examples::EXAMPLES,
         "messages": BTreeMap::from(messages),
     }))
@@ -113,6 +116,9 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
         "items": items.collect::<Vec<_>>(),
         "pairs": pairs,
         "opens_guide": state.options.opens_guide && queue.history.is_empty(),
+        "fault_shortage": queue.shortage.as_ref().map(|shortage| {
+            json!({ "made": shortage.planted, "wanted": shortage.wanted })
+        }),
     })))
 }
 
@@ -120,9 +126,6 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
 async fn summary(State(state): State<Arc<ServerState>>) -> ApiResult {
     let queue = state.load_queue().await?;
     let summary = ReviewSummary::read(&state, &queue).await?;
-        "fault_shortage": queue.shortage.as_ref().map(|shortage| {
-            json!({ "made": shortage.planted, "wanted": shortage.wanted })
-        }),
     Ok(Json(json!(summary.ok_or(ApiError::NotFinished)?)))
 }
 
@@ -221,7 +224,7 @@ async fn answer(
     let stored = state
         .catalog
         .answer(verdict, item.shown(), (state.options.now)());
-    let is_new = stored.await?;
+    let is_new = state.unstored.store(&body.event, stored).await?;
     Ok(Json(json!({ "stored": body.event, "new": is_new })))
 }
 
@@ -232,7 +235,8 @@ async fn undo(
     let Json(body) = body?;
     let reviewer = &state.options.queue.reviewer;
     let now = (state.options.now)();
-    state.catalog.undo_event(&body.event, reviewer, now).await?;
+    let undone = state.catalog.undo_event(&body.event, reviewer, now);
+    state.unstored.store(&body.event, undone).await?;
     Ok(Json(json!({ "undone": body.event })))
 }
 
@@ -262,7 +266,9 @@ async fn align(
     };
     let summary = json!(AlignmentSummary::of(&item, &record));
     let now = (state.options.now)();
-    state.catalog.store_manual_alignment(record, now).await?;
+    let event = record.event.clone();
+    let stored = state.catalog.store_manual_alignment(record, now);
+    state.unstored.store(&event, stored).await?;
     Ok(Json(summary))
 }
 

@@ -11,6 +11,7 @@ use super::options::ReviewOptions;
 use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use super::routes;
 use super::state::ServerState;
+use super::unstored::UnstoredEvents;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkFailed, WorkThread, listen, serve};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_store::Project;
@@ -81,6 +82,7 @@ pub async fn bind(
         catalog,
         project,
         options,
+        unstored: UnstoredEvents::default(),
         served_items: std::sync::Mutex::default(),
     };
     // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
@@ -126,10 +128,11 @@ impl ReviewServer {
     }
 
     /// Serves requests until `stop` completes, and then at most two seconds longer. Returns the number of requests that
-    /// were cut off without a response.
+    /// were cut off without a response, or that browsers keep because they are not stored.
     pub async fn serve(self, stop: impl Future<Output = ()>) -> usize {
         let router = routes::router(&self.state);
-        serve(self.listener, router, ConnectionLimits::system(), stop).await
+        let cut_off = serve(self.listener, router, ConnectionLimits::system(), stop).await;
+        cut_off + self.state.unstored.count()
     }
 }
 

@@ -8,6 +8,7 @@ use super::item_images::ImageCache;
 use super::options::ReviewOptions;
 use super::planted_faults::{FaultPlanter, QueueError};
 use super::review_queue::ReviewQueue;
+use super::unstored::UnstoredEvents;
 use crate::local_server::AccessControl;
 use mocban_catalog::Catalog;
 use mocban_store::Project;
@@ -21,6 +22,7 @@ pub(super) struct ServerState {
     pub(super) access: Arc<AccessControl>,
     pub(super) images: ImageCache,
     pub(super) planter: FaultPlanter,
+    pub(super) unstored: UnstoredEvents,
     /// Every item served since the server started, by id. Answers to these items are accepted even if their results
     /// were replaced.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
