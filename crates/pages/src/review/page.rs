@@ -104,7 +104,6 @@ fn viewer(language: Language) -> Markup {
         section #viewer tabindex="-1" aria-label=(language.translate("viewer")) {
             div.picture {
                 canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
-                p #hint .hint hidden {}
                 div #end .end tabindex="0" role="region" aria-label=(language.translate("summary")) hidden {}
             }
             p.caption { span #legend {} }
@@ -154,7 +153,8 @@ fn verdict_bar(language: Language) -> Markup {
                 (button("note", language))
                 (button("undo", language))
             }
-            div.reasons role="group" aria-label=(language.translate("reasons")) {
+            p #hint .hint hidden {}
+            div #reasons .reasons role="group" aria-label=(language.translate("reasons")) {
                 span { (language.translate("reasons")) }
                 @for reason in Reason::ALL { (button(reason.name(), language)) }
             }
