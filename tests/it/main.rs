@@ -2,6 +2,7 @@
 
 mod accessible;
 mod agreement;
+mod all_pages;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
@@ -114,9 +115,9 @@ mod semi_real;
 #[cfg(target_os = "linux")]
 mod session_browser;
 mod shim;
-#[cfg(unix)]
 #[cfg(target_os = "linux")]
 mod silent_review;
+#[cfg(unix)]
 mod silent_server;
 mod small_block;
 mod snapshots;

@@ -124,7 +124,7 @@ fn practice(language: Language) -> Markup {
 
 fn modes(language: Language) -> Markup {
     html! {
-        div.modes role="group" aria-label=(language.translate("modes")) {
+        section.modes aria-label=(language.translate("modes")) {
             @for mode in MODES.split_whitespace() { (toggle(mode, language)) }
             span.divider {}
             @for switch in SWITCHES.split_whitespace() { (toggle(switch, language)) }
