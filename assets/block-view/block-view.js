@@ -68,7 +68,7 @@ class BlockPage {
     });
     this.switch = element("button", { type: "button", "aria-pressed": "true", "aria-keyshortcuts": "B" }, text("boxes"));
     this.switch.addEventListener("click", () => this.toggleBoxes());
-    const zooms = [["closer", "+"], ["farther", "−"], ["whole", "0"]].map(([key, label]) => {
+    const zooms = [["closer", "+"], ["farther", "−"], ["whole", text("whole")]].map(([key, label]) => {
       const button = element("button", { type: "button", "aria-label": text(key), title: text(key) }, label);
       button.addEventListener("click", () => this.zoom(key));
       return button;
@@ -213,7 +213,8 @@ class BlockPage {
       const data = await response.arrayBuffer();
       // The dialog may have been closed while the data arrived.
       if (!container.isConnected) return;
-      const mounted = await mountScanViewer(container, data, { language, close: () => this.dialog.close() });
+      // The dialog has its own button, and closes on Escape.
+      const mounted = await mountScanViewer(container, data, { language });
       if (container.isConnected) this.mounted = mounted;
       else mounted.unmount();
     } catch (error) {

@@ -14,6 +14,8 @@ export const csrfToken = () => config.csrf_token;
 export const keys = () => config.keys;
 export const reviewOrder = config.review_order;
 export const minViewMs = config.min_view_ms;
+/** Time after which a request to store something is given up and sent again, ms. */
+export const sendLimitMs = config.send_limit_ms;
 /** Examples of the guide with their right answers. */
 export const examples = config.examples;
 export const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mirrored", "wrong_pair"];

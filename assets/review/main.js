@@ -337,6 +337,7 @@ try {
   requests.start();
   await queue.load(requests.requests);
   ui.saveState(requests.pendingCount, null);
+  ui.faultShortage(queue.faultShortage);
   await show();
   document.body.dataset.ready = "true";
   if (queue.opensGuide && queue.current) openGuide();

@@ -10,6 +10,8 @@ export class ReviewQueue {
     this.index = 0;
     /** Whether the page opens the guide at the start. */
     this.opensGuide = false;
+    /** Number of faults that were made and wanted, if fewer could be made. */
+    this.faultShortage = null;
     /** Item and event ids of the answers, oldest first. */
     this.events = [];
   }
@@ -18,8 +20,9 @@ export class ReviewQueue {
   async load(pending) {
     const response = await fetch("api/queue");
     if (!response.ok) throw new Error((await response.json()).error);
-    const { items, pairs, opens_guide: opensGuide } = await response.json();
+    const { items, pairs, opens_guide: opensGuide, fault_shortage: faultShortage } = await response.json();
     this.opensGuide = opensGuide;
+    this.faultShortage = faultShortage;
     this.items = items;
     this.pairs = pairs;
     const answered = this.items.filter((item) => item.answer);

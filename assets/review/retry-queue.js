@@ -1,6 +1,6 @@
 // Requests to store: sent in order, and retried until the server confirms that they are on the disk.
 
-import { csrfToken } from "./config.js";
+import { csrfToken, sendLimitMs } from "./config.js";
 
 const STORAGE_KEY = "mocban-pending";
 /** Number of unsaved requests at which the page accepts no more answers. */
@@ -68,17 +68,20 @@ export class RetryQueue {
 
   /** Sends one request. Returns `{ stored }`, `{ why }` if it is rejected for good, or `{ retry }` with the problem. */
   async send({ path, body }) {
-    let response;
+    let response, stored;
     try {
       response = await fetch(path, {
         method: "POST",
         headers: { "content-type": "application/json", "x-csrf-token": csrfToken() },
         body: JSON.stringify(body),
+        // Also ends a response that stops in the middle. An event that arrives twice is stored once.
+        signal: AbortSignal.timeout(sendLimitMs),
       });
+      if (response.ok) stored = await response.json();
     } catch {
       return { retry: "disconnected" };
     }
-    if (response.ok) return { stored: await response.json() };
+    if (response.ok) return { stored };
     if (response.status === 401) {
       this.moveToNewSession();
       return { retry: "restarted" };

@@ -119,10 +119,17 @@ export function legend(entries, extra) {
   byId("legend").replaceChildren(...marks, extra);
 }
 
-/** Shows a hint over the lower edge of the image. */
+/** Shows a hint below the verdicts, in place of the reasons, so that the image stays whole and in its place. */
 export function hint(text) {
   byId("hint").textContent = text;
   byId("hint").hidden = text === "";
+  byId("reasons").hidden = text !== "";
+}
+
+/** Shows that fewer attention checks could be made than wanted. */
+export function faultShortage(shortage) {
+  byId("fault-shortage").hidden = !shortage;
+  if (shortage) byId("fault-shortage").textContent = translate("fault_shortage", shortage);
 }
 
 /** Announces a text in the live region, for screen readers too. */

@@ -62,8 +62,10 @@ class MountedScan {
       return made;
     };
     const buttons = [button("reset", () => this.reset()), ...(this.close ? [button("close", () => this.close())] : [])];
+    // Over a page, whose heading is the first, it is a part.
+    const level = this.container.closest("dialog") ? "h2" : "h1";
     return element("div", { class: "scan-side" },
-      element("h2", {}, this.scan.header.pair ?? text("view")),
+      element(level, { class: "scan-title" }, this.scan.header.pair ?? text("view")),
       this.panel.root,
       element("div", { class: "scan-buttons" }, ...buttons),
       this.status,

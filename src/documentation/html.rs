@@ -119,7 +119,14 @@ fn content(markdown: &str) -> String {
         other => other.clone(),
     });
     pulldown_cmark::html::push_html(&mut html, with_ids);
-    html
+    with_focusable_frames(&html)
+}
+
+/// Lets keyboards reach and scroll what may be wider than the page: code, and tables, which get a frame.
+fn with_focusable_frames(html: &str) -> String {
+    html.replace("<pre>", "<pre tabindex=\"0\">")
+        .replace("<table>", "<div class=\"wide\" tabindex=\"0\"><table>")
+        .replace("</table>", "</table></div>")
 }
 
 /// Returns the text from the beginning of a heading to its end.

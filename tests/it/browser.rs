@@ -28,6 +28,33 @@ struct Pipes {
     calls: u64,
     /// Errors of scripts.
     script_errors: Vec<String>,
+    /// Errors on the console, and requests that failed.
+    problems: Vec<String>,
+}
+
+impl Pipes {
+    /// Records what an event says is wrong. The status of a page itself is not wrong: a page that is not open says why.
+    fn record(&mut self, event: &Value) {
+        let params = &event["params"];
+        let is_wrong = match event["method"].as_str() {
+            Some("Runtime.exceptionThrown") => {
+                self.script_errors.push(params.to_string());
+                true
+            }
+            Some("Runtime.consoleAPICalled") => params["type"] == "error",
+            Some("Log.entryAdded") => {
+                params["entry"]["level"] == "error" && params["entry"]["source"] != "network"
+            }
+            Some("Network.loadingFailed") => params["canceled"] != true,
+            Some("Network.responseReceived") => {
+                params["type"] != "Document" && params["response"]["status"].as_u64() >= Some(400)
+            }
+            _ => false,
+        };
+        if is_wrong {
+            self.problems.push(event.to_string());
+        }
+    }
 }
 
 /// Finds Chromium: `CHROME`, or one of its names on `PATH`.
@@ -94,6 +121,7 @@ impl Browser {
                 from,
                 calls: 0,
                 script_errors: Vec::new(),
+                problems: Vec::new(),
             }),
             _dir: dir,
         })
@@ -128,13 +156,16 @@ impl Browser {
                 .expect("the browser speaks");
             assert_eq!(bytes.pop(), Some(0), "the browser is gone");
             let response: Value = serde_json::from_slice(&bytes).expect("JSON");
-            if response["method"] == "Runtime.exceptionThrown" {
-                pipes.script_errors.push(response["params"].to_string());
-            }
+            pipes.record(&response);
             if response["id"] == id {
                 return response;
             }
         }
+    }
+
+    /// Returns errors on the console and requests that failed since the last call.
+    pub(crate) fn take_problems(&self) -> Vec<String> {
+        std::mem::take(&mut self.pipes.borrow_mut().problems)
     }
 
     /// Opens a tab of the given size.
@@ -151,10 +182,10 @@ impl Browser {
             session: session["sessionId"].as_str().expect("a session").to_owned(),
         };
         tab.call("Page.enable", &json!({}));
-        tab.call("Runtime.enable", &json!({}));
-        let size =
-            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
-        tab.call("Emulation.setDeviceMetricsOverride", &size);
+        for domain in ["Runtime", "Log", "Network"] {
+            tab.call(&format!("{domain}.enable"), &json!({}));
+        }
+        tab.resize([width, height]);
         tab
     }
 }
@@ -182,6 +213,13 @@ pub(crate) struct Tab<'a> {
 impl Tab<'_> {
     fn call(&self, method: &str, params: &Value) -> Value {
         self.browser.call(Some(&self.session), method, params)
+    }
+
+    /// Changes the size of the window.
+    pub(crate) fn resize(&self, [width, height]: [u32; 2]) {
+        let size =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        self.call("Emulation.setDeviceMetricsOverride", &size);
     }
 
     /// Navigates to a URL.

@@ -2,6 +2,7 @@
 
 mod accessible;
 mod agreement;
+mod all_pages;
 #[cfg(target_os = "linux")]
 mod attacks;
 mod backup;
@@ -115,6 +116,8 @@ mod semi_real;
 #[cfg(target_os = "linux")]
 mod session_browser;
 mod shim;
+#[cfg(target_os = "linux")]
+mod silent_review;
 #[cfg(unix)]
 mod silent_server;
 mod small_block;

@@ -229,7 +229,8 @@ impl Drop for Page {
     }
 }
 
-fn review(project: &Project, reviewer: &str) -> Command {
+/// Returns the command of a reviewer's page.
+pub(crate) fn review(project: &Project, reviewer: &str) -> Command {
     let mut command = binary();
     command.arg("-C").arg(project.dir());
     command.args(["--json", "review", "--no-open", "--reviewer", reviewer]);

@@ -70,7 +70,7 @@ pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }
 
-fn saved(tab: &Tab<'_>) {
+pub(crate) fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
 

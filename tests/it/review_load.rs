@@ -46,7 +46,7 @@ fn half_open_and_slow_connections_do_not_delay_other_requests() {
 }
 
 /// Sends the head of an answer and waits until the server asks for the body.
-fn begun_answer(page: &Page, body: &str) -> TcpStream {
+pub(crate) fn begun_answer(page: &Page, body: &str) -> TcpStream {
     let headers = page.headers().into_iter();
     let headers = headers.map(|(name, value)| format!("{name}: {value}"));
     let lines = [

@@ -1,14 +1,17 @@
 //! The review server stores a verdict only for the result that was shown, and does not reveal the metric of an item.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead as _, BufReader};
+use std::process::Stdio;
 
 use mocban::catalog::{AttentionCheckAnswer, Catalog};
-use mocban::domain::{Reason, Verdict};
+use mocban::domain::artifact_role::DEPTH;
+use mocban::domain::{PairName, Reason, Stage, Verdict};
 use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::{Call, mocban};
-use crate::page::{NO_CHECKS, Page, answer, open_review};
+use crate::page::{NO_CHECKS, Page, answer, open_review, read_project, review};
 
 /// Opens a project's catalog and reads from it.
 pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
@@ -192,6 +195,84 @@ fn attention_checks_are_stored_apart_and_not_revealed_by_the_page() {
             .iter()
             .all(|item| item["answer"]["verdict"] == "pass")
     );
+}
+
+/// Removes the artifact files of a project.
+fn remove_artifacts(project: &Project) {
+    std::fs::remove_dir_all(project.artifacts_dir()).expect("removed");
+}
+
+#[test]
+fn attention_checks_that_were_planted_stay_although_files_are_lost() {
+    let (_dir, project, page) = open_review(&[]);
+    let ids = || {
+        let queue = page.queue();
+        let ids = queue.iter().map(|item| item["id"].to_string());
+        ids.collect::<Vec<_>>()
+    };
+    let before = ids();
+    remove_artifacts(&project);
+    assert_eq!(ids(), before);
+    let queue = page.get("/api/queue").json();
+    assert_eq!(queue["fault_shortage"], Value::Null);
+}
+
+#[test]
+fn attention_checks_that_cannot_be_planted_are_told() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    remove_artifacts(&project);
+    let mut command = review(&project, "lan");
+    command.stderr(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().expect("the binary starts");
+    let lines = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    let mut lines = lines.map(|line| line.expect("a line"));
+    let warning = lines.find(|line| line.starts_with("warning: only "));
+    child.kill().expect("killed");
+    child.wait().expect("dead");
+    let warning = warning.expect("a warning");
+    let start = "warning: only 0 of 5 attention checks could be planted, because files of results cannot be read (";
+    assert!(warning.starts_with(start), "{warning}");
+    let page = Page::open(&project, "lan", &[]);
+    let queue = page.get("/api/queue").json();
+    assert_eq!(queue["fault_shortage"], json!({ "made": 0, "wanted": 5 }));
+}
+
+/// Answers every item. Returns the pairs in which faults were planted.
+fn pairs_with_faults(project: &Project, page: &Page) -> BTreeSet<PairName> {
+    for (number, item) in page.queue().iter().enumerate() {
+        let body = answer(
+            &format!("{}-{number}", page.pid().as_raw_nonzero()),
+            item,
+            "fail",
+        );
+        let reply = page.post("/api/answer", &body).expect("a reply");
+        assert_eq!(reply.status, 200);
+    }
+    let answers = check_answers(project).into_iter();
+    let faults = answers.filter(|answer| answer.check.is_fault());
+    faults.map(|answer| answer.pair).collect()
+}
+
+#[test]
+fn another_result_takes_the_place_of_one_that_cannot_be_read() {
+    let options = ["--attention-checks", "1", "--duplicates", "0"];
+    let (_dir, project, page) = open_review(&options);
+    let first = pairs_with_faults(&project, &page);
+    drop(page);
+    for pair in &first {
+        let depth = ask(&project, async |catalog| {
+            let detail = catalog.pair(pair).await.expect("the pair");
+            let results = detail.expect("the pair").results;
+            results.stage(Stage::Depth).expect("a result").files[DEPTH].clone()
+        });
+        std::fs::remove_file(project.artifact_path(&depth)).expect("removed");
+    }
+    let page = Page::open(&project, "lan", &options);
+    let queue = page.get("/api/queue").json();
+    assert_eq!(queue["fault_shortage"], Value::Null);
+    let both = pairs_with_faults(&project, &page);
+    assert!(both.len() > first.len(), "{first:?} {both:?}");
 }
 
 #[test]

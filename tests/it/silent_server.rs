@@ -7,17 +7,20 @@ use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::fleet::Fleet;
+use crate::lab::Lab;
+
+/// The process that accepts connections.
+const FIRST: &str = "SELECT split_part(pg_read_file('postmaster.pid'), chr(10), 1)::integer";
+/// The processes that serve other connections.
+const OTHERS: &str = "
+    SELECT pid FROM pg_stat_activity WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()";
 
 /// Processes of a server that were suspended. They go on when it is dropped.
-struct Suspended(Vec<Pid>);
+pub(crate) struct Suspended(Vec<Pid>);
 
 impl Suspended {
     /// Suspends the process that accepts connections, and then the processes that serve the workers.
     fn server(fleet: &Fleet) -> Self {
-        const FIRST: &str =
-            "SELECT CAST(split_part(pg_read_file('postmaster.pid'), chr(10), 1) AS integer)";
-        const OTHERS: &str = "
-            SELECT pid FROM pg_stat_activity WHERE backend_type = 'client backend' AND pid <> pg_backend_pid()";
         let mut suspended = Self(Vec::new());
         fleet.on_server(async |conn| {
             suspended.add(sqlx::query_scalar(FIRST).fetch_one(&mut *conn).await?);
@@ -27,6 +30,19 @@ impl Suspended {
             Ok(())
         });
         assert!(suspended.0.len() > 1, "no worker is connected");
+        suspended
+    }
+
+    /// Suspends the same processes of the server of a [`Lab`].
+    pub(crate) fn of_lab(lab: &Lab) -> Self {
+        let mut session = lab.session("mocban");
+        let mut suspended = Self(Vec::new());
+        for sql in [FIRST, OTHERS] {
+            for row in session.sql(sql).expect("rows") {
+                suspended.add(row[0].parse().expect("a number"));
+            }
+        }
+        assert!(suspended.0.len() > 1, "no page is connected");
         suspended
     }
 

@@ -122,6 +122,12 @@ pub fn describe(error: &anyhow::Error, project: &Path) -> String {
     without_error_numbers(&text)
 }
 
+/// Returns the sentence that explains an error of the catalog.
+pub fn catalog_text(error: &CatalogError, project: &Path) -> String {
+    let explained = explain_catalog(error, project);
+    without_error_numbers(&explained.unwrap_or_else(|| error.to_string()))
+}
+
 /// Removes the numbers that the standard library adds to the system's messages, such as `(os error 2)`.
 pub fn without_error_numbers(text: &str) -> String {
     const START: &str = " (os error ";

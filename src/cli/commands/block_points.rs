@@ -7,6 +7,7 @@ use mocban_catalog::{Catalog, ControlPointsChange};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};
 use mocban_export::block_view::{BlockCorrection, replaced_file};
 use mocban_pages::view::{CorrectionStore, PointsSaved};
+use mocban_project::error_text::describe;
 use mocban_store::Project;
 
 /// The control points of a block of the project. The catalog is open only while it is used, so that a page that stays
@@ -24,6 +25,17 @@ impl BlockPoints {
             context: context.clone(),
             block: block.clone(),
         }
+    }
+
+    /// Runs work on a thread for long work, and returns the sentence that explains an error. Futures that open a catalog are
+    /// not `Send`.
+    async fn on_thread<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> anyhow::Result<T> + Send + 'static,
+    ) -> Result<T, String> {
+        let done = tokio::task::spawn_blocking(work).await;
+        let done = done.map_err(anyhow::Error::from).flatten();
+        done.map_err(|error| describe(&error, &self.context.dir()))
     }
 
     async fn read_block(&self) -> anyhow::Result<BlockCorrection> {
@@ -69,7 +81,8 @@ impl BlockPoints {
 impl CorrectionStore for BlockPoints {
     async fn read(&self) -> Result<BlockCorrection, String> {
         let own = self.clone();
-        on_thread(move || Handle::current().block_on(own.read_block())).await
+        self.on_thread(move || Handle::current().block_on(own.read_block()))
+            .await
     }
 
     async fn save(
@@ -78,19 +91,11 @@ impl CorrectionStore for BlockPoints {
         points: Option<ControlPoints>,
     ) -> Result<PointsSaved, String> {
         let own = self.clone();
-        on_thread(move || Handle::current().block_on(own.store(read, points.as_ref()))).await
+        self.on_thread(move || Handle::current().block_on(own.store(read, points.as_ref())))
+            .await
     }
 
     fn next_command(&self) -> String {
         self.context.command("run")
     }
-}
-
-/// Runs work on a thread for long work, and returns the sentence of an error. Futures that open a catalog are not `Send`.
-async fn on_thread<T: Send + 'static>(
-    work: impl FnOnce() -> anyhow::Result<T> + Send + 'static,
-) -> Result<T, String> {
-    let done = tokio::task::spawn_blocking(work).await;
-    let done = done.map_err(anyhow::Error::from).flatten();
-    done.map_err(|error| format!("{error:#}"))
 }

@@ -1,10 +1,12 @@
 //! `--metrics`: serves the counts and times of a run to Prometheus.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use axum::Router;
+use axum::body::Bytes;
 use axum::http::header;
-use axum::response::IntoResponse;
 use axum::routing::get;
 use clap::Args;
 use tokio::net::TcpListener;
@@ -14,10 +16,14 @@ use crate::cli::output::context::Context;
 use mocban_pages::local_server::{ConnectionLimits, ServedNames, listen, serve};
 use mocban_project::exit::Refusal;
 use mocban_runner::RunMetrics;
+use mocban_system::failpoint::time_scale;
 use mocban_system::platform::host_name;
 
 /// Version 0.0.4 of the text format, which every version of Prometheus reads.
 const TEXT_FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
+
+/// Maximum age of the metrics in a response. Prometheus asks every 15 s or less often.
+const RENDER_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Parses `PORT` or `ADDRESS:PORT`. A port alone is on 127.0.0.1.
 fn address(text: &str) -> Result<SocketAddr, String> {
@@ -92,24 +98,50 @@ impl MetricsServer {
                 "the metrics are served on {address}, which other machines can reach, and the traffic is not encrypted"
             ));
         }
-        let router = Router::new().route("/metrics", get(async move || text(&metrics)));
+        let text = Arc::new(RenderedMetrics::default());
+        let render = move || text.at(Instant::now(), || metrics.prometheus_text());
+        let kind = [(header::CONTENT_TYPE, TEXT_FORMAT)];
+        let router = Router::new().route("/metrics", get(async move || (kind, render())));
         let router = self.names.guarded(router);
-        let limits = ConnectionLimits::system();
+        let limits = ConnectionLimits::of_rare_requests();
         let serving = serve(self.listener, router, limits, std::future::pending());
         Serving(tokio::spawn(serving).abort_handle())
     }
 }
 
-fn text(metrics: &RunMetrics) -> impl IntoResponse + use<> {
-    (
-        [(header::CONTENT_TYPE, TEXT_FORMAT)],
-        metrics.prometheus_text(),
-    )
+/// The text of the metrics, rendered once in [`RENDER_INTERVAL`] however many requests arrive.
+#[derive(Debug, Default)]
+struct RenderedMetrics(Mutex<Option<(Instant, Bytes)>>);
+
+impl RenderedMetrics {
+    fn at(&self, now: Instant, render: impl FnOnce() -> String) -> Bytes {
+        let interval = RENDER_INTERVAL / time_scale("MOCBAN_TIME_SCALE");
+        let mut rendered = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*rendered {
+            Some((at, text)) if now.duration_since(*at) < interval => text.clone(),
+            _ => {
+                let text = Bytes::from(render());
+                *rendered = Some((now, text.clone()));
+                text
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::address;
+    use std::time::{Duration, Instant};
+
+    use super::{RENDER_INTERVAL, RenderedMetrics, address};
+
+    #[test]
+    fn metrics_are_rendered_once_a_second() {
+        let (text, start) = (RenderedMetrics::default(), Instant::now());
+        let at = |after: Duration, value: &str| text.at(start + after, || value.to_owned());
+        assert_eq!(at(Duration::ZERO, "1"), "1");
+        assert_eq!(at(RENDER_INTERVAL / 2, "2"), "1");
+        assert_eq!(at(RENDER_INTERVAL, "3"), "3");
+    }
 
     #[test]
     fn a_port_alone_is_on_this_machine() {

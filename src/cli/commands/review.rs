@@ -1,27 +1,36 @@
 //! `review`: serves the review page on this machine.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::time::Duration;
 
 use clap::Args;
 use serde_json::json;
 
+use super::closing::{AFTER_SILENCE, close_within};
 use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
 use crate::cli::output::table::count;
-use mocban_catalog::{SetApart, StatusCounts};
+use mocban_catalog::{Catalog, SetApart, StatusCounts};
 use mocban_core::domain::{ReviewOrder, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_pages::review::{
-    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
+    self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
+    ReviewServer,
 };
+use mocban_project::error_text;
 use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files::input_file_limits;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_runner::{Stop, StopLevel};
+
+/// Time after a signal during which answers still wait for an unavailable database server.
+const UNAVAILABLE_AFTER_STOP: Duration = Duration::from_secs(1);
+/// Maximum time to close a catalog that has stored every answer.
+const CLOSE: Duration = Duration::from_secs(2);
 
 /// Arguments of `review`.
 #[derive(Debug, Args)]
@@ -119,6 +128,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
         limits: input_file_limits(&settings.config),
+        explain: error_text::catalog_text,
         now,
         queue: queue_options(&args),
     };
@@ -138,16 +148,28 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let _file = announce(&page, &args, context)?;
     let drain = stop.clone();
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
-    let cut_off = tokio::select! {
-        cut_off = served => cut_off,
+    let waits = tokio::spawn(stop_waiting(catalog.clone(), stop.clone()));
+    let kept = tokio::select! {
+        kept = served => kept,
         // After a second signal, do not wait for open connections. Acknowledged answers are already stored.
         () = stop.reached(StopLevel::Now) => 1,
     };
+    waits.abort();
+    catalog.stop_waiting();
+    let limit = if kept == 0 { CLOSE } else { AFTER_SILENCE };
+    close_within(catalog, &stop, limit).await;
     signals.abort();
-    catalog.close().await;
-    context.info(closing_line(cut_off == 0));
+    context.info(closing_line(kept == 0));
     context.next("report");
     Ok(ExitCode::Done)
+}
+
+/// Ends waits for an unavailable database server some time after a signal. Answers that wait for it are then refused, and
+/// the browser keeps them.
+async fn stop_waiting(catalog: Catalog, stop: Stop) {
+    stop.reached(StopLevel::Drain).await;
+    tokio::time::sleep(UNAVAILABLE_AFTER_STOP).await;
+    catalog.stop_waiting();
 }
 
 /// Returns the command's last message. The browser keeps unacknowledged answers and sends them again.
@@ -218,6 +240,16 @@ fn announce(
         "{}; press Ctrl-C to end",
         progress(&args.reviewer, page.counts())
     ));
+    if let Some(FaultShortage {
+        wanted,
+        planted,
+        example,
+    }) = page.shortage()
+    {
+        context.warn(&format!(
+            "only {planted} of {wanted} attention checks could be planted, because files of results cannot be read ({example}); `check` lists them"
+        ));
+    }
     context.info("the address works once; if you close the page, press Ctrl-C and start this command again: nothing is lost");
     if address.ip().is_loopback() {
         let port = address.port();

@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
+use super::closing::close;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
 use crate::cli::input::select;
@@ -192,7 +193,6 @@ pub(crate) async fn drive(
     })
     .await;
     progress.end();
-    watch.abort();
     // After an error, the catalog may not reply any more.
     let ended = match ended {
         Ok(summary) => {
@@ -201,7 +201,8 @@ pub(crate) async fn drive(
         }
         Err(error) => Err(error.into()),
     };
-    catalog.close().await;
+    close(catalog, &stop).await;
+    watch.abort();
     ended
 }
 

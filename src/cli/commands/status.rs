@@ -1,11 +1,13 @@
 //! `status`: shows the state of the project on one screen.
 
+use std::convert::Infallible;
 use std::io::IsTerminal;
 use std::time::Duration;
 
 use clap::Args;
 use serde_json::Value;
 
+use super::closing::{AFTER_SILENCE, close_within};
 use super::review::review_step;
 use super::status_hosts;
 use crate::cli::output::context::Context;
@@ -19,7 +21,7 @@ use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verd
 use mocban_project::exit::ExitCode;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
-use mocban_runner as runner;
+use mocban_runner::{self as runner, Stop};
 use mocban_store::Project;
 
 /// Arguments of `status`.
@@ -40,32 +42,43 @@ const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
 pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
-    loop {
-        if args.hosts {
-            let workers = status_hosts::read(&catalog, now()).await?;
-            print_refreshed(
-                &args,
-                context,
-                &workers.json(),
-                workers.text(context.stdout),
-            )?;
-        } else {
-            print_status(
-                &read(&project, &catalog, &args, context).await?,
-                &args,
-                context,
-            )?;
-        }
-        if !args.watch {
-            break;
-        }
-        tokio::select! {
-            () = tokio::time::sleep(WATCH_INTERVAL) => {}
-            _ = tokio::signal::ctrl_c() => break,
-        }
+    if !args.watch {
+        print_once(&project, &catalog, &args, context).await?;
+        catalog.close().await;
+        return Ok(ExitCode::Done);
     }
-    catalog.close().await;
-    Ok(ExitCode::Done)
+    let watching = async {
+        loop {
+            print_once(&project, &catalog, &args, context).await?;
+            tokio::time::sleep(WATCH_INTERVAL).await;
+        }
+    };
+    // Also ends a read to which the database server does not reply.
+    let ended: anyhow::Result<Infallible> = tokio::select! {
+        ended = watching => ended,
+        _ = tokio::signal::ctrl_c() => {
+            close_within(catalog, &Stop::new(), AFTER_SILENCE).await;
+            return Ok(ExitCode::Done);
+        }
+    };
+    match ended? {}
+}
+
+/// Reads and prints the status.
+async fn print_once(
+    project: &Project,
+    catalog: &Catalog,
+    args: &StatusArgs,
+    context: &Context,
+) -> anyhow::Result<()> {
+    if args.hosts {
+        let workers = status_hosts::read(catalog, now()).await?;
+        let (json, text) = (workers.json(), workers.text(context.stdout));
+        print_refreshed(args, context, &json, text)?;
+    } else {
+        print_status(&read(project, catalog, args, context).await?, args, context)?;
+    }
+    Ok(())
 }
 
 async fn read(

@@ -3,6 +3,7 @@
 use clap::Args;
 use serde_json::json;
 
+use super::closing::close;
 use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use crate::cli::input::signals;
@@ -56,8 +57,8 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let planned = runner::run(&project, &catalog, &config.stages, &options, &stop, |_| {}).await;
+    close(catalog, &stop).await;
     watch.abort();
-    catalog.close().await;
     let planned = planned?;
     let blocks = planned.blocks.left;
     context.print_json(&json!({

@@ -33,6 +33,8 @@ pub struct ConnectionLimits {
     pub(super) shutdown: Duration,
     /// Maximum time that the shutdown waits for the rest of a request's header.
     pub(super) shutdown_header: Duration,
+    /// Whether a connection may have several requests.
+    pub(super) keep_alive: bool,
 }
 
 impl ConnectionLimits {
@@ -44,6 +46,18 @@ impl ConnectionLimits {
             response: Duration::from_mins(1),
             shutdown: Duration::from_secs(2),
             shutdown_header: Duration::from_millis(300),
+            keep_alive: true,
+        }
+    }
+
+    /// Returns the limits of a server beside other work, which few clients ask once in some seconds. A connection has one
+    /// request, because a client may send many without waiting for the responses.
+    pub fn of_rare_requests() -> Self {
+        let system = Self::system();
+        Self {
+            connections: system.connections.min(16),
+            keep_alive: false,
+            ..system
         }
     }
 }
@@ -133,6 +147,7 @@ pub(super) async fn serve_connection(
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new())
         .max_buf_size(BUFFER_BYTES)
+        .keep_alive(limits.keep_alive)
         .header_read_timeout(limits.header);
     let served = http.serve_connection(TokioIo::new(stream), service);
     tokio::pin!(served);

@@ -201,7 +201,20 @@ mod tests {
             response: NEVER,
             shutdown: NEVER,
             shutdown_header: Duration::from_millis(1),
+            keep_alive: true,
         }
+    }
+
+    #[tokio::test]
+    async fn a_connection_without_keep_alive_has_one_request() {
+        let server = TestServer::start(ConnectionLimits {
+            keep_alive: false,
+            ..limits()
+        })
+        .await;
+        let request = "GET / HTTP/1.1\r\nhost: a\r\n\r\n";
+        let pipelined = rest(server.send(&request.repeat(3)).await).await;
+        assert_eq!(pipelined.matches("hello").count(), 1, "{pipelined}");
     }
 
     #[tokio::test]

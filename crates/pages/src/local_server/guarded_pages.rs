@@ -11,7 +11,7 @@ use axum::{Router, middleware};
 use super::access_control::AccessControl;
 use super::guard::guard;
 use super::page_frame::{closed_page, forward_page};
-use super::session::{SESSION_SCRIPT, START};
+use super::session::{ICON, SESSION_SCRIPT, START};
 
 impl AccessControl {
     /// Returns the router of a server: the start address, and `pages` for requests of the session. The paths of `pages`
@@ -19,10 +19,13 @@ impl AccessControl {
     pub fn guarded(self: &Arc<Self>, pages: Router) -> Router {
         let script = [(header::CONTENT_TYPE, "text/javascript; charset=utf-8")];
         let text = include_str!("../../../../assets/local-server/session.js");
+        let drawing = [(header::CONTENT_TYPE, "image/svg+xml")];
+        let icon = include_str!("../../../../assets/local-server/icon.svg");
         Router::new()
             .route(START, get(start))
             .with_state(Arc::clone(self))
             .route(SESSION_SCRIPT, get(async move || (script, text)))
+            .route(ICON, get(async move || (drawing, icon)))
             .fallback_service(pages)
             .layer(middleware::from_fn_with_state(Arc::clone(self), guard))
     }

@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, html};
 
-use super::session::SESSION_SCRIPT;
+use super::session::{ICON, SESSION_SCRIPT};
 
 /// Returns a whole document. `body` is the `body` element.
 pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -14,6 +14,7 @@ pub fn document(language: &str, title: &str, head: &Markup, body: &Markup) -> Ma
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
                 title { (title) }
+                link rel="icon" href=(ICON);
                 (head)
             }
             (body)
@@ -26,8 +27,10 @@ pub(super) fn forward_page(path: &str) -> Markup {
     let address = format!("{path}/");
     with_script(&html! {
         body data-session=(address) {
-            p { a href=(address) { "Open the page" } }
-            p lang="vi" { a href=(address) { "Mở trang" } }
+            main {
+                p { a href=(address) { "Open the page" } }
+                p lang="vi" { a href=(address) { "Mở trang" } }
+            }
         }
     })
 }
@@ -36,16 +39,18 @@ pub(super) fn forward_page(path: &str) -> Markup {
 pub(super) fn closed_page() -> Markup {
     with_script(&html! {
         body {
-            h1 { "This page is not open in this browser" }
-            p {
-                "Open the address that the command printed. It works once, in one browser. If it has been used, end the "
-                "command with Ctrl-C and run it again to get a new one: nothing is lost."
-            }
-            div lang="vi" {
-                h1 { "Trang này chưa được mở trong trình duyệt này" }
+            main {
+                h1 { "This page is not open in this browser" }
                 p {
-                    "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã "
-                    "được sử dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả."
+                    "Open the address that the command printed. It works once, in one browser. If it has been used, end the "
+                    "command with Ctrl-C and run it again to get a new one: nothing is lost."
+                }
+                div lang="vi" {
+                    h1 { "Trang này chưa được mở trong trình duyệt này" }
+                    p {
+                        "Hãy mở địa chỉ mà lệnh đã in ra. Địa chỉ chỉ dùng được một lần, trong một trình duyệt. Nếu địa chỉ đã "
+                        "được sử dụng, hãy dừng lệnh bằng Ctrl-C rồi chạy lại để nhận địa chỉ mới: không mất gì cả."
+                    }
                 }
             }
         }
@@ -54,7 +59,6 @@ pub(super) fn closed_page() -> Markup {
 
 fn with_script(body: &Markup) -> Markup {
     let head = html! {
-        link rel="icon" href="data:,";
         script type="module" src=(SESSION_SCRIPT) {}
     };
     document("en", "mocban", &head, body)

@@ -4,7 +4,6 @@ use mocban_export::scan_view;
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
-const ICON: &str = "image/svg+xml";
 
 /// Name, content type and text of an asset.
 macro_rules! asset {
@@ -17,9 +16,8 @@ macro_rules! asset {
     };
 }
 
-const ASSETS: [(&str, &str, &str); 19] = [
+const ASSETS: [(&str, &str, &str); 18] = [
     asset!("review.css", STYLE),
-    asset!("icon.svg", ICON),
     asset!("main.js", SCRIPT),
     asset!("config.js", SCRIPT),
     asset!("details.js", SCRIPT),

@@ -28,16 +28,25 @@ const DUPLICATE_GAP: f64 = 10.0;
 /// Largest random distance that is added to `DUPLICATE_GAP`.
 const DUPLICATE_SPREAD: f64 = 30.0;
 
-/// Selects the items from which a fault is made: `rates.faults` of the reviewed items, and at least [`MIN_FAULTS`]. If
-/// there are too few reviewed items, `others` are used, which are not reviewed themselves.
-pub(super) fn select_for_faults<'a>(
+/// Results in which faults may be planted, and how many faults are wanted.
+#[derive(Debug, Default)]
+pub(super) struct FaultCandidates<'a> {
+    /// The candidates in the order in which they are taken.
+    pub(super) items: Vec<&'a ReviewItem>,
+    /// Number of faults to plant. There are at least as many candidates.
+    pub(super) wanted: usize,
+}
+
+/// Returns the items from which a fault may be made. Wanted are `rates.faults` of the reviewed items, and at least
+/// [`MIN_FAULTS`]. If there are too few reviewed items, `others` are used, which are not reviewed themselves.
+pub(super) fn fault_candidates<'a>(
     items: &'a [ReviewItem],
     others: &'a [ReviewItem],
     rates: &CheckRates,
     random: &SeededRandom,
-) -> Vec<&'a ReviewItem> {
+) -> FaultCandidates<'a> {
     if rates.faults <= 0.0 {
-        return Vec::new();
+        return FaultCandidates::default();
     }
     let draw = |item: &ReviewItem| random.draw(&item.view.hash(), "control");
     let by_draw = |items: &'a [ReviewItem]| {
@@ -46,23 +55,22 @@ pub(super) fn select_for_faults<'a>(
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
         drawn
     };
-    let mut selected = by_draw(items);
-    let count = selected.partition_point(|(number, _)| *number < rates.faults);
-    selected.truncate(count.max(MIN_FAULTS));
-    if selected.len() < MIN_FAULTS {
-        selected.extend(by_draw(others));
-        selected.truncate(MIN_FAULTS);
+    let mut drawn = by_draw(items);
+    let count = drawn.partition_point(|(number, _)| *number < rates.faults);
+    drawn.extend(by_draw(others));
+    FaultCandidates {
+        wanted: count.max(MIN_FAULTS).min(drawn.len()),
+        items: drawn.into_iter().map(|(_, item)| item).collect(),
     }
-    selected.into_iter().map(|(_, item)| item).collect()
 }
 
 /// Makes a fault from a good result: mirrors the relief, changes the threshold, or rotates the relief. If mirroring or
-/// another threshold would not be a visible fault, rotates the relief instead.
+/// another threshold would not be a visible fault, rotates the relief instead. The fault depends only on the view.
 pub(super) fn plant_fault(
     item: &ReviewItem,
     depth: &DepthMap,
     random: &SeededRandom,
-) -> ReviewItem {
+) -> (AttentionCheck, ItemView) {
     let draw = |purpose| random.draw(&item.view.hash(), purpose);
     let strokes = depth.stroke_mask(item.view.level);
     let changed = match draw("kind") {
@@ -76,12 +84,7 @@ pub(super) fn plant_fault(
         }),
         _ => None,
     };
-    let (check, view) = changed.unwrap_or_else(|| rotated(item, draw("turn")));
-    ReviewItem {
-        check: Some(check),
-        view,
-        ..item.clone()
-    }
+    changed.unwrap_or_else(|| rotated(item, draw("turn")))
 }
 
 /// Rotates the relief of an item. `number` in 0..1 selects the direction and the angle.
@@ -159,7 +162,7 @@ pub(super) fn interleave(
 
 #[cfg(test)]
 mod tests {
-    use super::{CheckRates, interleave, plant_fault, select_for_faults};
+    use super::{CheckRates, fault_candidates, interleave, plant_fault};
     use crate::review::item::ReviewItem;
     use crate::review::item::test_fixtures::item;
     use mocban_core::domain::{AttentionCheck, SeededRandom};
@@ -181,9 +184,28 @@ mod tests {
 
     fn planted(depth: &DepthMap) -> Vec<ReviewItem> {
         let random = SeededRandom::new(3, "ana");
-        (0..300)
-            .map(|n| plant_fault(&item(n), depth, &random))
-            .collect()
+        (0..300).map(|n| fault(&item(n), depth, &random)).collect()
+    }
+
+    fn fault(item: &ReviewItem, depth: &DepthMap, random: &SeededRandom) -> ReviewItem {
+        let (check, view) = plant_fault(item, depth, random);
+        ReviewItem {
+            check: Some(check),
+            view,
+            ..item.clone()
+        }
+    }
+
+    /// Returns the results in which faults are planted if all can be read.
+    fn selected<'a>(
+        items: &'a [ReviewItem],
+        others: &'a [ReviewItem],
+        rates: &CheckRates,
+        random: &SeededRandom,
+    ) -> Vec<&'a ReviewItem> {
+        let mut found = fault_candidates(items, others, rates, random);
+        found.items.truncate(found.wanted);
+        found.items
     }
 
     #[test]
@@ -231,9 +253,9 @@ mod tests {
     fn duplicates_keep_a_distance_and_faults_are_spread_evenly() {
         let random = SeededRandom::new(5, "ana");
         let results: Vec<ReviewItem> = (0..400).map(item).collect();
-        let faults: Vec<ReviewItem> = select_for_faults(&results, &[], &RATES, &random)
+        let faults: Vec<ReviewItem> = selected(&results, &[], &RATES, &random)
             .into_iter()
-            .map(|item| plant_fault(item, &wedge(), &random))
+            .map(|item| fault(item, &wedge(), &random))
             .collect();
         let planted = faults.len();
         assert!((20..70).contains(&planted), "{planted}");
@@ -264,7 +286,7 @@ mod tests {
             item.is_reliable = false;
         }
         let random = SeededRandom::new(5, "ana");
-        assert!(select_for_faults(&unreliable, &unreliable, &RATES, &random).is_empty());
+        assert!(selected(&unreliable, &unreliable, &RATES, &random).is_empty());
     }
 
     #[test]
@@ -273,16 +295,16 @@ mod tests {
         let all: Vec<ReviewItem> = (0..60).map(item).collect();
         for sampled in [1, 3, 5, 8, 20] {
             let (items, others) = all.split_at(sampled);
-            let selected = select_for_faults(items, others, &RATES, &random);
-            assert!(selected.len() >= 5, "{sampled}: {}", selected.len());
-            let of_sample = selected.iter().filter(|item| items.contains(item)).count();
+            let found = selected(items, others, &RATES, &random);
+            assert!(found.len() >= 5, "{sampled}: {}", found.len());
+            let of_sample = found.iter().filter(|item| items.contains(item)).count();
             assert!(of_sample >= sampled.min(5), "{sampled}: {of_sample}");
         }
-        assert_eq!(select_for_faults(&all[..3], &[], &RATES, &random).len(), 3);
+        assert_eq!(selected(&all[..3], &[], &RATES, &random).len(), 3);
         let none = CheckRates {
             faults: 0.0,
             duplicates: 0.1,
         };
-        assert!(select_for_faults(&all, &[], &none, &random).is_empty());
+        assert!(selected(&all, &[], &none, &random).is_empty());
     }
 }

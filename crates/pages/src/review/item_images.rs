@@ -138,25 +138,43 @@ pub(super) struct ImageCache {
     project: Project,
     limits: InputFileLimits,
     slots: Mutex<CacheSlots<ItemImages>>,
+    pictures: WorkLane,
+    alignments: WorkLane,
+}
+
+/// A thread, on which one item at a time is read.
+#[derive(Debug)]
+struct WorkLane {
     /// Permits one item at a time to read its results, its print or its artifacts.
     reading: Semaphore,
     work: Arc<WorkThread>,
 }
 
+impl WorkLane {
+    const fn new(work: Arc<WorkThread>) -> Self {
+        Self {
+            reading: Semaphore::const_new(1),
+            work,
+        }
+    }
+}
+
 impl ImageCache {
+    /// Creates an empty cache. Pictures of whole prints are drawn on a thread of their own; `quick` is the thread for work
+    /// that takes milliseconds and needs no print.
     pub(super) fn new(
         catalog: Catalog,
         project: Project,
         limits: InputFileLimits,
-        work: Arc<WorkThread>,
+        quick: Arc<WorkThread>,
     ) -> Self {
         Self {
             catalog,
             project,
             limits,
             slots: Mutex::default(),
-            reading: Semaphore::new(1),
-            work,
+            pictures: WorkLane::new(Arc::default()),
+            alignments: WorkLane::new(quick),
         }
     }
 
@@ -197,7 +215,7 @@ impl ImageCache {
             let render = move |project: &Project, pair: &PairResults, item: &ReviewItem| {
                 ItemImages::render(project, pair, item, &limits)
             };
-            let images = Arc::new(self.read(item, render).await?);
+            let images = Arc::new(self.read(&self.pictures, item, render).await?);
             self.slots.lock().await.add(&item.id, images.bytes());
             Ok(images)
         };
@@ -221,7 +239,7 @@ impl ImageCache {
             let inputs = AlignmentInputs::read(&PairArtifacts::new(project, pair), item)?;
             Ok(draw(&inputs).into())
         };
-        self.read(item, read).await
+        self.read(&self.alignments, item, read).await
     }
 
     /// Checks that the pair of an item still has the result that the item shows.
@@ -232,7 +250,7 @@ impl ImageCache {
         let read = |project: &Project, pair: &PairResults, item: &ReviewItem| {
             require_current(&PairArtifacts::new(project, pair), item)
         };
-        self.read(item, read).await
+        self.read(&self.alignments, item, read).await
     }
 
     /// Computes what is stored with a manual alignment that places the relief by `print_from_depth`.
@@ -253,7 +271,7 @@ impl ImageCache {
                 mesh_hash: artifacts.stage(Stage::Fit)?.mesh_hash,
             })
         };
-        self.read(item, read).await
+        self.read(&self.alignments, item, read).await
     }
 
     /// Returns the data of the 3D view of an item. It does not name the pair.
@@ -269,16 +287,17 @@ impl ImageCache {
             let view = ScanView::of_alignment(project, pair, *metric, map, level, limits)?;
             Ok(view.ok_or(ImageError::Gone)?.to_bytes())
         };
-        self.read(item, read).await
+        self.read(&self.pictures, item, read).await
     }
 
-    /// Calls `read` with the current results of the item's pair, on the thread for long work. Only one call runs at a time.
+    /// Calls `read` with the current results of the item's pair, on the thread of a lane. One call of a lane runs at a time.
     async fn read<T: Send + 'static>(
         &self,
+        lane: &WorkLane,
         item: &Arc<ReviewItem>,
         read: impl FnOnce(&Project, &PairResults, &ReviewItem) -> Result<T, ImageError> + Send + 'static,
     ) -> Result<T, ImageError> {
-        let permit = self.reading.acquire().await;
+        let permit = lane.reading.acquire().await;
         let _permit = permit.map_err(|_closed| ImageError::Gone)?;
         let found = self.catalog.pair(&item.pair).await?;
         let pair = found.ok_or(ImageError::Gone)?.results;
@@ -287,13 +306,47 @@ impl ImageCache {
         }
         let (project, item) = (self.project.clone(), Arc::clone(item));
         let work = move || read(&project, &pair, &item);
-        self.work.call(work).await?
+        lane.work.call(work).await?
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::ImageLayer;
+    use std::sync::Arc;
+
+    use super::{ImageCache, ImageLayer};
+    use crate::review::image_error::ImageError;
+    use crate::review::item::test_fixtures::item;
+    use mocban_catalog::Catalog;
+    use mocban_core::mesh::MeshLimits;
+    use mocban_core::raster::ImageLimits;
+    use mocban_export::InputFileLimits;
+    use mocban_store::Project;
+
+    #[tokio::test]
+    async fn a_manual_alignment_does_not_wait_for_pictures() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::at(dir.path());
+        let catalog = Catalog::create(&project.catalog_path()).await;
+        let limits = InputFileLimits {
+            mesh: MeshLimits::SUGGESTED,
+            image: ImageLimits::SUGGESTED,
+        };
+        let cache = ImageCache::new(catalog.expect("a catalog"), project, limits, Arc::default());
+        let item = Arc::new(item(1));
+        let busy = cache.pictures.reading.acquire().await.expect("a permit");
+        {
+            let picture = cache.of(&item);
+            tokio::pin!(picture);
+            assert!(futures_util::poll!(&mut picture).is_pending());
+            // The pair is not in the catalog.
+            let current = cache.require_current(&item).await;
+            assert!(matches!(current, Err(ImageError::Gone)), "{current:?}");
+            assert!(futures_util::poll!(&mut picture).is_pending());
+        }
+        drop(busy);
+        assert!(matches!(cache.of(&item).await, Err(ImageError::Gone)));
+    }
 
     #[test]
     fn layers_are_found_by_name_and_nothing_else_is() {

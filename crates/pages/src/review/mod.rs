@@ -6,6 +6,7 @@
 mod alignment_editor;
 mod alignment_inputs;
 mod answer;
+mod api_error;
 mod assets;
 mod cache_slots;
 mod check_items;
@@ -20,14 +21,17 @@ mod options;
 mod order;
 mod page;
 mod page_dialogs;
+mod planted_faults;
 mod review_queue;
 mod routes;
 mod server;
 mod state;
 mod summary;
+mod unstored;
 
 pub use check_items::CheckRates;
 pub use i18n::Language;
 pub use keys::{KeyError, key_map};
 pub use options::{QueueOptions, ReviewOptions};
+pub use planted_faults::FaultShortage;
 pub use server::{QueueCounts, ReviewError, ReviewServer, bind};

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
+use std::path::Path;
 
 use super::check_items::CheckRates;
 use super::i18n::Language;
+use mocban_catalog::CatalogError;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
 use mocban_export::InputFileLimits;
 
@@ -55,6 +57,8 @@ pub struct ReviewOptions {
     pub listen: SocketAddr,
     /// Limits on the input files.
     pub limits: InputFileLimits,
+    /// Returns the sentence that explains an error of the catalog of the project in a folder.
+    pub explain: fn(&CatalogError, &Path) -> String,
     /// Clock.
     pub now: fn() -> UnixMillis,
 }

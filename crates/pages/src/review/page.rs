@@ -23,7 +23,6 @@ pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
     let head = html! {
         link rel="stylesheet" href="assets/review.css";
         link rel="stylesheet" href="assets/scan-viewer.css";
-        link rel="icon" href="assets/icon.svg";
         script type="module" src="assets/main.js" {}
     };
     let body = html! {
@@ -68,6 +67,7 @@ fn top(options: &QueueOptions, language: Language) -> Markup {
             span #progress {}
             progress #bar value="0" max="1" aria-label=(language.translate("progress_bar")) {}
             @if let Some(label) = label { strong.label { (label) } }
+            strong #fault-shortage .label hidden {}
             span.spacer {}
             span #pace {}
             span #saved .saved role="status" { (language.translate("saved")) }
@@ -104,7 +104,6 @@ fn viewer(language: Language) -> Markup {
         section #viewer tabindex="-1" aria-label=(language.translate("viewer")) {
             div.picture {
                 canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
-                p #hint .hint hidden {}
                 div #end .end tabindex="0" role="region" aria-label=(language.translate("summary")) hidden {}
             }
             p.caption { span #legend {} }
@@ -125,7 +124,7 @@ fn practice(language: Language) -> Markup {
 
 fn modes(language: Language) -> Markup {
     html! {
-        div.modes role="group" aria-label=(language.translate("modes")) {
+        section.modes aria-label=(language.translate("modes")) {
             @for mode in MODES.split_whitespace() { (toggle(mode, language)) }
             span.divider {}
             @for switch in SWITCHES.split_whitespace() { (toggle(switch, language)) }
@@ -154,7 +153,8 @@ fn verdict_bar(language: Language) -> Markup {
                 (button("note", language))
                 (button("undo", language))
             }
-            div.reasons role="group" aria-label=(language.translate("reasons")) {
+            p #hint .hint hidden {}
+            div #reasons .reasons role="group" aria-label=(language.translate("reasons")) {
                 span { (language.translate("reasons")) }
                 @for reason in Reason::ALL { (button(reason.name(), language)) }
             }

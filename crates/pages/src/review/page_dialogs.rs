@@ -92,8 +92,10 @@ pub(super) fn jump(language: Language) -> Markup {
                 input #jump-to type="text" list="pairs" autocomplete="off";
                 datalist #pairs {}
                 p #jump-error role="alert" {}
-                button value="go" { (language.translate("go")) }
-                button value="" formnovalidate { (language.translate("close")) }
+                div.actions {
+                    button value="go" { (language.translate("go")) }
+                    button value="" formnovalidate { (language.translate("close")) }
+                }
             }
         }
     }

@@ -7,12 +7,11 @@ use super::history::ReviewerHistory;
 use super::item::{ItemView, ReviewItem};
 use super::options::QueueOptions;
 use super::order;
-use crate::local_server::{WorkFailed, WorkThread};
+use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use mocban_core::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
 use mocban_report::consensus::{is_disputed, partition_verdicts};
-use mocban_report::pair_artifacts::{PairArtifacts, group_identical};
-use mocban_store::Project;
+use mocban_report::pair_artifacts::group_identical;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
@@ -24,6 +23,8 @@ const RELIABLE_CONFIDENCE: f64 = 0.8;
 pub(super) struct ReviewQueue {
     pub(super) items: Vec<Arc<ReviewItem>>,
     pub(super) history: ReviewerHistory,
+    /// Set if fewer faults could be planted than wanted.
+    pub(super) shortage: Option<FaultShortage>,
 }
 
 impl ReviewQueue {
@@ -33,8 +34,7 @@ impl ReviewQueue {
     /// Returns an error if the catalog cannot be read, or planting a fault panics.
     pub(super) async fn read(
         catalog: &Catalog,
-        project: &Project,
-        work: &WorkThread,
+        planter: &FaultPlanter,
         options: &QueueOptions,
     ) -> Result<Self, QueueError> {
         let key = catalog.review_key().await?;
@@ -45,26 +45,20 @@ impl ReviewQueue {
             None => Vec::new(),
         };
         order::sort(&mut items, options.order, &random);
+        let mut shortage = None;
         if options.has_attention_checks() {
-            let selected = check_items::select_for_faults(&items, &others, &options.rates, &random);
-            let faults = faults(catalog, project, work, selected, &random).await?;
-            items = check_items::interleave(items, faults, &options.rates, &random);
+            let found = check_items::fault_candidates(&items, &others, &options.rates, &random);
+            let faults = planter.plant(found, &random).await?;
+            shortage = faults.shortage;
+            items = check_items::interleave(items, faults.items, &options.rates, &random);
         }
         let item = |item: ReviewItem| Arc::new(item.with_id(&key, &options.reviewer));
         Ok(Self {
             items: items.into_iter().map(item).collect(),
             history: ReviewerHistory::read(catalog, options).await?,
+            shortage,
         })
     }
-}
-
-/// Why the queue cannot be built.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum QueueError {
-    #[error(transparent)]
-    Catalog(#[from] CatalogError),
-    #[error(transparent)]
-    Stopped(#[from] WorkFailed),
 }
 
 async fn all_items(
@@ -156,29 +150,6 @@ fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
         .iter()
         .any(|ruling| ruling.reviewer != reviewer && ruling.verdict != Verdict::Unsure);
     is_disputed(&verdicts) && !is_party && !is_settled
-}
-
-/// Plants faults in the selected items. Skips pairs whose files cannot be read.
-async fn faults(
-    catalog: &Catalog,
-    project: &Project,
-    work: &WorkThread,
-    selected: Vec<&ReviewItem>,
-    random: &SeededRandom,
-) -> Result<Vec<ReviewItem>, QueueError> {
-    let mut faults = Vec::with_capacity(selected.len());
-    for item in selected {
-        let Some(detail) = catalog.pair(&item.pair).await? else {
-            continue;
-        };
-        let (project, item, random) = (project.clone(), item.clone(), random.clone());
-        let fault = work.call(move || {
-            let depth = PairArtifacts::new(&project, &detail.results).depth().ok()?;
-            Some(check_items::plant_fault(&item, &depth, &random))
-        });
-        faults.extend(fault.await?);
-    }
-    Ok(faults)
 }
 
 #[cfg(test)]

@@ -8,24 +8,23 @@ use axum::extract::{Path, RawQuery, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Json, Router};
+use axum::{Json, Router, middleware};
 use serde_json::{Value, json};
 
 use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
-use super::answer::{AnswerBody, InvalidInput, UndoBody};
+use super::answer::{AnswerBody, UndoBody};
+use super::api_error::{self, ApiError};
 use super::history::ReviewerHistory;
 use super::i18n::Language;
-use super::image_error::ImageError;
 use super::item::ReviewItem;
 use super::item_images::ImageLayer;
 use super::page;
-use super::review_queue::QueueError;
 use super::state::ServerState;
 use super::summary::ReviewSummary;
+use super::unstored::confirmation_limit;
 use super::{assets, examples};
-use mocban_catalog::{CatalogError, CatalogErrorKind, ManualAlignment};
+use mocban_catalog::{CatalogError, ManualAlignment};
 use mocban_core::domain::{PairName, ReviewOrder, one_line};
-use mocban_report::pair_artifacts::PairArtifactsError;
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
@@ -43,67 +42,12 @@ pub(super) fn router(state: &Arc<ServerState>) -> Router {
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
+        .layer(middleware::map_response_with_state(
+            Arc::clone(state),
+            api_error::explain,
+        ))
         .with_state(Arc::clone(state));
     state.access.guarded(pages)
-}
-
-/// Why a request fails.
-#[derive(Debug, thiserror::Error)]
-enum ApiError {
-    #[error("there is no such item")]
-    NoItem,
-    #[error("answer it first")]
-    NotAnswered,
-    #[error("answer every image first")]
-    NotFinished,
-    #[error("{0}")]
-    Body(#[from] JsonRejection),
-    #[error(transparent)]
-    Input(#[from] InvalidInput),
-    #[error(transparent)]
-    Catalog(#[from] CatalogError),
-    #[error(transparent)]
-    Queue(#[from] QueueError),
-    #[error(transparent)]
-    Image(#[from] ImageError),
-    #[error(transparent)]
-    PairArtifacts(#[from] PairArtifactsError),
-}
-
-impl ApiError {
-    fn status(&self) -> StatusCode {
-        match self {
-            Self::NoItem | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
-            Self::NotAnswered | Self::NotFinished => StatusCode::FORBIDDEN,
-            Self::Body(rejection) => rejection.status(),
-            Self::Input(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::Image(ImageError::Gone) => StatusCode::GONE,
-            // The page resends what the server could not store.
-            Self::Catalog(_) | Self::Queue(_) | Self::Image(_) | Self::PairArtifacts(_) => {
-                StatusCode::SERVICE_UNAVAILABLE
-            }
-        }
-    }
-
-    /// Returns the message for the page, which shows it and sends the request again.
-    fn text(&self) -> String {
-        match self {
-            Self::Catalog(error) if error.kind() == Some(CatalogErrorKind::Full) => {
-                "the disk with the catalog is full; free some space there".to_owned()
-            }
-            error => error.to_string(),
-        }
-    }
-}
-
-impl IntoResponse for ApiError {
-    fn into_response(self) -> Response {
-        let status = self.status();
-        if status.is_server_error() {
-            tracing::warn!(error = %self, "a request of the review page failed");
-        }
-        (status, Json(json!({ "error": self.text() }))).into_response()
-    }
 }
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
@@ -142,6 +86,8 @@ async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
         "keys": state.options.keys,
         "review_order": state.options.queue.order,
         "min_view_ms": state.options.min_view_ms,
+        // Longer than the server waits for the catalog.
+        "send_limit_ms": 3 * confirmation_limit().as_millis() as u64 / 2,
         "examples": examples::EXAMPLES,
         "messages": BTreeMap::from(messages),
     }))
@@ -170,6 +116,9 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
         "items": items.collect::<Vec<_>>(),
         "pairs": pairs,
         "opens_guide": state.options.opens_guide && queue.history.is_empty(),
+        "fault_shortage": queue.shortage.as_ref().map(|shortage| {
+            json!({ "made": shortage.planted, "wanted": shortage.wanted })
+        }),
     })))
 }
 
@@ -275,7 +224,7 @@ async fn answer(
     let stored = state
         .catalog
         .answer(verdict, item.shown(), (state.options.now)());
-    let is_new = stored.await?;
+    let is_new = state.unstored.store(&body.event, stored).await?;
     Ok(Json(json!({ "stored": body.event, "new": is_new })))
 }
 
@@ -286,7 +235,8 @@ async fn undo(
     let Json(body) = body?;
     let reviewer = &state.options.queue.reviewer;
     let now = (state.options.now)();
-    state.catalog.undo_event(&body.event, reviewer, now).await?;
+    let undone = state.catalog.undo_event(&body.event, reviewer, now);
+    state.unstored.store(&body.event, undone).await?;
     Ok(Json(json!({ "undone": body.event })))
 }
 
@@ -316,7 +266,9 @@ async fn align(
     };
     let summary = json!(AlignmentSummary::of(&item, &record));
     let now = (state.options.now)();
-    state.catalog.store_manual_alignment(record, now).await?;
+    let event = record.event.clone();
+    let stored = state.catalog.store_manual_alignment(record, now);
+    state.unstored.store(&event, stored).await?;
     Ok(Json(summary))
 }
 

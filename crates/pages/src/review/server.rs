@@ -8,9 +8,11 @@ use tokio::net::TcpListener;
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
+use super::planted_faults::{FaultPlanter, FaultShortage, QueueError};
 use super::routes;
 use super::state::ServerState;
-use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use super::unstored::UnstoredEvents;
+use crate::local_server::{AccessControl, ConnectionLimits, WorkFailed, WorkThread, listen, serve};
 use mocban_catalog::{Catalog, CatalogError};
 use mocban_store::Project;
 
@@ -28,12 +30,12 @@ pub enum ReviewError {
     /// The operating system provides no randomness for the token.
     #[error("cannot make a token: {0}")]
     Token(std::io::Error),
-    /// The queue cannot be read.
-    #[error("cannot read the review queue: {0}")]
-    Queue(String),
     /// The catalog cannot be read.
-    #[error(transparent)]
-    Catalog(#[from] CatalogError),
+    #[error("cannot read the review queue: {0}")]
+    Catalog(#[source] CatalogError),
+    /// An attention check could not be planted.
+    #[error("cannot plant an attention check: {0}")]
+    Fault(WorkFailed),
 }
 
 /// A server that is bound and ready to serve.
@@ -43,6 +45,7 @@ pub struct ReviewServer {
     state: Arc<ServerState>,
     address: SocketAddr,
     counts: QueueCounts,
+    shortage: Option<FaultShortage>,
 }
 
 /// Number of items in the queue.
@@ -70,20 +73,24 @@ pub async fn bind(
     let name = origin_name(&project, &options.queue.reviewer);
     let listener = listen(address, &name).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
-    let work = Arc::new(WorkThread::default());
+    let quick = Arc::new(WorkThread::default());
     let (read, files) = (catalog.clone(), project.clone());
     let state = ServerState {
-        images: ImageCache::new(read, files, options.limits, Arc::clone(&work)),
-        work,
+        planter: FaultPlanter::new(read.clone(), files.clone(), Arc::clone(&quick)),
+        images: ImageCache::new(read, files, options.limits, quick),
         access: Arc::new(AccessControl::new("review", address).map_err(ReviewError::Token)?),
         catalog,
         project,
         options,
+        unstored: UnstoredEvents::default(),
         served_items: std::sync::Mutex::default(),
     };
     // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
     let queue = state.load_queue().await;
-    let queue = queue.map_err(|error| ReviewError::Queue(error.to_string()))?;
+    let queue = queue.map_err(|error| match error {
+        QueueError::Catalog(error) => ReviewError::Catalog(error),
+        QueueError::Stopped(error) => ReviewError::Fault(error),
+    })?;
     let count =
         |is: &dyn Fn(&ReviewItem) -> bool| queue.items.iter().filter(|item| is(item)).count();
     Ok(ReviewServer {
@@ -92,6 +99,7 @@ pub async fn bind(
             results: count(&|item| item.check.is_none()),
             answered: count(&|item| queue.history.answer(item).is_some()),
         },
+        shortage: queue.shortage,
         listener,
         state: Arc::new(state),
         address,
@@ -114,11 +122,17 @@ impl ReviewServer {
         self.counts
     }
 
+    /// Returns whether fewer faults could be planted than wanted.
+    pub const fn shortage(&self) -> Option<&FaultShortage> {
+        self.shortage.as_ref()
+    }
+
     /// Serves requests until `stop` completes, and then at most two seconds longer. Returns the number of requests that
-    /// were cut off without a response.
+    /// were cut off without a response, or that browsers keep because they are not stored.
     pub async fn serve(self, stop: impl Future<Output = ()>) -> usize {
         let router = routes::router(&self.state);
-        serve(self.listener, router, ConnectionLimits::system(), stop).await
+        let cut_off = serve(self.listener, router, ConnectionLimits::system(), stop).await;
+        cut_off + self.state.unstored.count()
     }
 }
 

@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
 use super::options::ReviewOptions;
-use super::review_queue::{QueueError, ReviewQueue};
-use crate::local_server::{AccessControl, WorkThread};
+use super::planted_faults::{FaultPlanter, QueueError};
+use super::review_queue::ReviewQueue;
+use super::unstored::UnstoredEvents;
+use crate::local_server::AccessControl;
 use mocban_catalog::Catalog;
 use mocban_store::Project;
 
@@ -19,8 +21,8 @@ pub(super) struct ServerState {
     pub(super) options: ReviewOptions,
     pub(super) access: Arc<AccessControl>,
     pub(super) images: ImageCache,
-    /// The thread for long work.
-    pub(super) work: Arc<WorkThread>,
+    pub(super) planter: FaultPlanter,
+    pub(super) unstored: UnstoredEvents,
     /// Every item served since the server started, by id. Answers to these items are accepted even if their results
     /// were replaced.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
@@ -32,8 +34,7 @@ impl ServerState {
     /// # Errors
     /// Returns an error if the catalog cannot be read, or if a blocking task fails.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
-        let (catalog, project, work) = (&self.catalog, &self.project, &self.work);
-        let queue = ReviewQueue::read(catalog, project, work, &self.options.queue).await?;
+        let queue = ReviewQueue::read(&self.catalog, &self.planter, &self.options.queue).await?;
         let mut served = self.lock_served();
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));

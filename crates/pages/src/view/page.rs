@@ -11,7 +11,6 @@ const LANGUAGE: &str = "en";
 pub(super) fn view(pair: &str) -> String {
     let head = html! {
         link rel="stylesheet" href="assets/scan-viewer.css";
-        link rel="icon" href="data:,";
         script type="module" src="assets/view.js" {}
     };
     let body = html! {
@@ -37,7 +36,6 @@ fn block_page(name: &str, script: &str) -> String {
     let head = html! {
         link rel="stylesheet" href="assets/scan-viewer.css";
         link rel="stylesheet" href="assets/block-view.css";
-        link rel="icon" href="data:,";
         script type="module" src=(script) {}
     };
     let body = html! {

@@ -25,7 +25,7 @@ pub(super) fn sentence(text: &str) -> Markup {
 /// Returns a table in a frame that scrolls sideways if the table is too wide.
 pub(super) fn table(table: &Table) -> Markup {
     html! {
-        div.wide id={ "table-" (table.id) } tabindex="0" role="region" aria-label=(name(table)) {
+        div.wide id={ "table-" (table.id) } tabindex="0" role="group" aria-label=(name(table)) {
             table {
                 caption { span { (prose(&table.caption)) } }
                 thead { tr { @for column in &table.columns { th scope="col" class=(class(column)) { (prose(column.header)) } } } }

@@ -1,0 +1,91 @@
+//! Answers of the review page while the catalog or the page's own server does not reply.
+
+use std::collections::BTreeSet;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use rustix::process::{Signal, kill_process};
+use serde_json::Value;
+
+use crate::browser::Browser;
+use crate::cli::mocban;
+use crate::lab::Lab;
+use crate::page::{Page, answer, read_project, review};
+use crate::review_browser::{PLAIN, enter, saved};
+use crate::review_load::begun_answer;
+use crate::silent_server::Suspended;
+
+/// Starts a page on a server, and sends an answer after the server no longer replies. Calls `then` while the answer waits.
+fn with_waiting_answer(scale: &str, then: impl FnOnce(&mut Page, TcpStream)) {
+    let Some(lab) = Lab::new("2") else {
+        return;
+    };
+    lab.call("mocban", "run").expect(0);
+    let words = "--json review --no-open --reviewer lan --attention-checks 0 --duplicates 0";
+    let mut command = lab.command("mocban", words);
+    let mut page = Page::of(command.env("MOCBAN_TIME_SCALE", scale)).with_session();
+    let body = answer("e1", &page.queue()[0], "pass").to_string();
+    let _suspended = Suspended::of_lab(&lab);
+    let mut stream = begun_answer(&page, &body);
+    stream.write_all(body.as_bytes()).expect("sent");
+    then(&mut page, stream);
+}
+
+/// Returns a response up to the end of its JSON, or of the connection.
+fn reply(stream: TcpStream) -> String {
+    let mut bytes = Vec::new();
+    // A reset is an end too.
+    let _ = BufReader::new(stream).read_until(b'}', &mut bytes);
+    String::from_utf8(bytes).expect("UTF-8")
+}
+
+#[test]
+fn a_signal_ends_a_review_whose_server_does_not_reply() {
+    for signals in [1, 2] {
+        with_waiting_answer("1", |page, stream| {
+            let start = Instant::now();
+            for _ in 0..signals {
+                kill_process(page.pid(), Signal::INT).expect("sent");
+            }
+            assert_eq!(page.exit_code(), Some(0));
+            let took = start.elapsed();
+            assert!(took < Duration::from_secs(6), "{signals}: {took:?}");
+            assert!(!reply(stream).starts_with("HTTP/1.1 200"));
+        });
+    }
+}
+
+#[test]
+fn an_answer_is_given_up_if_the_server_does_not_reply() {
+    with_waiting_answer("20", |_, stream| {
+        let reply = reply(stream);
+        assert!(reply.starts_with("HTTP/1.1 503"), "{reply}");
+        assert!(reply.contains("has not confirmed this in time"), "{reply}");
+    });
+}
+
+#[test]
+fn an_answer_without_a_reply_is_sent_again() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let mut command = review(&project, "lan");
+    let page = Page::of(command.args(PLAIN).env("MOCBAN_TIME_SCALE", "20"));
+    let tab = enter(&browser, &page, [1024, 768]);
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    // The server accepts connections, but does not reply.
+    kill_process(page.pid(), Signal::STOP).expect("suspended");
+    tab.key("KeyP");
+    tab.wait("document.getElementById('alert').textContent.startsWith('No connection to mocban')");
+    kill_process(page.pid(), Signal::CONT).expect("continued");
+    saved(&tab);
+    let log = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let acts = log.out.lines().map(|line| {
+        let event: Value = serde_json::from_str(line).expect("JSON");
+        event["act"].to_string()
+    });
+    assert_eq!(acts.collect::<BTreeSet<_>>().len(), 1, "{}", log.out);
+}
