@@ -178,6 +178,9 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Res
 }
 
 /// Adds what to do if an output could not be written to its place in the project because no other was named.
+///
+/// # Errors
+/// Returns the error of the write.
 pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow::Result<()> {
     match written {
         Err(error) if named.is_none() && !error.is::<Refusal>() => {

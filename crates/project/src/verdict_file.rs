@@ -26,7 +26,9 @@ const REQUIRED: usize = 3;
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VerdictRow {
+    /// Number of the line, from 1.
     pub line: usize,
+    /// The verdict, and the result that it judges if the file names it.
     pub listed: ListedVerdict,
 }
 
