@@ -1,22 +1,10 @@
 //! Reads arbitrary bytes as a verdict file or a ground-truth file: gives rows, or an error that names the line.
 
 #![no_main]
-#![allow(
-    dead_code,
-    reason = "the parsers are compiled from the command line's files, which use everything"
-)]
-
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use mocban::{catalog, config, domain, manifest, report};
-
-#[path = "../../../src/cli/time_text.rs"]
-mod time_text;
-#[path = "../../../src/cli/truth_file.rs"]
-mod truth_file;
-#[path = "../../../src/cli/verdict_file.rs"]
-mod verdict_file;
+use mocban::project::{truth_file, verdict_file};
 
 fuzz_target!(|bytes: &[u8]| {
     for is_jsonl in [false, true] {
