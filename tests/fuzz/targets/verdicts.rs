@@ -1,6 +1,7 @@
 //! Reads arbitrary bytes as a verdict file or a ground-truth file: gives rows, or an error that names the line.
 
 #![no_main]
+
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
