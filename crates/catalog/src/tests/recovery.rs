@@ -1,5 +1,6 @@
 //! Recovery of the pairs of dead workers, and crashes that are blamed on a pair.
 
+use super::blocks::attributes;
 use super::protocol::status;
 use super::{World, name, observed, register};
 use crate::{CheckpointOutcome, ClaimRequest, DeadWorker};
@@ -140,4 +141,19 @@ async fn an_overdue_lease_of_a_living_worker_is_recovered() {
         assert_eq!(by_others.await.expect("a recovery").ready, recovered);
     }
     world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_death_with_a_pair_and_a_block_blames_neither() {
+    let world = World::new(1).await;
+    world.import_block(attributes("b")).await;
+    assert_eq!(world.claim(1).await.len(), 1);
+    world.leased_block().await;
+    let other = register(&world.catalog).await;
+    let recovered = world.catalog.recover(DeadWorker::AllExcept(other), 60);
+    let recovered = recovered.await.expect("a recovery");
+    assert_eq!((recovered.ready, recovered.blocks), (1, 1));
+    assert_eq!(world.crashes("p0").await, 0);
+    let blocks = world.catalog.block_states().await.expect("a read");
+    assert_eq!(blocks[0].crashes, 0);
 }
