@@ -22,6 +22,32 @@ pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<
     intact
 }
 
+/// Overwrites a part of the catalog's file in which rows are stored, but not the schema. Returns the intact bytes.
+fn corrupt_rows(project: &Project) -> Vec<u8> {
+    const PARTS: usize = 64;
+    let path = project.catalog_path();
+    let intact = std::fs::read(&path).expect("read");
+    let is_of_rows = |part: &usize| {
+        let mut bytes = intact.clone();
+        let from = bytes.len() * *part / PARTS;
+        for (index, byte) in bytes[from..]
+            .iter_mut()
+            .take(intact.len() / PARTS)
+            .enumerate()
+        {
+            *byte = (index * 37 % 251) as u8;
+        }
+        std::fs::write(&path, bytes).expect("written");
+        let lists_faults = at(project, &["check"])
+            .out
+            .contains("faults of the database");
+        lists_faults && at(project, &["report"]).code == 1
+    };
+    let found = (1..PARTS).rev().find(is_of_rows);
+    assert!(found.is_some(), "every part of the file holds the schema");
+    intact
+}
+
 /// Terms of SQLite and sqlx that no message may contain.
 const RAW: [&str; 4] = ["code:", "returned from database", "SQLITE_", "malformed"];
 
@@ -96,8 +122,7 @@ fn a_database_of_another_version_or_program_is_refused_and_left_alone() {
 fn catalog_with_garbage_inside_is_reported_and_not_repaired() {
     let dir = empty();
     let project = done(dir.path());
-    // Where rows are stored, but not the schema.
-    let intact = corrupt_catalog(&project, 1, 2);
+    let intact = corrupt_rows(&project);
     for command in [&["report"][..], &["export", "-o", "x"], &["run"]] {
         let refused = at(&project, command).expect(1);
         plain(&refused.err, "is damaged");
