@@ -22,7 +22,7 @@ pub enum QuoteFault {
     Unclosed,
     /// The next quote, on this line, is in the middle of a cell.
     ClosedInText(usize),
-    /// The cell has more than [`MAX_CELL_LINES`] lines. The next quote is on this line.
+    /// The cell has more than a hundred lines. The next quote is on this line.
     Long(usize),
 }
 
