@@ -342,8 +342,10 @@ mod tests {
     #[test]
     fn the_papers_method_has_the_papers_rows_only() {
         let mut report = ReportAccumulator::default();
-        let pair = test_fixtures::done_by_paper("a", 0.8, &[Verdict::Pass]);
-        report.add(&pair, &TruthEvaluation::default());
+        for name in ["a", "b", "c", "d", "e", "f"] {
+            let pair = test_fixtures::done_by_paper(name, 0.8, &[Verdict::Pass]);
+            report.add(&pair, &TruthEvaluation::default());
+        }
         let report = report.finish();
         let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
         assert_eq!(metrics, ThresholdMetric::PAPER);

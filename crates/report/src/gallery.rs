@@ -32,13 +32,21 @@ pub enum GalleryReason {
     Conflict,
     /// It misses the ground truth.
     OffTruth,
+    /// Its confidence is low.
+    LowConfidence,
     /// It was chosen at random.
     Random,
 }
 
 impl GalleryReason {
     /// Every reason, in the order of the report.
-    pub const ALL: [Self; 4] = [Self::Failed, Self::Conflict, Self::OffTruth, Self::Random];
+    pub const ALL: [Self; 5] = [
+        Self::Failed,
+        Self::Conflict,
+        Self::OffTruth,
+        Self::LowConfidence,
+        Self::Random,
+    ];
 }
 
 /// One result with its images.

@@ -166,7 +166,7 @@ mod tests {
             let answers = [
                 "36 of 38 pairs",
                 "Acc of Ensemble",
-                "By verdicts, all metrics",
+                "By verdicts, no two metrics",
             ];
             let [first, second, third] = answers.map(at);
             assert!(

@@ -94,6 +94,11 @@ const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static s
             "Off the ground truth",
             "Results that miss the true alignment or the true stroke tops.",
         ),
+        GalleryReason::LowConfidence => (
+            "low-confidence",
+            "Low confidence",
+            "Results of the ensemble with a confidence below 0.5, the lowest first.",
+        ),
         GalleryReason::Random => (
             "random",
             "Random sample",
