@@ -16,9 +16,6 @@ impl Catalog {
     /// A pair or block is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned`
     /// returns true, which also considers other recent deaths. Therefore, killing processes from outside rarely
     /// quarantines one.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -37,9 +34,6 @@ impl Catalog {
     /// Recovers overdue leases of other workers that are not known to be dead. A lease is overdue if its worker's last
     /// heartbeat is more than `margin_ms` after the deadline. This is rare, because processes enforce their own
     /// deadlines.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn recover_overdue(
         &self,
         me: WorkerId,

@@ -56,9 +56,6 @@ struct SelectedResults {
 
 /// Draws the images of a project's report. An image that cannot be drawn is left out. If the print or depth map of a
 /// result cannot be read, its gallery item states the reason.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_gallery(
     mut selection: GallerySelection,
     catalog: &Catalog,

@@ -67,9 +67,6 @@ FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = CAST(wante
 
 impl Catalog {
     /// Reads up to `limit` pairs with ids above `after`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn audit_page(&self, after: Option<PairId>, limit: usize) -> Result<AuditPage> {
         let mut conn = self.snapshot().await?;
         let query = query(PAGE).bind(after.map_or(0, |pair| pair.0));

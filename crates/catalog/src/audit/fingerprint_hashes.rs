@@ -36,9 +36,6 @@ const MARK_ALL: &str = "UPDATE job SET dirty = 1 WHERE dirty = 0";
 
 impl Catalog {
     /// Returns the fingerprints of jobs whose hash does not follow from their settings.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn faulty_fingerprints(&self) -> Result<Vec<FaultyFingerprint>> {
         let mut conn = self.read_conn().await?;
         let used = query(USED).fetch_all(&mut conn).await?;

@@ -89,9 +89,6 @@ impl Catalog {
     }
 
     /// Corrects the fingerprint of each job, marks jobs with inconsistent results dirty, and recounts all counters.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -107,9 +104,6 @@ impl Catalog {
     }
 
     /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -124,9 +118,6 @@ impl Catalog {
     }
 
     /// Recreates missing indexes and triggers. Does not change tables.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
         self.in_transaction(move |conn| {

@@ -71,9 +71,6 @@ impl FromRow for StoredCharacter {
 
 impl Catalog {
     /// Returns the characters of a block in reading order, retired ones last.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_characters(&self, block: &BlockName) -> Result<Vec<StoredCharacter>> {
         let mut conn = self.read_conn().await?;
         let list = query_as(LIST).bind(block.as_str());

@@ -25,9 +25,6 @@ pub enum ControlPointsChange {
 impl Catalog {
     /// Stores the control points of a block, or removes them, if the stored ones still have the hash `read`; `None` stands
     /// for no points. So nobody replaces points that they have not seen. The next run finds out which stages are stale.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_control_points(
         &self,
         block: &BlockName,

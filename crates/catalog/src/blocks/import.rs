@@ -90,9 +90,6 @@ impl Catalog {
     }
 
     /// Returns the names of all blocks, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_names(&self) -> Result<Vec<BlockName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));

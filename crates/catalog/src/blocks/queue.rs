@@ -52,9 +52,6 @@ impl Catalog {
     /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks.
     /// Returns `None` if no block is ready, or if the worker has ended or its last heartbeat is before `alive_since`. A
     /// worker has at most one block: it gets the same lease again if the reply to the claim before was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn claim_block(
         &self,
         worker: WorkerId,
@@ -89,9 +86,6 @@ impl Catalog {
 
     /// Stores a finished stage and advances the job. Its artifacts must be on disk already. If the lease was lost, nothing
     /// is stored. The last stage is stored with [`Catalog::finish_cut`].
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn checkpoint_block(
         &self,
         lease: Lease<BlockJob>,
@@ -111,9 +105,6 @@ impl Catalog {
     }
 
     /// Stores a failed stage of a block. Returns `false`, and stores nothing, if the lease was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn fail_block(
         &self,
         lease: Lease<BlockJob>,
@@ -127,9 +118,6 @@ impl Catalog {
     }
 
     /// Gives a lease back. Returns `false` if it was lost.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_block(&self, lease: Lease<BlockJob>) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -143,9 +131,6 @@ impl Catalog {
     }
 
     /// Stores versions of the input files of blocks. Keeps the stored version of a file whose new version is `None`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn store_block_inputs(&self, seen: Vec<(BlockId, BlockInputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -160,9 +145,6 @@ impl Catalog {
 
     /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only
     /// its blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn outstanding_blocks(
         &self,
         among: Option<&BlockSelection>,
@@ -174,9 +156,6 @@ impl Catalog {
 
     /// Ends the back-offs of blocks that are due, and returns the number of blocks made ready. Also ends back-offs with
     /// more than `longest` milliseconds left, which only a clock jump can cause.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_due_blocks(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(

@@ -247,9 +247,6 @@ impl Catalog {
     pub const LOW_CHARACTER_CONFIDENCE: f64 = 0.5;
 
     /// Returns all blocks with the states of their jobs, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_states(&self) -> Result<Vec<BlockState>> {
         let mut conn = self.read_conn().await?;
         let states = query_as(STATES).bind(None::<&str>);
@@ -259,9 +256,6 @@ impl Catalog {
     }
 
     /// Returns everything about a block, or `None` if it does not exist.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block(&self, name: &BlockName) -> Result<Option<BlockDetail>> {
         let mut conn = self.snapshot().await?;
         let state = query_as(STATES).bind(name.as_str());
@@ -280,9 +274,6 @@ impl Catalog {
     }
 
     /// Returns all blocks with their input files as last read, sorted by id.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn known_blocks(&self) -> Result<Vec<KnownBlock>> {
         let mut conn = self.read_conn().await?;
         query_as(BLOCKS).fetch_all(&mut conn).await

@@ -209,9 +209,6 @@ impl PlannedBlock {
 impl Catalog {
     /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
     /// its blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn plan_blocks(
         &self,
         settings: &BlockSettings,
@@ -230,9 +227,6 @@ impl Catalog {
 
     /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
     /// considers only its blocks. Returns their number.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn requeue_stale_blocks(
         &self,
         settings: &BlockSettings,
@@ -257,9 +251,6 @@ impl Catalog {
 
     /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
     /// of their results are missing or damaged.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn reset_blocks(&self, blocks: Vec<(BlockId, BlockStage)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

@@ -155,9 +155,6 @@ impl<R: Rows> Query<R> {
     }
 
     /// Returns the first row.
-    ///
-    /// # Errors
-    /// Returns an error if there is none.
     pub(crate) async fn fetch_one(self, conn: &mut Conn) -> Result<R::Value> {
         let row = self.fetch_optional(conn).await?;
         row.ok_or(CatalogError::Database(sqlx::Error::RowNotFound))

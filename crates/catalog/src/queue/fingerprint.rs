@@ -90,9 +90,6 @@ ON CONFLICT DO NOTHING",
 
 impl Catalog {
     /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
@@ -124,9 +121,6 @@ impl Catalog {
 
     /// Returns the settings in which `fingerprints` differ from those of another process, which is described by its
     /// [`Fingerprints::hash_line`]. Skips a stage if the catalog does not know the other process's hash.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn changes_from(
         &self,
         hash_line: &str,

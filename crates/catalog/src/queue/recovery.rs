@@ -146,9 +146,6 @@ pub(crate) struct RecoveredJobs<K: JobKind> {
 
 impl Catalog {
     /// Returns the workers that hold leases.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
         let mut holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(&mut conn).await?;
@@ -164,9 +161,6 @@ impl Catalog {
 
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
     /// the stored hashes to detect replaced files.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

@@ -83,9 +83,6 @@ from_row! { RemovedJob { job in row, token, low_confidence } }
 
 impl Catalog {
     /// Returns the names of the retired pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn retired_pairs(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(NAMES);

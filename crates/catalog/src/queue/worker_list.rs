@@ -88,9 +88,6 @@ impl WorkerRecord {
 
 impl Catalog {
     /// Returns the workers whose last heartbeat is later than `since`, in the order in which they registered.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn workers(&self, since: UnixMillis) -> Result<Vec<WorkerRecord>> {
         let mut conn = self.read_conn().await?;
         query_as(LIST).bind(since).fetch_all(&mut conn).await

@@ -79,9 +79,6 @@ GROUP BY j.stage, j.status";
 
 impl Catalog {
     /// Registers a worker process with its settings. Returns an id that no worker had before.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
@@ -93,9 +90,6 @@ impl Catalog {
     }
 
     /// Records that a worker ended properly, and with which metrics. Without metrics, the worker is not listed any more.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn end_worker(
         &self,
         worker: WorkerId,
@@ -119,9 +113,6 @@ impl Catalog {
 
     /// Ends the back-offs that are due, and returns the number of pairs made ready. Also ends back-offs with more than
     /// `longest` milliseconds left, which only a clock jump can cause.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -136,9 +127,6 @@ impl Catalog {
 
     /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `among`, counts
     /// all pairs, but at most 1000 ready ones.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn outstanding(
         &self,
         until: Stage,
@@ -153,9 +141,6 @@ impl Catalog {
     }
 
     /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
         let query = match among {

@@ -22,9 +22,6 @@ WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.name = item.value ->> 'name') 
 
 impl Catalog {
     /// Returns whether any pair has a true alignment.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         let exists = query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");

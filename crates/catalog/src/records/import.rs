@@ -150,9 +150,6 @@ impl Catalog {
     }
 
     /// Returns the names of all pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
@@ -160,18 +157,12 @@ impl Catalog {
     }
 
     /// Returns the unknown names among `names`, in the given order.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
     }
 
     /// Returns the pairs with the given names. Unknown names are left out.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await

@@ -145,17 +145,11 @@ impl Catalog {
     }
 
     /// Returns all manual alignments, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         self.manual_alignment_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` manual alignments with ids above `after`, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn manual_alignment_page(
         &self,
         after: i64,
@@ -170,18 +164,12 @@ impl Catalog {
     }
 
     /// Returns the newest manual alignment of each pair. Ignores alignments that are undone or whose `holds` is false.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         Ok(newest(self.manual_alignments().await?))
     }
 
     /// Returns the newest manual alignment of each pair with a name from `first` to `last`, like
     /// [`Self::newest_manual_alignments`].
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn newest_manual_alignments_between(
         &self,
         first: &PairName,

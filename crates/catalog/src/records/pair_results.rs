@@ -59,9 +59,6 @@ const ATTEMPTS: &str =
 
 impl Catalog {
     /// Returns up to `limit` pairs with names above `after`, sorted by name. Returns an empty list at the end.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(crate) async fn results_page(
         &self,
         after: Option<&PairName>,
@@ -75,9 +72,6 @@ impl Catalog {
     }
 
     /// Returns the details of a pair, or `None` if the pair does not exist.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
         let found = self.bind_left_out(query(ONE).bind(name.as_str()));
@@ -105,9 +99,6 @@ impl Catalog {
     }
 
     /// Returns up to `limit` quarantined pairs, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
         let query = query(FAILED).bind(limit as i64);
@@ -124,9 +115,6 @@ impl Catalog {
     }
 
     /// Counts the quarantined pairs by failure class. Leaves out classes without pairs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
         let query = query_as(FAILED_BY_CLASS);
@@ -260,9 +248,6 @@ impl Catalog {
 
 impl ResultPages<'_> {
     /// Returns the next page, which is never empty, or `None` after the last page.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
         let page = self.catalog.results_page(self.after.as_ref(), self.size);
         let page = page.await?;

@@ -61,9 +61,6 @@ FROM pair WHERE id > ?1 AND id IN (SELECT CAST(atom AS bigint) FROM json_each(?3
 
 impl Catalog {
     /// Returns the leased pairs with their results, in the same order as the leases.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails, or if a stored value is invalid.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = json_array(leases.iter().map(|lease| lease.unit.0));
@@ -94,9 +91,6 @@ impl Catalog {
 
     /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `among` is given,
     /// returns only its pairs. Returns an empty list at the end.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
@@ -117,9 +111,6 @@ impl Catalog {
     }
 
     /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

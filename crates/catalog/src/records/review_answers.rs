@@ -248,9 +248,6 @@ impl Catalog {
 
     /// Returns the answers of a reviewer that are not undone, oldest first. An answer on several results appears once
     /// for each of these results.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let left_out = &self.left_out;
@@ -264,17 +261,11 @@ impl Catalog {
     }
 
     /// Returns all answers to attention checks, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         self.attention_check_page(0, i64::MAX as usize).await
     }
 
     /// Returns up to `limit` answers to attention checks with ids above `after`, including undone ones, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn attention_check_page(
         &self,
         after: i64,
@@ -291,9 +282,6 @@ impl Catalog {
     }
 
     /// Returns the key from which the review page derives the ids of its items. A catalog's key never changes.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let query = query_scalar("SELECT key FROM review_key");

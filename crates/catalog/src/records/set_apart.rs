@@ -66,9 +66,6 @@ ON CONFLICT (record, row) DO UPDATE SET value = excluded.value, fault = excluded
 
 impl Catalog {
     /// Compares all rows with their checksums. Returns the catalog without the rows that do not agree, and these rows.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn without_faulty_rows(&self) -> Result<(Self, Vec<FaultyRow>)> {
         let faulty = self.faulty_rows().await?;
         let mut by_table: BTreeMap<_, Vec<i64>> = BTreeMap::new();
@@ -82,9 +79,6 @@ impl Catalog {
     }
 
     /// Returns whether the user of the database may set rows apart: the owner, or anybody if the catalog is a file.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn may_set_apart(&self) -> Result<bool> {
         if !self.is_shared() {
             return Ok(true);
@@ -95,9 +89,6 @@ impl Catalog {
     }
 
     /// Records that the owner knows of damaged rows of append-only tables. The rows stay as they are.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn set_apart(&self, rows: Vec<FaultyRow>, now: UnixMillis) -> Result<()> {
         let rows = rows.iter();
         let rows = rows.map(|row| json!([row.table.code(), row.row, row.value, row.fault.name()]));

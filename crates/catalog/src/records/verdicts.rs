@@ -179,18 +179,12 @@ impl Catalog {
     }
 
     /// Returns the verdict log of one pair, or of all pairs, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair, &self.left_out).await
     }
 
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         let (after, limit) = (Some(after), Some(limit as i64));

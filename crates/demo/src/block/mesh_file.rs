@@ -26,9 +26,6 @@ impl BlockMeshFormat {
 }
 
 /// Writes the mesh of a block.
-///
-/// # Errors
-/// Returns an error if `out` does.
 pub(super) fn write_solid(
     solid: &BlockSolid,
     format: BlockMeshFormat,

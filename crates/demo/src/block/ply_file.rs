@@ -61,9 +61,6 @@ impl VertexNumbers {
 }
 
 /// Writes the mesh of a block: vertices row by row, then faces row by row.
-///
-/// # Errors
-/// Returns an error if `out` does.
 pub(super) fn write_ply(solid: &BlockSolid, out: &mut impl Write) -> io::Result<()> {
     let numbers = VertexNumbers::of(solid);
     write!(

@@ -8,9 +8,6 @@ use super::facets::{BAND, facing, split, triangle_count};
 use super::solid::BlockSolid;
 
 /// Writes the mesh of a block: the sides row by row, then walls and support.
-///
-/// # Errors
-/// Returns an error if `out` does.
 pub(super) fn write_stl(solid: &BlockSolid, out: &mut impl Write) -> io::Result<()> {
     let mut header = [0; 80];
     let title = b"carved block";

@@ -185,9 +185,6 @@ impl BlockWorld {
     }
 
     /// Writes the mesh row by row.
-    ///
-    /// # Errors
-    /// Returns an error if `out` does.
     pub fn write_mesh(&self, format: BlockMeshFormat, out: &mut impl Write) -> io::Result<()> {
         write_solid(&self.solid, format, out)
     }

@@ -41,9 +41,6 @@ impl ViaRegions {
     }
 
     /// Writes the file, image by image. The key of an image is its name followed by its size in bytes, as in VIA.
-    ///
-    /// # Errors
-    /// Returns the first error of `append`.
     pub(crate) fn write<E>(self, mut append: impl FnMut(&str) -> Result<(), E>) -> Result<(), E> {
         append("{")?;
         for (k, (name, image)) in self.0.into_iter().enumerate() {

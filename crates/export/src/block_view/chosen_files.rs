@@ -10,9 +10,6 @@ use mocban_store::{Project, hash_input};
 
 /// Returns the file of a block that is another one than the file on which points were chosen, if there is one. A file that
 /// cannot be read here counts as the same, because the scan may be on another computer.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read.
 pub async fn replaced_file(
     catalog: &Catalog,
     project: &Project,

@@ -35,9 +35,6 @@ pub(crate) struct RegisteredFace {
 impl RegisteredFace {
     /// Collects the current outcomes of a block. Returns `None` if its page is not aligned: it has not run, was refused, or
     /// runs again.
-    ///
-    /// # Errors
-    /// Returns an error if a stored outcome has another form.
     pub(crate) fn of(detail: &BlockDetail) -> Result<Option<Self>, BlockViewError> {
         let next = detail.state.next_stage;
         let is_current = |stage| next.is_none_or(|next| stage < next);

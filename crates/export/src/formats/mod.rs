@@ -19,9 +19,6 @@ use super::format::ExportFormat;
 use super::format_writer::{FormatFolder, FormatWriter};
 
 /// Creates the writer of a format for an empty folder.
-///
-/// # Errors
-/// Returns an error if a file cannot be created.
 pub(super) fn begin(
     format: ExportFormat,
     folder: FormatFolder,

@@ -64,9 +64,6 @@ impl Pack {
     }
 
     /// Stores the pack.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn store(self, bucket: &Bucket) -> Result<(), BucketError> {
         bucket.write(&key(&self.name), self.bytes)
     }
@@ -89,9 +86,6 @@ pub(crate) fn number_of(name: &str) -> Option<u64> {
 }
 
 /// Reads a whole pack.
-///
-/// # Errors
-/// Returns an error if the request fails.
 pub(super) fn read_pack(bucket: &Bucket, name: &str) -> Result<Vec<u8>, BucketError> {
     bucket.read(&key(name), MAX_BYTES)
 }
