@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::kind::BlockKind;
-use super::mesh_file::BlockMeshFormat;
 use super::world::BlockWorld;
 use crate::dataset::{DatasetError, at};
 
@@ -151,7 +150,7 @@ fn write_mesh(
         inner: BufWriter::with_capacity(BUFFER, file),
         is_stopped,
     };
-    let written = world.write_mesh(BlockMeshFormat::Ply, &mut out);
+    let written = world.write_mesh(&mut out);
     let written = written.and_then(|()| out.flush());
     if is_stopped() {
         return Err(DatasetError::Stopped);

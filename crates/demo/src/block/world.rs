@@ -13,10 +13,10 @@ use super::impression::Impression;
 use super::kind::{BlockKind, BlockSupport, PageExtent};
 use super::layout::PageLayout;
 use super::leaf::{PageScene, PrintedLeaf};
-use super::mesh_file::{BlockMeshFormat, write_solid};
 use super::page_file::{PageFileBytes, encode_page};
 use super::page_image::{InkBox, PageRendering};
 use super::page_sheet::PageSheet;
+use super::ply_file::write_ply;
 use super::pose::{BlockPose, FaceSide, SideFrame};
 use super::relief::BlockRelief;
 use super::seeding::{hash, part_rng};
@@ -184,9 +184,9 @@ impl BlockWorld {
         triangle_count(&self.solid)
     }
 
-    /// Writes the mesh row by row.
-    pub fn write_mesh(&self, format: BlockMeshFormat, out: &mut impl Write) -> io::Result<()> {
-        write_solid(&self.solid, format, out)
+    /// Writes the mesh as binary PLY, row by row, so that the memory does not grow with the file.
+    pub fn write_mesh(&self, out: &mut impl Write) -> io::Result<()> {
+        write_ply(&self.solid, out)
     }
 
     /// Returns the true alignment.
