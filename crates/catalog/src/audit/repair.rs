@@ -9,6 +9,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as};
 use crate::db::rows::json_array;
 use crate::db::schema::{self, SchemaDifference, wanted_objects};
+use crate::handle::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::fragments::{fingerprint_before, inconsistent};
 use crate::queue::job_counts::count_jobs;
@@ -84,61 +85,51 @@ impl Catalog {
     /// # Errors
     /// Returns an error if a database operation fails. In that case nothing is changed.
     pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
-        self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
-            .await
+        in_transaction!(self, |conn| { restore(conn, &pairs).await })
     }
 
     /// Corrects the fingerprint of each job, marks jobs with inconsistent results dirty, and recounts all counters.
     pub async fn rebuild_counters(&self) -> Result<()> {
-        self.in_transaction(|conn| {
-            Box::pin(async move {
-                // Before the jobs are changed, so that heartbeats wait.
-                lock_counters(conn).await?;
-                for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
-                    query(sql).execute(&mut *conn).await?;
-                }
-                recount(conn).await
-            })
+        in_transaction!(self, |conn| {
+            // Before the jobs are changed, so that heartbeats wait.
+            lock_counters(conn).await?;
+            for sql in [FIX_FINGERPRINTS, MARK_DIRTY] {
+                query(sql).execute(&mut *conn).await?;
+            }
+            recount(conn).await
         })
-        .await
     }
 
     /// Rebuilds every index from its table. Returns the faults that SQLite's integrity check finds afterwards.
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
-        self.in_transaction(|conn| {
-            Box::pin(async move {
-                let Conn::Sqlite(conn) = conn else {
-                    return Ok(Vec::new());
-                };
-                sqlx::query("REINDEX").execute(&mut **conn).await?;
-                integrity(conn, false).await
-            })
+        in_transaction!(self, |conn| {
+            let Conn::Sqlite(conn) = conn else {
+                return Ok(Vec::new());
+            };
+            sqlx::query("REINDEX").execute(&mut **conn).await?;
+            integrity(conn, false).await
         })
-        .await
     }
 
     /// Recreates missing indexes and triggers. Does not change tables.
     pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let Conn::Sqlite(conn) = conn else {
-                    return Ok(());
+        in_transaction!(self, |conn| {
+            let Conn::Sqlite(conn) = conn else {
+                return Ok(());
+            };
+            for found in schema::differences(conn, wanted).await? {
+                let SchemaDifference::Missing(name) = found else {
+                    continue;
                 };
-                for found in schema::differences(conn, wanted).await? {
-                    let SchemaDifference::Missing(name) = found else {
-                        continue;
-                    };
-                    if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
-                        // SQL of our own migrations.
-                        let sql = AssertSqlSafe(sql.as_str());
-                        sqlx::query(sql).execute(&mut **conn).await?;
-                    }
+                if let Some(sql) = wanted.get(&name).filter(|_| !name.starts_with("table ")) {
+                    // SQL of our own migrations.
+                    let sql = AssertSqlSafe(sql.as_str());
+                    sqlx::query(sql).execute(&mut **conn).await?;
                 }
-                Ok(())
-            })
+            }
+            Ok(())
         })
-        .await
     }
 }
 

@@ -10,6 +10,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
 use crate::db::script::Script;
+use crate::handle::in_transaction;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;
@@ -75,10 +76,7 @@ impl Catalog {
         characters: Vec<NewCharacter>,
     ) -> Result<CutReply> {
         let done = (lease, vec![stage]);
-        self.in_transaction(move |conn| {
-            Box::pin(async move { finish(conn, &done, &characters).await })
-        })
-        .await
+        in_transaction!(self, |conn| { finish(conn, &done, &characters).await })
     }
 }
 

@@ -4,6 +4,7 @@ use crate::blocks::model::BlockAttributes;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
+use crate::handle::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::{Catalog, Result};
@@ -56,16 +57,13 @@ impl Catalog {
         rows: Vec<BlockAttributes>,
         now: UnixMillis,
     ) -> Result<BlockImportSummary> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = BlockImportSummary::default();
-                for row in &rows {
-                    import_block(conn, row, now, &mut summary).await?;
-                }
-                Ok(summary)
-            })
+        in_transaction!(self, |conn| {
+            let mut summary = BlockImportSummary::default();
+            for row in &rows {
+                import_block(conn, row, now, &mut summary).await?;
+            }
+            Ok(summary)
         })
-        .await
     }
 
     /// Changes a block by a statement with its name as `?1` and a value as `?2`, which returns its id, and stores the
@@ -77,16 +75,13 @@ impl Catalog {
         value: Option<String>,
     ) -> Result<bool> {
         let name = block.to_string();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let update = query_scalar(statement).bind(&name).bind(&value);
-                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
-                let Some(id) = id else { return Ok(false) };
-                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-                Ok(true)
-            })
+        in_transaction!(self, |conn| {
+            let update = query_scalar(statement).bind(&name).bind(&value);
+            let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+            let Some(id) = id else { return Ok(false) };
+            checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+            Ok(true)
         })
-        .await
     }
 
     /// Returns the names of all blocks, sorted.

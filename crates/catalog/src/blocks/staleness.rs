@@ -15,6 +15,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row};
 use crate::db::value::Json;
+use crate::handle::in_transaction;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
@@ -234,38 +235,32 @@ impl Catalog {
         among: Option<&BlockSelection>,
     ) -> Result<u64> {
         let (settings, among) = (settings.clone(), among.cloned());
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
-                let stale = decided.iter().filter(|(job, from, why)| {
-                    let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
-                    !waits || job.next() != Some(*from)
-                });
-                let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
-                let stale: Vec<_> = stale.collect();
-                requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
-            })
+        in_transaction!(self, |conn| {
+            let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
+            let stale = decided.iter().filter(|(job, from, why)| {
+                let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
+                !waits || job.next() != Some(*from)
+            });
+            let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
+            let stale: Vec<_> = stale.collect();
+            requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
         })
-        .await
     }
 
     /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
     /// of their results are missing or damaged.
     pub async fn reset_blocks(&self, blocks: Vec<(BlockId, BlockStage)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                for (block, stage) in &blocks {
-                    let new = query(NEW_JOB).bind(block.0);
-                    new.execute(&mut *conn).await?;
-                    let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
-                    reset.execute(&mut *conn).await?;
-                    let clear = query(CLEAR_FAILURE).bind(block.0);
-                    clear.execute(&mut *conn).await?;
-                }
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            for (block, stage) in &blocks {
+                let new = query(NEW_JOB).bind(block.0);
+                new.execute(&mut *conn).await?;
+                let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
+                reset.execute(&mut *conn).await?;
+                let clear = query(CLEAR_FAILURE).bind(block.0);
+                clear.execute(&mut *conn).await?;
+            }
+            Ok(())
         })
-        .await
     }
 }
 

@@ -10,6 +10,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
+use crate::handle::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
@@ -162,20 +163,17 @@ impl Catalog {
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
     /// the stored hashes to detect replaced files.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let items = || {
-                    seen.iter()
-                        .map(|(pair, inputs)| input_item((*pair, inputs)))
-                };
-                script.execute_over(UPDATE_INPUTS, items())?;
-                script.execute_over(FATAL_INPUTS, items())?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let items = || {
+                seen.iter()
+                    .map(|(pair, inputs)| input_item((*pair, inputs)))
+            };
+            script.execute_over(UPDATE_INPUTS, items())?;
+            script.execute_over(FATAL_INPUTS, items())?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 

@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::handle::in_transaction;
 use crate::queue::fingerprint::{differences, fields_of};
 use crate::queue::plan::FieldChange;
 use crate::queue::provenance::FingerprintId;
@@ -50,18 +51,15 @@ impl Catalog {
     /// Makes these the settings of all workers, unless pairs or blocks are leased by workers with other settings. Workers
     /// with other settings get no more pairs and blocks.
     pub async fn set_run_settings(&self, settings: WorkerSettings) -> Result<SharedSettings> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let (pairs, blocks) = (settings.fingerprints.json(), settings.blocks.json());
-                let others = query_as(OTHERS).bind(&pairs).bind(&blocks);
-                if let Some(others) = others.fetch_optional(&mut *conn).await? {
-                    return other(conn, others, &settings).await;
-                }
-                query(SET).bind(&pairs).bind(&blocks).execute(conn).await?;
-                Ok(SharedSettings::Same)
-            })
+        in_transaction!(self, |conn| {
+            let (pairs, blocks) = (settings.fingerprints.json(), settings.blocks.json());
+            let others = query_as(OTHERS).bind(&pairs).bind(&blocks);
+            if let Some(others) = others.fetch_optional(&mut *conn).await? {
+                return other(conn, others, &settings).await;
+            }
+            query(SET).bind(&pairs).bind(&blocks).execute(conn).await?;
+            Ok(SharedSettings::Same)
         })
-        .await
     }
 
     /// Compares the settings of a new worker with those of the last plan. Without a plan, any settings are accepted.

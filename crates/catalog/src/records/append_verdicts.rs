@@ -8,6 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::json_array;
+use crate::handle::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::review_context::ReviewContext;
 use crate::records::verdicts::NewVerdict;
@@ -186,24 +187,21 @@ impl Catalog {
     where
         I: Iterator<Item = Result<ListedVerdict>> + Send + 'static,
     {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let newest = "SELECT coalesce(max(id), 0) FROM verdict";
-                let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
-                let mut counts = ImportedVerdicts::default();
-                loop {
-                    let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
-                    if part.is_empty() {
-                        return Ok(counts);
-                    }
-                    let of_part = append(conn, &part, newest, now).await?;
-                    counts.recorded += of_part.recorded;
-                    counts.known += of_part.known;
-                    counts.left_out += of_part.left_out;
+        in_transaction!(self, |conn| {
+            let newest = "SELECT coalesce(max(id), 0) FROM verdict";
+            let newest: i64 = query_scalar(newest).fetch_one(&mut *conn).await?;
+            let mut counts = ImportedVerdicts::default();
+            loop {
+                let part: Vec<_> = list.by_ref().take(CHUNK).collect::<Result<_>>()?;
+                if part.is_empty() {
+                    return Ok(counts);
                 }
-            })
+                let of_part = append(conn, &part, newest, now).await?;
+                counts.recorded += of_part.recorded;
+                counts.known += of_part.known;
+                counts.left_out += of_part.left_out;
+            }
         })
-        .await
     }
 }
 

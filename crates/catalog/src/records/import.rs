@@ -10,6 +10,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
+use crate::handle::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
@@ -122,31 +123,28 @@ impl Catalog {
         truths: Vec<(PairName, Value)>,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = ImportSummary::default();
-                let mut deltas = Deltas::default();
-                loop {
-                    match chunks.recv().await {
-                        Some(ImportChunk::Rows(rows)) => {
-                            for chunk in rows.chunks(CHUNK) {
-                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
-                            }
+        in_transaction!(self, |conn| {
+            let mut summary = ImportSummary::default();
+            let mut deltas = Deltas::default();
+            loop {
+                match chunks.recv().await {
+                    Some(ImportChunk::Rows(rows)) => {
+                        for chunk in rows.chunks(CHUNK) {
+                            import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
                         }
-                        Some(ImportChunk::End) => break,
-                        None => return Err(CatalogError::CutShort),
                     }
+                    Some(ImportChunk::End) => break,
+                    None => return Err(CatalogError::CutShort),
                 }
-                deltas.apply(conn).await?;
-                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                let stored = ground_truth::set(conn, &truths).await?;
-                if let Conn::Postgres(_) = conn {
-                    query(ANALYZE).execute(conn).await?;
-                }
-                Ok((summary, stored))
-            })
+            }
+            deltas.apply(conn).await?;
+            summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+            let stored = ground_truth::set(conn, &truths).await?;
+            if let Conn::Postgres(_) = conn {
+                query(ANALYZE).execute(conn).await?;
+            }
+            Ok((summary, stored))
         })
-        .await
     }
 
     /// Returns the names of all pairs, sorted.

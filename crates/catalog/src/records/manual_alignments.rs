@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
+use crate::handle::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_answers::pair_id;
@@ -117,31 +118,27 @@ impl Catalog {
         made: ManualAlignment,
         now: UnixMillis,
     ) -> Result<bool> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let pair = pair_id(conn, &made.pair).await?;
-                let stored: Option<i64> = query_scalar(INSERT)
-                    .bind(&made.event)
-                    .bind(pair)
-                    .bind(&made.mesh_hash.as_bytes()[..])
-                    .bind(&made.print_hash.as_bytes()[..])
-                    .bind(&made.depth_hash.as_bytes()[..])
-                    .bind(&made.seen.as_bytes()[..])
-                    .bind(serde_json::to_string(&made.print_from_depth)?)
-                    .bind(serde_json::to_string(&made.print_from_mesh)?)
-                    .bind(made.iou)
-                    .bind(made.dice)
-                    .bind(&made.reviewer)
-                    .bind(&made.note)
-                    .bind(now)
-                    .fetch_optional(&mut *conn)
-                    .await?;
-                checksums::store(conn, ChecksummedTable::ManualAlignment, stored.as_slice())
-                    .await?;
-                Ok(stored.is_some())
-            })
+        in_transaction!(self, |conn| {
+            let pair = pair_id(conn, &made.pair).await?;
+            let stored: Option<i64> = query_scalar(INSERT)
+                .bind(&made.event)
+                .bind(pair)
+                .bind(&made.mesh_hash.as_bytes()[..])
+                .bind(&made.print_hash.as_bytes()[..])
+                .bind(&made.depth_hash.as_bytes()[..])
+                .bind(&made.seen.as_bytes()[..])
+                .bind(serde_json::to_string(&made.print_from_depth)?)
+                .bind(serde_json::to_string(&made.print_from_mesh)?)
+                .bind(made.iou)
+                .bind(made.dice)
+                .bind(&made.reviewer)
+                .bind(&made.note)
+                .bind(now)
+                .fetch_optional(&mut *conn)
+                .await?;
+            checksums::store(conn, ChecksummedTable::ManualAlignment, stored.as_slice()).await?;
+            Ok(stored.is_some())
         })
-        .await
     }
 
     /// Returns all manual alignments, including undone ones, oldest first.

@@ -6,6 +6,7 @@ use crate::db::query::query;
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::rows::json_array;
 use crate::db::script::Script;
+use crate::handle::in_transaction;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::Lease;
 use crate::queue::pair_job::PairJob;
@@ -112,16 +113,13 @@ impl Catalog {
 
     /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
-                PairJob::add_inputs(&mut script, inputs)?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
+            PairJob::add_inputs(&mut script, inputs)?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 

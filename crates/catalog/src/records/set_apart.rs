@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::db::query::{query, query_scalar};
 use crate::db::rows::json_array;
+use crate::handle::in_transaction;
 use crate::records::faulty_rows::FaultyRow;
 use crate::records::left_out::LeftOut;
 use crate::{Catalog, Result};
@@ -93,9 +94,8 @@ impl Catalog {
         let rows = rows.iter();
         let rows = rows.map(|row| json!([row.table.code(), row.row, row.value, row.fault.name()]));
         let rows = json_array(rows);
-        self.in_transaction(move |conn| {
-            Box::pin(async move { query(SET_APART).bind(rows).bind(now).execute(conn).await })
+        in_transaction!(self, |conn| {
+            query(SET_APART).bind(rows).bind(now).execute(conn).await
         })
-        .await
     }
 }
