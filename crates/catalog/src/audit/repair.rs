@@ -6,38 +6,17 @@ use sqlx::AssertSqlSafe;
 use crate::audit::integrity::integrity;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
-use crate::db::query::{query, query_as};
+use crate::db::query::query;
 use crate::db::rows::json_array;
 use crate::db::schema::{self, SchemaDifference, wanted_objects};
 use crate::handle::in_transaction;
-use crate::queue::counters::{CounterKey, Deltas};
+use crate::queue::counters::Deltas;
 use crate::queue::fragments::{fingerprint_before, inconsistent};
 use crate::queue::job_counts::count_jobs;
 use crate::queue::pair_job::PairJob;
-use crate::queue::requeue::CLEAR_FAILURES;
+use crate::queue::requeue::send_back;
 use crate::{Catalog, Result};
 use mocban_core::domain::{PairId, Stage};
-
-const POSITIONS: &str = "
-SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
-FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = CAST(item.value ->> 0 AS bigint)";
-
-const NEW_JOBS: &str = "
-INSERT INTO job (pair, stage, status)
-SELECT CAST(value ->> 0 AS bigint), 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = CAST(value ->> 0 AS bigint))";
-
-/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
-/// lease fail.
-pub(crate) const RESTORE: &str = concat!(
-    "
-UPDATE job SET stage = min(stage, CAST(item.value ->> 1 AS bigint)), status = 0, run_at = NULL, prio = 0,
-    attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
-    fingerprint = ",
-    fingerprint_before!("min(job.stage, CAST(item.value ->> 1 AS bigint))"),
-    "
-FROM json_each(?1) AS item WHERE job.pair = CAST(item.value ->> 0 AS bigint)
-RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
-);
 
 /// Removes the results of the stages that are to run again, because their values may be invalid.
 const REMOVE_RESULTS: &str = "
@@ -154,30 +133,11 @@ pub(crate) async fn recount(conn: &mut Conn) -> Result<()> {
 }
 
 async fn restore(conn: &mut Conn, pairs: &[(PairId, Stage)]) -> Result<()> {
-    let items = json_array(
-        pairs
-            .iter()
-            .map(|(pair, stage)| json!([pair.0, stage.index()])),
-    );
+    let items = pairs.iter();
+    let items = items.map(|(pair, stage)| json!([pair.0, stage.index()]));
     let mut deltas = Deltas::default();
-    let before = query_as(POSITIONS).bind(&items);
-    let before: Vec<CounterKey> = before.fetch_all(&mut *conn).await?;
-    for key in before {
-        deltas.add(key, -1);
-    }
-    query(NEW_JOBS).bind(&items).execute(&mut *conn).await?;
-    let after = query_as(RESTORE).bind(&items);
-    let after: Vec<CounterKey> = after.fetch_all(&mut *conn).await?;
-    for key in after {
-        deltas.add(key, 1);
-    }
-    query(REMOVE_RESULTS)
-        .bind(&items)
-        .execute(&mut *conn)
-        .await?;
-    query(CLEAR_FAILURES.of::<PairJob>())
-        .bind(&items)
-        .execute(&mut *conn)
-        .await?;
+    send_back::<PairJob>(conn, pairs.iter().copied(), &mut deltas).await?;
+    let remove = query(REMOVE_RESULTS).bind(json_array(items));
+    remove.execute(&mut *conn).await?;
     deltas.apply(conn).await
 }

@@ -82,6 +82,7 @@ impl StoredKind for BlockJob {
         ("and_advance", ""),
         ("and_fail", ""),
         ("and_requeue", ""),
+        ("and_send_back", ""),
         ("and_recover", ""),
         ("and_overdue", ""),
         ("and_count_claimed", ""),

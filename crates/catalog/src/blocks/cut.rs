@@ -17,10 +17,11 @@ use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::{Lease, StageCheckpoint};
 use crate::queue::pair_job::PairJob;
 use crate::queue::provenance::InputVersions;
+use crate::queue::requeue::send_back;
 use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::{Catalog, Result};
-use mocban_core::domain::{BlockName, PairId, PairName};
+use mocban_core::domain::{BlockName, PairId, PairName, Stage};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -179,10 +180,11 @@ async fn store_pairs(
         .map(|change| &change.name)
         .collect();
     let again = stored.iter().filter(|(_, name)| changed.contains(name));
-    let again: Vec<PairId> = again.map(|(id, _)| *id).collect();
-    retired::reset(conn, &again, deltas).await?;
+    // The workers that hold their leases read the old files.
+    let from_start = again.clone().map(|(id, _)| (*id, Stage::Fit));
+    send_back::<PairJob>(conn, from_start, deltas).await?;
     let all = names.len() as u64;
-    let changed = again.len() as u64;
+    let changed = again.count() as u64;
     Ok(CutSummary {
         added: summary.added,
         changed,

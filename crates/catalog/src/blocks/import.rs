@@ -37,7 +37,7 @@ ON CONFLICT (name) DO UPDATE SET
     labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
 RETURNING id";
 
-pub(crate) const NEW_JOB: &str =
+const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
 
 const NAMES: &str = concat!(

@@ -6,7 +6,6 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::block_job::BlockJob;
-use crate::blocks::import::NEW_JOB;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
 use crate::blocks::queue::uncounted;
 use crate::blocks::records::{control_points, input_versions};
@@ -19,7 +18,7 @@ use crate::handle::in_transaction;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
-use crate::queue::requeue::requeue;
+use crate::queue::requeue::{requeue, send_back};
 use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
@@ -31,13 +30,6 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id ORDER BY b.id";
 
 const RESULTS: &str = "SELECT block, stage, made_with FROM block_result ORDER BY block, stage";
-
-/// Sends a block back to a stage and ends its lease.
-const RESET: &str = "
-UPDATE block_job SET stage = min(stage, ?2), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
-    deadline = NULL, token = token + 1 WHERE block = ?1";
-
-const CLEAR_FAILURE: &str = "DELETE FROM block_failure WHERE block = ?1";
 
 /// Why a block runs, or runs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -251,15 +243,7 @@ impl Catalog {
     /// of their results are missing or damaged.
     pub async fn reset_blocks(&self, blocks: Vec<(BlockId, BlockStage)>) -> Result<()> {
         in_transaction!(self, |conn| {
-            for (block, stage) in &blocks {
-                let new = query(NEW_JOB).bind(block.0);
-                new.execute(&mut *conn).await?;
-                let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
-                reset.execute(&mut *conn).await?;
-                let clear = query(CLEAR_FAILURE).bind(block.0);
-                clear.execute(&mut *conn).await?;
-            }
-            Ok(())
+            send_back::<BlockJob>(conn, blocks.into_iter(), &mut uncounted()).await
         })
     }
 }
