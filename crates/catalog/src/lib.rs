@@ -58,10 +58,7 @@ pub use blocks::model::{
     NewCharacter, StoredCharacter,
 };
 pub use blocks::queue::OutstandingBlocks;
-pub use blocks::records::{
-    AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
-    StoredBlockFailure,
-};
+pub use blocks::records::{AuditedBlock, BlockDetail, BlockStageDetail, BlockState, KnownBlock};
 pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::error::{CatalogError, LogLoss, Result};

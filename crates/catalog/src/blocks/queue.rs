@@ -3,7 +3,7 @@
 
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockWork};
-use crate::blocks::records::{BLOCK, control_points, input_versions, stage_records};
+use crate::blocks::records::{BLOCK, control_points, stage_records};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
@@ -194,7 +194,7 @@ async fn work(conn: &mut Conn, lease: &Lease<BlockJob>) -> Result<BlockWork> {
         return Err(CatalogError::Corrupt(text));
     };
     let attributes = BlockAttributes::from_row(&row)?;
-    let inputs: BlockInputVersions = input_versions(&row)?;
+    let inputs: BlockInputVersions = BlockInputVersions::from_row(&row)?;
     let control_points = control_points(&row)?;
     let mut results = stage_records(conn, lease.unit).await?;
     results.retain(|record| record.stage < lease.cursor);

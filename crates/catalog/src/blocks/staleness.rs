@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::blocks::block_job::BlockJob;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
 use crate::blocks::queue::uncounted;
-use crate::blocks::records::{control_points, input_versions};
+use crate::blocks::records::control_points;
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
@@ -103,7 +103,7 @@ impl FromRow for PlannedBlock {
         Ok(Self {
             block: row.get("id")?,
             attributes: BlockAttributes::from_row(row)?,
-            inputs: input_versions(row)?,
+            inputs: BlockInputVersions::from_row(row)?,
             control_points: control_points(row)?,
             cursor: row.get("stage")?,
             status: row.get("status")?,

@@ -10,14 +10,12 @@ use crate::queue::counters::Cursor;
 use crate::records::checksums::ChecksummedTable;
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
-    StoredFailure,
+    FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord, stored_failure,
 };
 use crate::records::{stage_results, verdicts};
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{
-    ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
-    UnixMillis,
+    ContentHash, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
 };
 
 /// Selects pairs with their attributes, job, failure and true alignment, without the pairs of `?2` and the true alignments
@@ -80,6 +78,7 @@ impl Catalog {
             return Ok(None);
         };
         let row = &found[0];
+        let attempts = query_as(ATTEMPTS).bind(row.get::<i64>("id")?);
         Ok(Some(PairDetail {
             results,
             mesh_hash: row.get("mesh_hash")?,
@@ -87,7 +86,7 @@ impl Catalog {
             attempt: row.get("attempt")?,
             crashes: row.get("crashes")?,
             run_at: row.get("run_at")?,
-            attempts: attempts(&mut conn, row.get("id")?).await?,
+            attempts: attempts.fetch_all(&mut conn).await?,
             verdict_log: verdicts::log(&mut conn, Some(name), &self.left_out).await?,
         }))
     }
@@ -152,18 +151,6 @@ async fn assemble(conn: &mut Conn, found: &[Row], left_out: &LeftOut) -> Result<
     pairs.collect()
 }
 
-fn stored_failure(row: &Row) -> Result<Option<StoredFailure>> {
-    let Some(stage) = row.get("failed_stage")? else {
-        return Ok(None);
-    };
-    let message: String = row.get("message")?;
-    Ok(Some(StoredFailure {
-        stage,
-        failure: Failure::new(row.get("class")?, message),
-        at: row.get("failed_at")?,
-    }))
-}
-
 /// Returns the metrics of a pair, with the verdicts on their current results. Returns none if the pair is not done.
 fn metrics(
     pair: i64,
@@ -203,28 +190,6 @@ fn metrics(
             .position(|metric| *metric == record.outcome.metric)
     });
     Ok(found)
-}
-
-async fn attempts(conn: &mut Conn, pair: i64) -> Result<Vec<AttemptRecord>> {
-    type Attempt = (
-        Stage,
-        Option<FailureClass>,
-        Option<String>,
-        Option<u64>,
-        UnixMillis,
-    );
-    let query = query_as(ATTEMPTS).bind(pair);
-    let found: Vec<Attempt> = query.fetch_all(conn).await?;
-    let records = found.into_iter().map(|(stage, class, message, ms, at)| {
-        let failure = class.zip(message);
-        AttemptRecord {
-            stage,
-            failure: failure.map(|(class, message)| Failure::new(class, message)),
-            ms,
-            at,
-        }
-    });
-    Ok(records.collect())
 }
 
 /// Reads the results of all pairs page by page, sorted by name. Only one page is read into memory at a time.

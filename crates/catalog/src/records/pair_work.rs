@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::db::query::query;
+use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row, from_row};
-use crate::db::rows::json_array;
+use crate::db::rows::{input_version, json_array};
 use crate::db::script::Script;
 use crate::handle::in_transaction;
 use crate::queue::kind::StoredKind as _;
@@ -15,8 +15,7 @@ use crate::queue::selection::PairSelection;
 use crate::records::model::{PairAttributes, StageRecord};
 use crate::records::stage_results;
 use crate::{Catalog, CatalogError, Result};
-use mocban_core::domain::InputVersion;
-use mocban_core::domain::{PairId, Stage};
+use mocban_core::domain::{InputVersion, PairId, Stage};
 
 /// A leased pair with its attributes and results.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,14 +100,13 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let after = after.map_or(0, |pair| pair.0);
         let query = match among {
-            None => query(INPUTS).bind(after).bind(limit as i64),
-            Some(among) => query(INPUTS_AMONG)
+            None => query_as(INPUTS).bind(after).bind(limit as i64),
+            Some(among) => query_as(INPUTS_AMONG)
                 .bind(after)
                 .bind(limit as i64)
                 .bind(&among.json),
         };
-        let found = query.fetch_all(&mut conn).await?;
-        found.iter().map(known_inputs).collect()
+        query.fetch_all(&mut conn).await
     }
 
     /// Stores versions of input files. Keeps the stored version of a file whose new version is `None`.
@@ -124,17 +122,14 @@ impl Catalog {
 }
 
 /// Reads the input files from a row with the columns of [`INPUTS`].
-pub(crate) fn known_inputs(row: &Row) -> Result<KnownInputs> {
-    let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
-        let (hash, stat): (Option<_>, Option<_>) = (row.get(hash)?, row.get(stat)?);
-        let both = hash.zip(stat);
-        Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
-    };
-    Ok(KnownInputs {
-        pair: row.get("id")?,
-        mesh_path: row.get("mesh_path")?,
-        mesh: version("mesh_hash", "mesh_stat")?,
-        print_path: row.get("print_path")?,
-        print: version("print_hash", "print_stat")?,
-    })
+impl FromRow for KnownInputs {
+    fn from_row(row: &Row) -> Result<Self> {
+        Ok(Self {
+            pair: row.get("id")?,
+            mesh_path: row.get("mesh_path")?,
+            mesh: input_version(row, "mesh")?,
+            print_path: row.get("print_path")?,
+            print: input_version(row, "print")?,
+        })
+    }
 }
