@@ -43,9 +43,8 @@ mod world;
 mod tests;
 
 pub use block_truth::{BlockCharacterTruth, BlockLandmark, BlockTextPart, BlockTruth};
-pub use files::{BlockFiles, BlockOptions, block_options, find_block, write_block};
-pub use kind::BlockKind;
+pub use files::{BlockFiles, block_options, find_block, write_block};
+pub use kind::{BlockKind, BlockOptions};
 pub use page_file::PageFileBytes;
-pub use pair_truth::CutPairTruth;
 pub use pose::FaceSide;
 pub use world::BlockWorld;

@@ -3,15 +3,22 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use super::{BlockKind, BlockTruth, BlockWorld, FaceSide};
+use super::{BlockKind, BlockOptions, BlockTruth, BlockWorld, FaceSide};
 use mocban_core::mesh::{Mesh, MeshLimits, read};
 use mocban_core::raster::{Grid, ImageLimits, decode};
 
 const SPACING_MM: f64 = 0.6;
 
+fn world(seed: u64, kind: BlockKind, spacing_mm: f64) -> BlockWorld {
+    BlockWorld::new(BlockOptions {
+        kind,
+        seed,
+        spacing_mm,
+    })
+}
+
 /// A block with text on both sides, whose page is of the back.
-static BACK: LazyLock<BlockWorld> =
-    LazyLock::new(|| BlockWorld::new(5, BlockKind::Back, SPACING_MM));
+static BACK: LazyLock<BlockWorld> = LazyLock::new(|| world(5, BlockKind::Back, SPACING_MM));
 
 fn mesh_bytes(world: &BlockWorld) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -160,7 +167,7 @@ fn page_landmarks_lie_in_their_boxes() {
 
 #[test]
 fn text_is_carved_in_mirror_writing_on_both_sides() {
-    for world in [&*BACK, &BlockWorld::new(3, BlockKind::QuarterTurn, 2.0)] {
+    for world in [&*BACK, &world(3, BlockKind::QuarterTurn, 2.0)] {
         let truth = world.truth();
         let characters = truth
             .characters
@@ -223,7 +230,7 @@ fn same_seed_gives_the_same_bytes_on_any_number_of_threads() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let again = pool.install(|| BlockWorld::new(5, BlockKind::Back, SPACING_MM));
+    let again = pool.install(|| world(5, BlockKind::Back, SPACING_MM));
     assert!(again.page().bytes == BACK.page().bytes);
     assert!(again.labels_via() == BACK.labels_via());
     let truth = |world: &BlockWorld| serde_json::to_string(&world.truth()).expect("plain values");
@@ -234,7 +241,7 @@ fn same_seed_gives_the_same_bytes_on_any_number_of_threads() {
 #[test]
 fn half_pages_show_about_half_of_the_characters() {
     for kind in [BlockKind::HalfPage, BlockKind::OpenedBook] {
-        let truth = BlockWorld::new(2, kind, 3.0).truth();
+        let truth = world(2, kind, 3.0).truth();
         let shown = truth
             .characters
             .iter()
@@ -255,7 +262,7 @@ fn half_pages_show_about_half_of_the_characters() {
 
 #[test]
 fn page_of_another_block_has_labels_but_no_truth() {
-    let world = BlockWorld::new(2, BlockKind::WrongPage, 3.0);
+    let world = world(2, BlockKind::WrongPage, 3.0);
     let truth = world.truth();
     assert!(!truth.belongs && truth.map.is_empty());
     assert!(
