@@ -181,8 +181,7 @@ impl Catalog {
     /// Sends the writer a message.
     pub(crate) async fn send(&self, message: Message) -> Result<()> {
         let inbox = self.inbox.as_ref().ok_or(CatalogError::ReadOnly)?;
-        let sent = inbox.send(message).await;
-        sent.or(Err(CatalogError::Closed))
+        inbox.send(message).await.or(Err(CatalogError::Closed))
     }
 
     /// Sends the writer a message and waits for the reply.

@@ -96,8 +96,8 @@ impl Artwork {
         let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
         let column = self.size_mm * rng.random_range(1.04..1.18) + 0.4;
         let beside = [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]];
-        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-        let corners = corners.map(|[across, down]| [across * column, down * pitch]);
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+            .map(|[across, down]| [across * column, down * pitch]);
         let (offsets, probability) = match crop {
             Crop::Character => (beside.to_vec(), 0.75),
             Crop::WideMesh | Crop::WidePrint => ([beside, corners].concat(), 1.0),

@@ -107,8 +107,7 @@ impl GallerySelection {
 
     /// Reads the verdicts on what is shown.
     async fn read_log(&mut self, catalog: &Catalog) -> Result<(), CatalogError> {
-        let groups = self.groups.iter_mut();
-        for (_, subject) in groups.flat_map(|group| &mut group.subjects) {
+        for (_, subject) in self.groups.iter_mut().flat_map(|group| &mut group.subjects) {
             if subject.is_judged() {
                 let name = &subject.pair.attributes.name;
                 subject.log = catalog.verdict_log(Some(name)).await?;

@@ -60,10 +60,9 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let query = query(ORIGINS).bind(first.as_str()).bind(last.as_str());
         let rows = query.fetch_all(&mut conn).await?;
-        let origins = rows
-            .iter()
-            .map(|row| Ok((row.get("name")?, CutOrigin::from_row(row)?)));
-        origins.collect()
+        rows.iter()
+            .map(|row| Ok((row.get("name")?, CutOrigin::from_row(row)?)))
+            .collect()
     }
 }
 
@@ -113,6 +112,5 @@ pub(crate) async fn store(
         let gone = query(sql).bind(block.0).bind(&labels);
         gone.execute(&mut *conn).await?;
     }
-    let uncut = query_scalar(UNCUT).bind(block.0);
-    uncut.fetch_all(conn).await
+    query_scalar(UNCUT).bind(block.0).fetch_all(conn).await
 }

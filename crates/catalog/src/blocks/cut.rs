@@ -92,8 +92,8 @@ async fn finish(
     let name: BlockName = name.fetch_one(&mut *conn).await?;
     let rows = pair_rows(&name, found)?;
     let names: Vec<PairName> = rows.iter().map(|cut| cut.row.name.clone()).collect();
-    let taken = query_scalar(TAKEN).bind(lease.unit.0);
-    let taken: Option<PairName> = taken
+    let taken: Option<PairName> = query_scalar(TAKEN)
+        .bind(lease.unit.0)
         .bind(names_json(&names))
         .fetch_optional(&mut *conn)
         .await?;

@@ -131,12 +131,11 @@ impl<R: Rows> Query<R> {
                 let rows = self.sqlite()?.fetch_all(&mut **conn).await?.into_iter();
                 rows.map(|row| R::value(Row::Sqlite(row))).collect()
             }
-            Conn::Postgres(conn) => {
-                let rows = limited(self.postgres()?.fetch_all(&mut **conn))
-                    .await?
-                    .into_iter();
-                rows.map(|row| R::value(Row::Postgres(row))).collect()
-            }
+            Conn::Postgres(conn) => limited(self.postgres()?.fetch_all(&mut **conn))
+                .await?
+                .into_iter()
+                .map(|row| R::value(Row::Postgres(row)))
+                .collect(),
         }
     }
 

@@ -148,8 +148,8 @@ pub(crate) async fn known(
 ) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
-        let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
+        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
+            .bind(&fingerprints.of(stage).hash.as_bytes()[..]);
         *id = query.fetch_optional(&mut *conn).await?;
     }
     Ok(ids)

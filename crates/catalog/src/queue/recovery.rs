@@ -210,8 +210,7 @@ pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
 
 /// Builds the items of [`RECOVER`] for some workers.
 pub(crate) async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
-    let query = query_as(LEFT_BY).bind(workers);
-    let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
+    let found: Vec<(i64, bool, i64)> = query_as(LEFT_BY).bind(workers).fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
         json!([worker, i64::from(died), i64::from(blamed)])

@@ -67,8 +67,7 @@ impl Catalog {
     /// Returns the names of the retired pairs, sorted.
     pub async fn retired_pairs(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let names = query_scalar(NAMES);
-        names.fetch_all(&mut conn).await
+        query_scalar(NAMES).fetch_all(&mut conn).await
     }
 }
 
@@ -81,8 +80,7 @@ pub(crate) async fn retire(
     deltas: &mut Deltas,
 ) -> Result<u64> {
     let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let removed = query_as(REMOVE).bind(ids);
-    let removed: Vec<RemovedJob> = removed.fetch_all(&mut *conn).await?;
+    let removed: Vec<RemovedJob> = query_as(REMOVE).bind(ids).fetch_all(&mut *conn).await?;
     let mut items = Vec::new();
     for one in &removed {
         let KeyedJob { unit: pair, key } = one.job;
@@ -109,8 +107,7 @@ pub(crate) async fn retire(
 
 /// Gives the retired pairs among these names, a JSON array, their jobs back. Returns how many there were.
 pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -> Result<u64> {
-    let restored = query_as(RESTORE).bind(names);
-    let restored: Vec<KeyedJob> = restored.fetch_all(&mut *conn).await?;
+    let restored: Vec<KeyedJob> = query_as(RESTORE).bind(names).fetch_all(&mut *conn).await?;
     for job in &restored {
         deltas.add(job.key, 1);
     }

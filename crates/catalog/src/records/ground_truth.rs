@@ -40,8 +40,7 @@ pub(crate) async fn set(conn: &mut Conn, truths: &[(PairName, Value)]) -> Result
         if let Some(name) = unknown.fetch_optional(&mut *conn).await? {
             return Err(CatalogError::UnknownPair(name));
         }
-        let set = query_scalar(SET).bind(items);
-        let pairs: Vec<i64> = set.fetch_all(&mut *conn).await?;
+        let pairs: Vec<i64> = query_scalar(SET).bind(items).fetch_all(&mut *conn).await?;
         checksums::store(conn, ChecksummedTable::Truth, &pairs).await?;
         stored += pairs.len() as u64;
     }

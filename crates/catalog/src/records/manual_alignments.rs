@@ -153,8 +153,7 @@ impl Catalog {
         limit: usize,
     ) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(LOG).bind(after);
-        let query = query.bind(limit as i64);
+        let query = query_as(LOG).bind(after).bind(limit as i64);
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         query.fetch_all(&mut conn).await
@@ -173,8 +172,7 @@ impl Catalog {
         last: &PairName,
     ) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let query = query_as(OF_NAMES);
-        let query = query.bind(first.as_str()).bind(last.as_str());
+        let query = query_as(OF_NAMES).bind(first.as_str()).bind(last.as_str());
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignment));
         let query = query.bind(self.left_out.of(ChecksummedTable::ManualAlignmentUndo));
         Ok(newest(query.fetch_all(&mut conn).await?))

@@ -139,8 +139,7 @@ fn write_mesh(
         inner: BufWriter::with_capacity(BUFFER, file),
         is_stopped,
     };
-    let written = world.write_mesh(&mut out);
-    let written = written.and_then(|()| out.flush());
+    let written = world.write_mesh(&mut out).and_then(|()| out.flush());
     if is_stopped() {
         return Err(DatasetError::Stopped);
     }

@@ -23,8 +23,7 @@ impl ViaRegions {
     pub(crate) fn add(&mut self, strokes: &StrokeAnnotation, bytes: u64) {
         // VIA names an image by its file name without folders.
         let name = strokes.file_name.rsplit('/').next().unwrap_or_default();
-        let image = self.0.entry(name.to_owned());
-        let image = image.or_insert_with(|| ViaImage {
+        let image = self.0.entry(name.to_owned()).or_insert_with(|| ViaImage {
             bytes,
             regions: Vec::new(),
         });

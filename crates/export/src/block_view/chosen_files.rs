@@ -30,8 +30,8 @@ fn compare(
     let attributes = &detail.state.attributes;
     let mut faces = detail.stages.iter();
     let faces = faces.find(|one| one.stage == BlockStage::Face);
-    let scanned = faces.map(|stored| serde_json::from_value(stored.made_with["mesh"].clone()));
-    let scanned: Option<ContentHash> = scanned
+    let scanned: Option<ContentHash> = faces
+        .map(|stored| serde_json::from_value(stored.made_with["mesh"].clone()))
         .transpose()
         .map_err(|why| unusable(BlockStage::Face, &why.to_string()))?;
     // A run may have found the faces of another scan meanwhile.

@@ -294,10 +294,7 @@ impl Bucket {
     {
         let (address, reply) = (self.address_of(key), send(self.store()?, self.path(key)?));
         let place = address.clone();
-        let outcome = async move {
-            let outcome = reply.await;
-            outcome.map_err(|error| BucketError::of(&place, &error))
-        };
+        let outcome = async move { reply.await.map_err(|error| BucketError::of(&place, &error)) };
         start(address, outcome)?.wait()
     }
 }
