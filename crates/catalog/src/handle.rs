@@ -181,8 +181,7 @@ impl Catalog {
     /// Sends the writer a message.
     pub(crate) async fn send(&self, message: Message) -> Result<()> {
         let inbox = self.inbox.as_ref().ok_or(CatalogError::ReadOnly)?;
-        let sent = inbox.send(message).await;
-        sent.or(Err(CatalogError::Closed))
+        inbox.send(message).await.or(Err(CatalogError::Closed))
     }
 
     /// Sends the writer a message and waits for the reply.
@@ -225,3 +224,13 @@ impl Catalog {
         .await
     }
 }
+
+/// Runs a block with a connection in a write transaction of its own: see [`Catalog::in_transaction`].
+macro_rules! in_transaction {
+    ($catalog:expr, |$conn:ident| $work:block) => {
+        $catalog
+            .in_transaction(move |$conn| Box::pin(async move $work))
+            .await
+    };
+}
+pub(crate) use in_transaction;

@@ -42,9 +42,6 @@ impl NewCatalog {
 
     /// Closes the catalog and durably renames its file to the final path. Returns `false`, and drops the new catalog,
     /// if another process created a catalog there first.
-    ///
-    /// # Errors
-    /// Returns an error if the disk returns one.
     pub async fn place(self) -> Result<bool> {
         self.catalog.close().await;
         self.file.place()

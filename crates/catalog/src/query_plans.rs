@@ -4,7 +4,6 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::tests::{Place, World};
 use crate::audit::audited_pairs;
-use crate::audit::repair;
 use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::queue::checkpoint;
@@ -67,7 +66,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
         fail::FAIL.of::<PairJob>(),
         claim::RELEASE.of::<PairJob>(),
         requeue::REQUEUE.of::<PairJob>(),
-        repair::RESTORE.into(),
+        requeue::SEND_BACK.of::<PairJob>(),
     ] {
         let plan = plan(sql).await;
         assert!(

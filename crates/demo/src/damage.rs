@@ -90,10 +90,8 @@ impl Crack {
 fn draw_lost_regions(share: NumberRange, artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;
-    let ink: Vec<(usize, usize)> = (0..frame.side * frame.side)
-        .map(|i| (i % frame.side, i / frame.side))
-        .filter(|(x, y)| strokes.at(*x, *y) > 0.0)
-        .collect();
+    let ink = frame.samples().filter(|(x, y)| strokes.at(*x, *y) > 0.0);
+    let ink: Vec<(usize, usize)> = ink.collect();
     let target = rng.random_range(share[0]..share[1] - 0.04);
     let edge_noise = Noise::draw(rng);
     let mut lost = ScalarField::from_fn(frame, |_, _, _| -9.0);

@@ -64,9 +64,6 @@ pub(super) struct Printed {
 
 /// Makes a pair whose print is drawn, so not a photograph. The character is one of `characters`, which are in the font.
 /// If the tier has a kind, draws again until print and relief both show the character.
-///
-/// # Errors
-/// Returns an error if the print cannot be encoded.
 pub(super) fn drawn_pair(
     glyphs: &Glyphs,
     characters: &[char],

@@ -107,9 +107,6 @@ struct SheetCandidate {
 /// Draws the contact sheet of a project. Unfinished pairs are left out.
 ///
 /// An image that cannot be drawn is left blank. If a pair's print or depth map cannot be read, its cell states why.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_contact_sheet(
     catalog: &Catalog,
     project: &Project,

@@ -51,9 +51,6 @@ impl Folder {
     }
 
     /// Returns whether finishing would replace an earlier export.
-    ///
-    /// # Errors
-    /// Returns an error if the disk fails.
     pub(super) fn replaces(&self) -> Result<bool, FolderError> {
         let manifest = self.0.target().join(MANIFEST);
         manifest.try_exists().map_err(at(&manifest))
@@ -131,9 +128,6 @@ pub(super) struct SharedFile {
 
 impl SharedFile {
     /// Creates an empty file below a folder.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be created.
     pub(super) fn create(root: &Path, below: &str) -> Result<Self, FolderError> {
         let path = root.join(below);
         let file = BufWriter::new(File::create(&path).map_err(at(&path))?);
@@ -141,17 +135,11 @@ impl SharedFile {
     }
 
     /// Appends bytes.
-    ///
-    /// # Errors
-    /// Returns an error if they cannot be written.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), FolderError> {
         self.file.write_all(bytes).map_err(at(&self.path))
     }
 
     /// Writes what is buffered.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written.
     pub(super) fn flush(&mut self) -> Result<(), FolderError> {
         self.file.flush().map_err(at(&self.path))
     }

@@ -57,9 +57,6 @@ struct SelectedResults {
 
 /// Draws the images of a project's report. An image that cannot be drawn is left out. If the print or depth map of a
 /// result cannot be read, its gallery item states the reason.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read, or a worker task panics.
 pub async fn draw_gallery(
     mut selection: GallerySelection,
     catalog: &Catalog,
@@ -120,8 +117,7 @@ impl GallerySelection {
 
     /// Reads the verdicts on what is shown.
     async fn read_log(&mut self, catalog: &Catalog) -> Result<(), CatalogError> {
-        let groups = self.groups.iter_mut();
-        for (_, subject) in groups.flat_map(|group| &mut group.subjects) {
+        for (_, subject) in self.groups.iter_mut().flat_map(|group| &mut group.subjects) {
             if subject.is_judged() {
                 let name = &subject.pair.attributes.name;
                 subject.log = catalog.verdict_log(Some(name)).await?;

@@ -23,8 +23,7 @@ pub async fn claim_artifacts(
     let known = async || catalog.first_artifacts(SAMPLES).await;
     let known = catalog.retry_while_unavailable(known).await?;
     let project = project.clone();
-    let claimed = run_blocking(move || project.claim_places(&identity, &known, take_over));
-    for message in claimed.await? {
+    for message in run_blocking(move || project.claim_places(&identity, &known, take_over)).await? {
         tracing::warn!("{message}");
     }
     Ok(())

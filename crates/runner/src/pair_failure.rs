@@ -23,9 +23,6 @@ pub(super) struct PairFailure {
 
 impl PairFailure {
     /// Stores the failure under the lease. Returns how the pair ended.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog returns one.
     pub(super) async fn store(
         self,
         context: &RunContext,

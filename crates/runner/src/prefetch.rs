@@ -235,8 +235,7 @@ impl Prefetch {
             pairs.leased.into_iter().map(|(lease, _)| lease)
         });
         let queued = std::mem::take(&mut self.queue);
-        let queued = queued.into_iter().map(|pair| pair.lease);
-        for lease in queued.chain(arriving) {
+        for lease in queued.into_iter().map(|pair| pair.lease).chain(arriving) {
             self.context.catalog.release(lease).await?;
         }
         Ok(())

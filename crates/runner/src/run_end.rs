@@ -39,10 +39,8 @@ pub(super) async fn compute(
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
     let (worker, now) = (scheduler.worker(), context.clock.now());
     let metrics = context.worker_metrics();
-    let ended = catalog.retry_while_unavailable(async || {
-        let ended = catalog.end_worker(worker, now, Some(&metrics));
-        ended.await
-    });
+    let ended = catalog
+        .retry_while_unavailable(async || catalog.end_worker(worker, now, Some(&metrics)).await);
     let ended = ended.await;
     // A lost log explains other errors.
     let ended = match ended {

@@ -46,9 +46,6 @@ impl RunSelection {
     }
 
     /// Adds the pairs that were cut from the blocks since the last call, and removes retired ones.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(super) async fn refresh(&mut self, catalog: &Catalog) -> Result<(), RunError> {
         if !self.blocks.is_empty() {
             let (named, blocks) = (&self.named, &self.blocks);

@@ -134,8 +134,8 @@ impl WorkerSession {
             self.overdue_checked = now;
             let margin = context.timing.deadline_margin.as_millis() as i64;
             let overdue = catalog
-                .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await);
-            let overdue = overdue.await?;
+                .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await)
+                .await?;
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }

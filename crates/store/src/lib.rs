@@ -9,6 +9,8 @@
 //! - `remote/`: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs` keeps copies of inputs, `listing.rs`
 //!   notices changes
 //!
+//! Every call fails if the disk or the object store fails. `# Errors` names other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** a file gets its name when it is whole and on the disk, and nothing that another project may use is
 //! removed. "Cannot be read" is an error, not an absent file.
 

@@ -97,9 +97,6 @@ impl Project {
     }
 
     /// Returns whether the directory is still at its path. If not, nothing may be created at that path.
-    ///
-    /// # Errors
-    /// Returns an error if the disk fails.
     pub(super) fn is_in_place(&self) -> std::io::Result<bool> {
         let Some(identity) = self.identity else {
             return Ok(true);
@@ -112,9 +109,6 @@ impl Project {
     }
 
     /// Creates the project directory durably if it is missing. `Catalog::create` creates the catalog.
-    ///
-    /// # Errors
-    /// Returns an error if the directory cannot be created.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;

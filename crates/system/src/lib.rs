@@ -3,6 +3,8 @@
 //! - [`platform`]: identity of files, syncing, memory of the process, signals, time during which the process runs
 //! - [`failpoint`]: named points of a run
 //!
+//! Every call fails if the operating system refuses it. `# Errors` names other reasons.
+//!
 //! **Invariant:** no other crate names an operating system in production code, apart from `cfg` of Linux.
 
 pub mod failpoint;

@@ -136,11 +136,11 @@ impl BlockStatus {
 mod tests {
     use super::BlockStatus;
     use crate::cli::output::screen::Palette;
-    use mocban_catalog::{BlockAttributes, BlockState, StoredBlockFailure};
+    use mocban_catalog::{BlockAttributes, BlockState, StoredFailure};
     use mocban_core::domain::{BlockStage, Failure, FailureClass, JobStatus};
 
     fn state(name: &str, status: JobStatus) -> BlockState {
-        let failure = StoredBlockFailure {
+        let failure = StoredFailure {
             stage: BlockStage::Align,
             failure: Failure::new(
                 FailureClass::NoSolution,

@@ -88,12 +88,10 @@ impl Orientation {
         }
         let spread = SymmetricEigen::new(covariance);
         let long_side = SIDE_BY_DEVIATION * spread.eigenvalues.max().max(0.0).sqrt();
-        let normals = SymmetricEigen::new(sums.normals);
-        let candidates = normals
+        let n = SymmetricEigen::new(sums.normals)
             .eigenvectors
             .column_iter()
-            .chain(spread.eigenvectors.column_iter());
-        let n = candidates
+            .chain(spread.eigenvectors.column_iter())
             .map(|candidate| {
                 poll();
                 let n = refined(candidate.into_owned(), sample);

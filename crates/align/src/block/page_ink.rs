@@ -40,8 +40,7 @@ impl PageInk {
     /// Returns an error if the image has no ink.
     pub fn of(page: &PrintImage) -> Result<Self, BlockError> {
         let grey = grey(page);
-        let sheet = Sheet::of(&grey);
-        let darkness = sheet.darkness(&grey);
+        let darkness = Sheet::of(&grey).darkness(&grey);
         let (threshold, contrast) = threshold(&darkness)?;
         let ramp = (RAMP * contrast * 255.0).max(1.0);
         let low = threshold * 255.0 - ramp / 2.0;

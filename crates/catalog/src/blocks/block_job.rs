@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::Result;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
-use crate::blocks::records::{BLOCK, control_points, input_versions};
+use crate::blocks::records::{BLOCK, control_points};
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::query;
@@ -82,6 +82,7 @@ impl StoredKind for BlockJob {
         ("and_advance", ""),
         ("and_fail", ""),
         ("and_requeue", ""),
+        ("and_send_back", ""),
         ("and_recover", ""),
         ("and_overdue", ""),
         ("and_count_claimed", ""),
@@ -101,7 +102,10 @@ impl StoredKind for BlockJob {
         _: Option<WorkerId>,
     ) -> Result<Value> {
         let row = query(BLOCK).bind(block.0).fetch_one(conn).await?;
-        let (attributes, inputs) = (BlockAttributes::from_row(&row)?, input_versions(&row)?);
+        let (attributes, inputs) = (
+            BlockAttributes::from_row(&row)?,
+            BlockInputVersions::from_row(&row)?,
+        );
         let points = control_points(&row)?;
         let made_with = MadeWith::new(stage, &Value::Null, &attributes, &inputs, points.as_ref());
         Ok(serde_json::to_value(Self::provenance(&made_with)?)?)

@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::db::row::from_row;
-use mocban_core::domain::InputVersion;
+use crate::Result;
+use crate::db::row::{FromRow, Row, from_row};
+use crate::db::rows::input_version;
 use mocban_core::domain::{
     BlockCharacterState, BlockName, BlockSide, BlockStage, BlockStageRecord, ContentHash,
-    ControlPoints, LengthUnit, PrintFromMesh,
+    ControlPoints, InputVersion, LengthUnit, PrintFromMesh,
 };
 
 /// Attributes of a block as imported.
@@ -45,6 +46,17 @@ pub struct BlockInputVersions {
     pub page: Option<InputVersion>,
     /// The labels.
     pub labels: Option<InputVersion>,
+}
+
+/// Reads the input files of a block as last read.
+impl FromRow for BlockInputVersions {
+    fn from_row(row: &Row) -> Result<Self> {
+        Ok(Self {
+            mesh: input_version(row, "mesh")?,
+            page: input_version(row, "page")?,
+            labels: input_version(row, "labels")?,
+        })
+    }
 }
 
 impl BlockInputVersions {
@@ -168,6 +180,8 @@ pub struct CutOrigin {
     pub maps: Option<CharacterMaps>,
 }
 
+from_row! { CutOrigin { label, bounds: "box" as Json, maps as JsonOrNull } }
+
 /// A character of a block as stored.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StoredCharacter {
@@ -189,3 +203,5 @@ pub struct StoredCharacter {
     /// Id of its pair.
     pub pair: Option<String>,
 }
+
+from_row! { StoredCharacter { label, character, bounds: "box" as Json, confidence, state, reason, maps as JsonOrNull, pair } }

@@ -6,19 +6,19 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::block_job::BlockJob;
-use crate::blocks::import::NEW_JOB;
 use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
 use crate::blocks::queue::uncounted;
-use crate::blocks::records::{control_points, input_versions};
+use crate::blocks::records::control_points;
 use crate::blocks::selection::BlockSelection;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row};
 use crate::db::value::Json;
+use crate::handle::in_transaction;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::counters::{CounterKey, KeyedJob};
 use crate::queue::lease::position;
-use crate::queue::requeue::requeue;
+use crate::queue::requeue::{requeue, send_back};
 use crate::queue::staleness::RerunPolicy;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockId, BlockName, BlockStage, ControlPoints, JobStatus, Stage};
@@ -30,13 +30,6 @@ SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id ORDER BY b.id";
 
 const RESULTS: &str = "SELECT block, stage, made_with FROM block_result ORDER BY block, stage";
-
-/// Sends a block back to a stage and ends its lease.
-const RESET: &str = "
-UPDATE block_job SET stage = min(stage, ?2), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
-    deadline = NULL, token = token + 1 WHERE block = ?1";
-
-const CLEAR_FAILURE: &str = "DELETE FROM block_failure WHERE block = ?1";
 
 /// Why a block runs, or runs again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -110,7 +103,7 @@ impl FromRow for PlannedBlock {
         Ok(Self {
             block: row.get("id")?,
             attributes: BlockAttributes::from_row(row)?,
-            inputs: input_versions(row)?,
+            inputs: BlockInputVersions::from_row(row)?,
             control_points: control_points(row)?,
             cursor: row.get("stage")?,
             status: row.get("status")?,
@@ -209,9 +202,6 @@ impl PlannedBlock {
 impl Catalog {
     /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
     /// its blocks.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn plan_blocks(
         &self,
         settings: &BlockSettings,
@@ -230,9 +220,6 @@ impl Catalog {
 
     /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
     /// considers only its blocks. Returns their number.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn requeue_stale_blocks(
         &self,
         settings: &BlockSettings,
@@ -240,41 +227,24 @@ impl Catalog {
         among: Option<&BlockSelection>,
     ) -> Result<u64> {
         let (settings, among) = (settings.clone(), among.cloned());
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
-                let stale = decided.iter().filter(|(job, from, why)| {
-                    let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
-                    !waits || job.next() != Some(*from)
-                });
-                let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
-                let stale: Vec<_> = stale.collect();
-                requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
-            })
+        in_transaction!(self, |conn| {
+            let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
+            let stale = decided.iter().filter(|(job, from, why)| {
+                let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
+                !waits || job.next() != Some(*from)
+            });
+            let stale = stale.map(|(job, from, _)| (job.keyed(), position::<BlockJob>(*from)));
+            let stale: Vec<_> = stale.collect();
+            requeue::<BlockJob>(conn, &stale, &mut uncounted()).await
         })
-        .await
     }
 
     /// Sends blocks back to a stage, never forward, and ends their leases. Adds missing jobs. For repairs, when files
     /// of their results are missing or damaged.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn reset_blocks(&self, blocks: Vec<(BlockId, BlockStage)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                for (block, stage) in &blocks {
-                    let new = query(NEW_JOB).bind(block.0);
-                    new.execute(&mut *conn).await?;
-                    let reset = query(RESET).bind(block.0).bind(stage.index() as i64);
-                    reset.execute(&mut *conn).await?;
-                    let clear = query(CLEAR_FAILURE).bind(block.0);
-                    clear.execute(&mut *conn).await?;
-                }
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            send_back::<BlockJob>(conn, blocks.into_iter(), &mut uncounted()).await
         })
-        .await
     }
 }
 

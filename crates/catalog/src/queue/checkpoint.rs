@@ -91,8 +91,7 @@ pub(crate) async fn store<K: StoredKind>(
     }
     let mut script = Script::default();
     let statement = add_advance(&mut script, [checkpoint].into_iter())?;
-    let rows = script.run(conn).await?;
-    let advanced = rows.read_if_any(statement.as_ref())?;
+    let advanced = script.run(conn).await?.read_if_any(statement.as_ref())?;
     if !checkpoint.0.is_in(&advanced) {
         return Ok(false);
     }

@@ -120,8 +120,7 @@ pub(crate) async fn store<K: StoredKind>(
 ) -> Result<bool> {
     let mut script = Script::default();
     let statement = add_failures(&mut script, [failed].into_iter())?;
-    let rows = script.run(conn).await?;
-    let rows = rows.read_if_any(statement.as_ref())?;
+    let rows = script.run(conn).await?.read_if_any(statement.as_ref())?;
     let Some(row) = row_of(&failed.0, &rows) else {
         return Ok(false);
     };

@@ -9,6 +9,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
 use crate::db::value::Json;
+use crate::handle::in_transaction;
 use crate::queue::plan::FieldChange;
 use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
@@ -90,43 +91,34 @@ ON CONFLICT DO NOTHING",
 
 impl Catalog {
     /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
     ) -> Result<FingerprintIds> {
         let fingerprints = fingerprints.clone();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut upstream: Option<FingerprintId> = None;
-                let mut ids = [FingerprintId(0); 4];
-                for stage in Stage::ALL {
-                    let fingerprint = fingerprints.of(stage);
-                    let id = query_scalar(INSERT)
-                        .bind(stage.index() as i64)
-                        .bind(&fingerprint.hash.as_bytes()[..])
-                        .bind(fingerprint.fields.to_string())
-                        .bind(upstream)
-                        .fetch_one(&mut *conn)
-                        .await?;
-                    let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
-                    counters.bind(id).execute(&mut *conn).await?;
-                    ids[stage.index()] = id;
-                    upstream = Some(id);
-                }
-                Ok(FingerprintIds(ids))
-            })
+        in_transaction!(self, |conn| {
+            let mut upstream: Option<FingerprintId> = None;
+            let mut ids = [FingerprintId(0); 4];
+            for stage in Stage::ALL {
+                let fingerprint = fingerprints.of(stage);
+                let id = query_scalar(INSERT)
+                    .bind(stage.index() as i64)
+                    .bind(&fingerprint.hash.as_bytes()[..])
+                    .bind(fingerprint.fields.to_string())
+                    .bind(upstream)
+                    .fetch_one(&mut *conn)
+                    .await?;
+                let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
+                counters.bind(id).execute(&mut *conn).await?;
+                ids[stage.index()] = id;
+                upstream = Some(id);
+            }
+            Ok(FingerprintIds(ids))
         })
-        .await
     }
 
     /// Returns the settings in which `fingerprints` differ from those of another process, which is described by its
     /// [`Fingerprints::hash_line`]. Skips a stage if the catalog does not know the other process's hash.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn changes_from(
         &self,
         hash_line: &str,
@@ -156,8 +148,8 @@ pub(crate) async fn known(
 ) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
-        let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
+        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
+            .bind(&fingerprints.of(stage).hash.as_bytes()[..]);
         *id = query.fetch_optional(&mut *conn).await?;
     }
     Ok(ids)

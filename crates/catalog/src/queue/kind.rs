@@ -103,6 +103,8 @@ impl Template {
         *self.filled[K::NUMBER].get_or_init(|| {
             let named = with_names::<K>(self.text);
             let sqlite = with_fields(&named, |field| format!("item.value ->> {field}"));
+            // SQLite locks the whole database.
+            let sqlite = sqlite.replace(" FOR UPDATE", "");
             let postgres = with_fields(&named, |field| {
                 format!("CAST(item.value ->> {field} AS bigint)")
             });

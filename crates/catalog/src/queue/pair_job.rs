@@ -133,6 +133,13 @@ impl StoredKind for PairJob {
             "and_requeue",
             concat!(", prio = 0, exclusive = 0", go_back_to!("([1])")),
         ),
+        (
+            "and_send_back",
+            concat!(
+                ", prio = 0, exclusive = 0",
+                go_back_to!("min(job.stage, [1])")
+            ),
+        ),
         ("and_recover", ", exclusive = max(exclusive, [1])"),
         ("and_overdue", ", exclusive = 1"),
         ("and_count_claimed", COUNT_CLAIMED),

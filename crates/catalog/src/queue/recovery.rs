@@ -10,6 +10,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
+use crate::handle::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};
@@ -146,9 +147,6 @@ pub(crate) struct RecoveredJobs<K: JobKind> {
 
 impl Catalog {
     /// Returns the workers that hold leases.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
         let mut holders: Vec<LeaseHolder> = query_as(HOLDERS).fetch_all(&mut conn).await?;
@@ -164,24 +162,18 @@ impl Catalog {
 
     /// Stores the current versions of input files that no stage of a quarantined pair has read. A later run compares
     /// the stored hashes to detect replaced files.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut script = Script::default();
-                let items = || {
-                    seen.iter()
-                        .map(|(pair, inputs)| input_item((*pair, inputs)))
-                };
-                script.execute_over(UPDATE_INPUTS, items())?;
-                script.execute_over(FATAL_INPUTS, items())?;
-                script.run(conn).await?;
-                Ok(())
-            })
+        in_transaction!(self, |conn| {
+            let mut script = Script::default();
+            let items = || {
+                seen.iter()
+                    .map(|(pair, inputs)| input_item((*pair, inputs)))
+            };
+            script.execute_over(UPDATE_INPUTS, items())?;
+            script.execute_over(FATAL_INPUTS, items())?;
+            script.run(conn).await?;
+            Ok(())
         })
-        .await
     }
 }
 
@@ -218,8 +210,7 @@ pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
 
 /// Builds the items of [`RECOVER`] for some workers.
 pub(crate) async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
-    let query = query_as(LEFT_BY).bind(workers);
-    let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
+    let found: Vec<(i64, bool, i64)> = query_as(LEFT_BY).bind(workers).fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
         json!([worker, i64::from(died), i64::from(blamed)])

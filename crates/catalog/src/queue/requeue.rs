@@ -38,7 +38,24 @@ FROM json_each(?1) AS item WHERE {job}.{unit} = [0] AND {job}.status <> 1
 RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
-/// Locks jobs in PostgreSQL, always in the order of ids.
+/// Adds the jobs that are missing.
+static NEW_JOBS: Template = Template::new(
+    "
+INSERT INTO {job} ({unit}, stage, status)
+SELECT [0], 0, 0 FROM json_each(?1) AS item WHERE NOT EXISTS (SELECT 1 FROM {job} WHERE {unit} = [0])",
+);
+
+/// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
+/// lease fail.
+pub(crate) static SEND_BACK: Template = Template::new(
+    "
+UPDATE {job} SET stage = min({job}.stage, [1]), status = 0, run_at = NULL, attempt = 0, crashes = 0, worker = NULL,
+    deadline = NULL, token = token + 1{and_send_back}
+FROM json_each(?1) AS item WHERE {job}.{unit} = [0]
+RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
+);
+
+/// Selects jobs, and locks them in PostgreSQL, always in the order of ids.
 static LOCK_JOBS: Template = Template::new(
     "
 SELECT {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint FROM {job}
@@ -50,7 +67,7 @@ pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS NOT DISTINCT FROM ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
 
-pub(crate) static CLEAR_FAILURES: Template =
+static CLEAR_FAILURES: Template =
     Template::new("DELETE FROM {failure} WHERE {unit} IN (SELECT [0] FROM json_each(?1) AS item)");
 
 /// Selects the jobs that failed or back off, of one failure class or of all.
@@ -289,4 +306,28 @@ pub(crate) async fn requeue<K: StoredKind>(
         }
     }
     Ok(moved.len() as u64)
+}
+
+/// Sends jobs back to a stage, never forward, and ends their leases. Adds missing jobs and removes the failures.
+pub(crate) async fn send_back<K: StoredKind>(
+    conn: &mut Conn,
+    jobs: impl Iterator<Item = (K::Unit, K::Stage)> + Clone,
+    deltas: &mut Deltas,
+) -> Result<()> {
+    let units = json_array(jobs.clone().map(|(unit, _)| K::id(unit)));
+    let items = json_array(jobs.map(|(unit, to)| json!([K::id(unit), K::index(to)])));
+    let before = query_as(LOCK_JOBS.of::<K>()).bind(units);
+    let before: Vec<KeyedJob> = before.fetch_all(&mut *conn).await?;
+    query(NEW_JOBS.of::<K>()).bind(&items).execute(conn).await?;
+    let after = query_as(SEND_BACK.of::<K>()).bind(&items);
+    let after: Vec<KeyedJob> = after.fetch_all(&mut *conn).await?;
+    let clear = query(CLEAR_FAILURES.of::<K>()).bind(&items);
+    clear.execute(conn).await?;
+    for job in before {
+        deltas.add(job.key, -1);
+    }
+    for job in after {
+        deltas.add(job.key, 1);
+    }
+    Ok(())
 }

@@ -14,9 +14,6 @@ use mocban_core::domain::{PairName, Stage};
 
 impl Catalog {
     /// Plans a run with these settings for the selected pairs, or for all.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
@@ -28,9 +25,6 @@ impl Catalog {
     }
 
     /// Counts the pairs that have a result with outdated settings or inputs.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn count_stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;

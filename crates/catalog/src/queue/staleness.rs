@@ -182,8 +182,7 @@ pub(crate) async fn groups(
     conn: &mut Conn,
     chains: &FingerprintChains,
 ) -> Result<Vec<(StaleJob, u64)>> {
-    let counted = counters(conn).await?;
-    let groups = counted.into_iter().map(|(key, jobs)| {
+    let groups = counters(conn).await?.into_iter().map(|(key, jobs)| {
         let job = StaleJob {
             key,
             change: changed_settings(key, chains),

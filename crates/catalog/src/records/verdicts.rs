@@ -8,6 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{As, Query, query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
+use crate::handle::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::review_context::ReviewContext;
@@ -155,42 +156,33 @@ impl Catalog {
         now: UnixMillis,
     ) -> Result<Vec<VerdictEvent>> {
         let reviewer = reviewer.map(str::to_owned);
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let act: Option<i64> = query_scalar(
-                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
+        in_transaction!(self, |conn| {
+            let act: Option<i64> = query_scalar(
+                "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
-                )
-                .bind(&reviewer)
-                .fetch_one(&mut *conn)
-                .await?;
-                let Some(act) = act else {
-                    return Err(CatalogError::NothingToUndo(reviewer));
-                };
-                query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
-                checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
-                let nothing = LeftOut::default();
-                select_log((Some(act), None), (None, None), &nothing)
-                    .fetch_all(conn)
-                    .await
-            })
+            )
+            .bind(&reviewer)
+            .fetch_one(&mut *conn)
+            .await?;
+            let Some(act) = act else {
+                return Err(CatalogError::NothingToUndo(reviewer));
+            };
+            query(UNDO).bind(act).bind(now).execute(&mut *conn).await?;
+            checksums::store(conn, ChecksummedTable::VerdictUndo, &[act]).await?;
+            let nothing = LeftOut::default();
+            select_log((Some(act), None), (None, None), &nothing)
+                .fetch_all(conn)
+                .await
         })
-        .await
     }
 
     /// Returns the verdict log of one pair, or of all pairs, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair, &self.left_out).await
     }
 
     /// Returns up to `limit` lines of the verdict log with ids above `after`, oldest first.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn verdict_log_page(&self, after: i64, limit: usize) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         let (after, limit) = (Some(after), Some(limit as i64));

@@ -52,6 +52,12 @@ enum_names! { pub ThresholdMetric, "a metric":
     NlSsim = "nl_ssim", Density = "density", Ensemble = "ensemble", Relief = "relief",
 }
 
+impl Default for ThresholdMetric {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 impl ThresholdMetric {
     /// The metric of everything that shows one result per pair: files, contact sheets, the headline of a report, and the
     /// pairs of low confidence in `status`. Both methods compute it.

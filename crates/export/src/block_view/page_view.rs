@@ -120,8 +120,7 @@ async fn pairs_of(
     let mut by_name: BTreeMap<PairName, PairResults> = found
         .map(|pair| (pair.attributes.name.clone(), pair))
         .collect();
-    let pairs = names.map(|name| by_name.remove(&name?));
-    Ok(pairs.collect())
+    Ok(names.map(|name| by_name.remove(&name?)).collect())
 }
 
 /// Reads the page and the heights of a block.

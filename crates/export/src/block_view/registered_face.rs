@@ -35,9 +35,6 @@ pub(crate) struct RegisteredFace {
 impl RegisteredFace {
     /// Collects the current outcomes of a block. Returns `None` if its page is not aligned: it has not run, was refused, or
     /// runs again.
-    ///
-    /// # Errors
-    /// Returns an error if a stored outcome has another form.
     pub(crate) fn of(detail: &BlockDetail) -> Result<Option<Self>, BlockViewError> {
         let next = detail.state.next_stage;
         let is_current = |stage| next.is_none_or(|next| stage < next);
@@ -80,8 +77,7 @@ impl RegisteredFace {
     /// # Errors
     /// Returns an error if the stored map has no grid.
     pub(crate) fn map(&self) -> Result<PageMap, BlockViewError> {
-        let map = PageMap::try_from(self.map.clone());
-        map.map_err(|why| unusable(self.map_stage, &why))
+        PageMap::try_from(self.map.clone()).map_err(|why| unusable(self.map_stage, &why))
     }
 
     /// Returns the number of columns of the nodes of the map, and the pixels of the page of the nodes, row by row.
@@ -123,6 +119,5 @@ pub(super) fn unusable(stage: BlockStage, why: &str) -> BlockViewError {
 }
 
 pub(super) fn outcome<T: DeserializeOwned>(stage: &BlockStageDetail) -> Result<T, BlockViewError> {
-    let read = T::deserialize(&stage.outcome);
-    read.map_err(|error| unusable(stage.stage, &error.to_string()))
+    T::deserialize(&stage.outcome).map_err(|error| unusable(stage.stage, &error.to_string()))
 }

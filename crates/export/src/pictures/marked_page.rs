@@ -112,10 +112,9 @@ fn name(picture: &mut Rgb, one: &MarkedBox, others: &[[f64; 4]]) {
 /// Returns the first name that fits into a width in pixels at any size, and the size; the last one is shortened. Returns
 /// `None` if there are no names.
 fn fitting_name(names: &[String], space: usize) -> Option<(String, f32)> {
-    let sizes = names
+    let fitting = names
         .iter()
-        .flat_map(|text| NAME_FONTS.map(|size| (text, size)));
-    let fitting = sizes
+        .flat_map(|text| NAME_FONTS.map(|size| (text, size)))
         .into_iter()
         .find(|(text, size)| text_width(text, *size) <= space);
     if let Some((text, size)) = fitting {

@@ -72,9 +72,6 @@ impl FaultPlanter {
     }
 
     /// Plants the wanted number of faults, or fewer if not enough candidates can be read.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read, or planting a fault panics.
     pub(super) async fn plant(
         &self,
         candidates: FaultCandidates<'_>,

@@ -29,9 +29,6 @@ pub(super) struct ReviewQueue {
 
 impl ReviewQueue {
     /// Reads the queue of a reviewer from the current state of the catalog.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read, or planting a fault panics.
     pub(super) async fn read(
         catalog: &Catalog,
         planter: &FaultPlanter,

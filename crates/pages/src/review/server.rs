@@ -86,8 +86,7 @@ pub async fn bind(
         served_items: std::sync::Mutex::default(),
     };
     // Loads the items now: after a restart, a page may resend an answer before it requests the queue.
-    let queue = state.load_queue().await;
-    let queue = queue.map_err(|error| match error {
+    let queue = state.load_queue().await.map_err(|error| match error {
         QueueError::Catalog(error) => ReviewError::Catalog(error),
         QueueError::Stopped(error) => ReviewError::Fault(error),
     })?;

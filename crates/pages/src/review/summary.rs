@@ -48,9 +48,6 @@ impl VerdictCounts {
 impl ReviewSummary {
     /// Reads the summary of a queue. Returns `None` while an item has no answer, because the counts would reveal which
     /// items are attention checks.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog cannot be read.
     pub(super) async fn read(
         state: &ServerState,
         queue: &ReviewQueue,

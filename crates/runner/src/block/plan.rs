@@ -11,9 +11,6 @@ use mocban_store::Project;
 
 /// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `among`, and ends
 /// back-offs that are due.
-///
-/// # Errors
-/// Returns an error if a database operation fails.
 pub(crate) async fn requeue(
     project: &Project,
     catalog: &Catalog,

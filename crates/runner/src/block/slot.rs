@@ -137,9 +137,6 @@ impl BlockSlot {
     }
 
     /// Counts a block that ended.
-    ///
-    /// # Errors
-    /// Returns the error that ends the run.
     pub(crate) fn count(&mut self, ended: BlockReport) -> Result<(), RunError> {
         self.may_find_one = true;
         match ended? {

@@ -188,8 +188,8 @@ async fn compute(
         sources.check_unchanged(&read)?;
         failpoint::hit(stage, Point::Computed, Some(&inputs.name));
         Ok((output, artifacts.finish()?))
-    });
-    let outcome = outcome.await?;
+    })
+    .await?;
     let ms = begun.elapsed().as_millis() as u64;
     match outcome {
         Ok((output, files)) => Ok(ComputedBlockStage { output, files, ms }),

@@ -78,9 +78,6 @@ pub enum CheckError {
 /// Checks a project and, with `repair`, repairs it.
 ///
 /// A damaged database is not written to, with one exception: if only indexes are damaged, a repair rebuilds them.
-///
-/// # Errors
-/// Returns an error if the catalog or the place of the artifacts cannot be read or written, or a worker thread panics.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,

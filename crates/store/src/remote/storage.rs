@@ -274,9 +274,6 @@ impl ProjectStorage {
     }
 
     /// Returns a pack, from memory if it was read lately.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn pack(&self, bucket: &Bucket, name: &str) -> Result<Arc<Vec<u8>>, BucketError> {
         self.packs
             .get_or_insert(name, || read_pack(bucket, name).map(Arc::new))
@@ -290,9 +287,6 @@ impl ProjectStorage {
     }
 
     /// Returns the length of a pack in bytes.
-    ///
-    /// # Errors
-    /// Returns an error if the request fails.
     pub(crate) fn pack_bytes(&self, bucket: &Bucket, name: &str) -> Result<u64, BucketError> {
         self.lengths
             .get_or_insert(name, || Ok(bucket.stat(&key(name))?.bytes))

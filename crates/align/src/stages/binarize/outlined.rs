@@ -22,10 +22,8 @@ pub(crate) fn hypotheses_within(
         turned: picture.turned,
     };
     let whole = |ink: InkMask| {
-        let from_part = |x: usize, y: usize| {
-            let is_inside = inside.at(x, y);
-            is_inside.then(|| [x - bounds.x0, y - bounds.y0])
-        };
+        let from_part =
+            |x: usize, y: usize| inside.at(x, y).then(|| [x - bounds.x0, y - bounds.y0]);
         let mask = |of: &Mask| {
             Mask::from_fn(size[0], size[1], |x, y| {
                 from_part(x, y).is_some_and(|[x, y]| of.at(x, y))

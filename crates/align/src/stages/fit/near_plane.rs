@@ -31,10 +31,9 @@ pub(super) fn near_plane(
     normal: Vector3<f64>,
 ) -> Option<(Mesh, Rigid3)> {
     let level = frame(normal, Vector3::zeros());
-    let parallel = facets
+    let mut places: Vec<([f64; 3], f64)> = facets
         .iter()
-        .filter(|facet| angle(&facet.normal, &normal) < SAME);
-    let mut places: Vec<([f64; 3], f64)> = parallel
+        .filter(|facet| angle(&facet.normal, &normal) < SAME)
         .map(|facet| (level.apply(facet.middle.into()), facet.area))
         .collect();
     let middle = quantile(&mut places, 2, MIDDLE)?;

@@ -68,8 +68,8 @@ pub fn fit(
     if let (Some(print), Some(inks)) = (print, &inks)
         && agreement < LEAST
     {
-        let parts = part_search::search(indexed, &start, print, params);
-        let parts = parts.filter(|found| found.agreement > agreement * BETTER);
+        let parts = part_search::search(indexed, &start, print, params)
+            .filter(|found| found.agreement > agreement * BETTER);
         let wider = wider_search::search(mesh, indexed, inks, agreement, params);
         let found = [parts, wider].into_iter().flatten();
         if let Some(found) = found.max_by(|a, b| a.agreement.total_cmp(&b.agreement)) {

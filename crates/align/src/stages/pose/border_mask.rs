@@ -105,10 +105,9 @@ impl StrokeMasks {
 
     /// Returns 1 for strokes that are not connected to the border, 0 elsewhere.
     fn interior(&self) -> Grid<f32> {
-        let inner = self
-            .all
-            .zip_map(&self.border, |stroke, border| stroke && !border);
-        inner.to_weights()
+        self.all
+            .zip_map(&self.border, |stroke, border| stroke && !border)
+            .to_weights()
     }
 
     /// Removes the border pixels that lie on `others`, the inner strokes of the other level.

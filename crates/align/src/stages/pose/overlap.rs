@@ -27,8 +27,7 @@ impl PlacedLevel<'_> {
         fixed_valid: &Grid<f32>,
     ) -> impl Iterator<Item = (usize, usize, BilinearCell)> {
         let rows = 0..fixed_valid.height();
-        let pixels = rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)));
-        pixels
+        rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)))
             .filter(|(x, y)| fixed_valid.at(*x, *y) != 0.0)
             .filter_map(|(x, y)| Some((x, y, self.cell(x, y)?)))
     }

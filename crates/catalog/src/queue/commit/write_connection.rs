@@ -170,9 +170,6 @@ impl WriteConnection {
     }
 
     /// Keeps the lock of a worker, over a new connection if the server was unavailable.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub(crate) async fn keep_worker_lock(&mut self, worker: WorkerId) -> Result<()> {
         self.reconnect_if_broken().await?;
         let mut repeats = 0;

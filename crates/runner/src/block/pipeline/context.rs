@@ -34,8 +34,7 @@ impl StageContext<'_> {
         stage: BlockStage,
     ) -> Result<T, BlockStageError> {
         let record = self.record(stage)?;
-        let outcome = serde_json::from_str(&record.outcome);
-        outcome.map_err(|error| {
+        serde_json::from_str(&record.outcome).map_err(|error| {
             tracing::warn!(block = %self.inputs.name, %stage, "the outcome cannot be read: {error}; the stage runs again");
             BlockStageError::RerunFrom(stage)
         })
