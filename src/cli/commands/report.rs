@@ -17,9 +17,9 @@ use mocban_project::files;
 use mocban_project::location::now;
 use mocban_project::time_text::day;
 use mocban_report::{
-    Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
-    summary,
+    Cover, Report, ReportFormat, build, build_with, page, quality_gate, render, summary,
 };
+use mocban_results::IntervalMethod;
 use mocban_store::Project;
 
 /// Seed of the random choice of images; the HTML page states it.

@@ -20,7 +20,7 @@ use mocban_core::domain::{
 use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::shell::shell_quoted;
 use mocban_project::time_text::local;
-use mocban_report::ManualCorrection;
+use mocban_results::ManualCorrection;
 use mocban_runner::{self as runner, NamedWork};
 use mocban_store::Project;
 

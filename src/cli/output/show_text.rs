@@ -10,7 +10,7 @@ use mocban_core::domain::{
     ThresholdMetric, Verdict, one_line,
 };
 use mocban_project::time_text::{duration, local};
-use mocban_report::ManualCorrection;
+use mocban_results::ManualCorrection;
 use mocban_store::Project;
 
 /// One pair, its project and the colours.
