@@ -9,10 +9,10 @@ use super::source_print::result_images;
 use mocban_catalog::{Catalog, CatalogError, PairResults, SetApart};
 use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use mocban_core::raster::ImageLimits;
-use mocban_report::ground_truth::TruthErrors;
-use mocban_report::number_format::NumberStyle::{Degrees, Percent, Score};
-use mocban_report::number_format::{counted, format_count, format_number};
-use mocban_report::{Consensus, evaluate_pairs};
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Percent, Score};
+use mocban_results::number_format::{counted, format_count, format_number};
+use mocban_results::{Consensus, evaluate_pairs};
 use mocban_store::Project;
 
 /// Pairs in memory at a time while the worst are selected.
@@ -281,8 +281,8 @@ mod tests {
     use crate::pictures::FrameKind;
     use mocban_core::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use mocban_core::raster::ImageLimits;
-    use mocban_report::Consensus;
-    use mocban_report::test_fixtures;
+    use mocban_results::Consensus;
+    use mocban_results::test_fixtures;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
         ContactSheetOptions {

@@ -7,12 +7,12 @@ use super::source_print::result_images;
 use mocban_catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use mocban_core::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use mocban_core::raster::{ImageLimits, jpeg_rgb8};
-use mocban_report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
-use mocban_report::ground_truth::TruthErrors;
-use mocban_report::number_format::NumberStyle::{Degrees, Percent, Score};
-use mocban_report::number_format::format_number;
-use mocban_report::pair_artifacts::group_identical;
-use mocban_report::{Consensus, TruthEvaluation};
+use mocban_results::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
+use mocban_results::ground_truth::TruthErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Percent, Score};
+use mocban_results::number_format::format_number;
+use mocban_results::pair_artifacts::group_identical;
+use mocban_results::{Consensus, TruthEvaluation};
 use mocban_store::Project;
 
 /// Longest side of an image, pixels.
@@ -256,7 +256,8 @@ fn file_name(stored: &str) -> String {
 mod tests {
     use super::{GallerySelection, MAX_PER_REASON, SAMPLE_SIZE};
     use mocban_core::domain::Verdict::{Fail, Pass};
-    use mocban_report::{TruthEvaluation, test_fixtures};
+    use mocban_results::TruthEvaluation;
+    use mocban_results::test_fixtures;
 
     fn selection(seed: u64, pairs: usize) -> GallerySelection {
         let mut selection = GallerySelection::new(seed);

@@ -8,7 +8,7 @@ use super::pair_pictures::InputFileLimits;
 use super::split::SplitSettings;
 use mocban_catalog::MetricRecord;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric, Verdict, enum_names};
-use mocban_report::Consensus;
+use mocban_results::Consensus;
 
 /// Default size of shards in MiB.
 const SHARD_MIB: u64 = 256;

@@ -11,7 +11,7 @@ use mocban_core::domain::{
     DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_core::raster::{compact_rgb8, png_grey16, png_mask};
-use mocban_report::pair_artifacts::same_alignment;
+use mocban_results::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
 const PAIR: &str = "pairs/*";

@@ -14,7 +14,7 @@ use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb,
 };
-use mocban_report::pair_artifacts::{PairArtifacts, PairArtifactsError};
+use mocban_results::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use mocban_store::{InputError, Project, open_input};
 
 /// Why the pictures or the mesh of a pair cannot be used. The other pairs are exported.

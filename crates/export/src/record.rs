@@ -10,7 +10,7 @@ use mocban_core::domain::{
     Affine2, ContentHash, Failure, FailureClass, HeightFromMesh, JobStatus, LengthUnit, PairName,
     PrintFromMesh, Reason, ReviewOrder, Rigid3, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
-use mocban_report::Consensus;
+use mocban_results::Consensus;
 
 /// State of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]

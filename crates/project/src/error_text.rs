@@ -4,13 +4,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use super::exit::{ExitCode, Refusal};
-use super::time_text::local;
 use mocban_catalog::{CatalogError, CatalogErrorKind, LockOwner, LogLoss, lock_owner};
 use mocban_config::ConfigError;
 use mocban_export::FolderError;
 use mocban_runner::RunError;
 use mocban_store::{CATALOG_FILE, StorageError, StoreError, TargetLockError};
 use mocban_system::platform;
+use mocban_system::time_text::local;
 
 /// Returns the exit code of an error.
 pub fn exit_code(error: &anyhow::Error) -> ExitCode {

@@ -23,6 +23,5 @@ pub mod missing_files;
 pub mod new_project;
 pub mod restore;
 pub mod shell;
-pub mod time_text;
 pub mod truth_file;
 pub mod verdict_file;

@@ -10,12 +10,12 @@ use csv::StringRecord;
 use serde::Deserialize;
 
 use super::files::RefusedLine;
-use super::time_text::parse_utc;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis};
 use mocban_lists::manifest::{LineCounter, as_utf8, delimiter};
 use mocban_lists::quotes::check_quotes;
+use mocban_system::time_text::parse_utc;
 
 const COLUMNS: [&str; 7] = [
     "pair", "verdict", "reviewer", "metric", "reason", "note", "at",

@@ -1,11 +1,13 @@
 //! The sentences of the headline on Acc: the value, what does not count, and what speaks against it.
 
-use super::attention_checks::AttentionCheckRates;
 use super::model::{MetricRow, Report};
-use super::number_format::{NumberStyle, counted};
-use super::number_format::{format_count, format_interval, format_rate, format_share, joined};
-use super::stats::Rate;
 use mocban_core::domain::{ThresholdMetric, sanitize};
+use mocban_results::attention_checks::AttentionCheckRates;
+use mocban_results::number_format::{NumberStyle, counted};
+use mocban_results::number_format::{
+    format_count, format_interval, format_rate, format_share, joined,
+};
+use mocban_results::stats::Rate;
 
 /// Returns the sentences on Acc of the default metric, or of the first metric with an Acc, and on ground truth.
 pub(super) fn accuracy(report: &Report) -> String {

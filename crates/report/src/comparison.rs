@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::number_format::format_count;
-use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 use mocban_core::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 use mocban_core::domain::enum_names;
+use mocban_results::number_format::format_count;
+use mocban_results::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 
 /// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: u64 = 100_000;

@@ -5,9 +5,9 @@
 use super::accuracy_sentence::accuracy;
 use super::comparison::{Basis, Comparison, MIN_PAIRS, TOO_FEW_TO_ESTIMATE, about};
 use super::model::{MetricRow, Report};
-use super::number_format::{format_count, format_p, joined};
-use super::stats::SIGNIFICANCE_LEVEL;
 use mocban_core::domain::{MetricOutcome, ThresholdMetric};
+use mocban_results::number_format::{format_count, format_p, joined};
+use mocban_results::stats::SIGNIFICANCE_LEVEL;
 
 /// Returns the paragraphs, in order. There are fewer than three if there are no results.
 pub(super) fn headline(report: &Report) -> Vec<String> {
@@ -199,14 +199,12 @@ fn without_basis(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::headline;
-    use crate::{
-        AttentionCheckRates, IntervalMethod, Rate, Report, ReportAccumulator, TruthEvaluation,
-        test_fixtures,
-    };
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_catalog::PairResults;
     use mocban_core::domain::ThresholdMetric::{Density, Ensemble};
     use mocban_core::domain::Verdict::{Fail, Pass};
     use mocban_core::domain::{FailureClass, ThresholdMetric, Verdict};
+    use mocban_results::{AttentionCheckRates, IntervalMethod, Rate, TruthEvaluation};
 
     /// Returns a report on `n` pairs whose verdicts `verdict` chooses, by pair and metric.
     fn judged(n: u32, verdict: impl Fn(u32, ThresholdMetric) -> Verdict) -> Report {

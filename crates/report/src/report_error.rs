@@ -1,7 +1,7 @@
 //! Why no report can be made.
 
-use super::pair_artifacts::PairArtifactsError;
 use mocban_catalog::CatalogError;
+use mocban_results::pair_artifacts::PairArtifactsError;
 
 /// Why no report can be made.
 #[derive(Debug, thiserror::Error)]

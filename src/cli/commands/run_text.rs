@@ -7,8 +7,8 @@ use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{BlockPlanEntry, Plan};
 use mocban_core::domain::JobStatus;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::duration;
 use mocban_runner::{BlockSummary, RunSummary};
+use mocban_system::time_text::duration;
 
 /// Prints how a run ended and which pairs failed.
 pub(crate) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {

@@ -19,10 +19,10 @@ use mocban_core::domain::{
 };
 use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::local;
-use mocban_report::ManualCorrection;
+use mocban_results::ManualCorrection;
 use mocban_runner::{self as runner, NamedWork};
 use mocban_store::Project;
+use mocban_system::time_text::local;
 
 /// Arguments of `show`.
 #[derive(Debug, Args)]

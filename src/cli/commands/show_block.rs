@@ -12,8 +12,8 @@ use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
 use mocban_project::exit::ExitCode;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::{duration, local};
 use mocban_store::Project;
+use mocban_system::time_text::{duration, local};
 
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;

@@ -9,7 +9,7 @@ use crate::cli::output::table::{columns, count};
 use crate::cli::output::worker_totals::{WorkerTotals, is_present};
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_core::domain::UnixMillis;
-use mocban_project::time_text::rough_duration;
+use mocban_system::time_text::rough_duration;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
 const SHOWN_MS: i64 = 24 * 3_600_000;

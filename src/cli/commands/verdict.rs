@@ -20,8 +20,8 @@ use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files::{self, RefusedLine};
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
-use mocban_project::time_text::{duration, local};
 use mocban_project::verdict_file::{self, VerdictList};
+use mocban_system::time_text::{duration, local};
 
 /// Commands on verdicts.
 #[derive(Debug, Subcommand)]

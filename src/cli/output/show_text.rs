@@ -9,9 +9,9 @@ use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,
 };
-use mocban_project::time_text::{duration, local};
-use mocban_report::ManualCorrection;
+use mocban_results::ManualCorrection;
 use mocban_store::Project;
+use mocban_system::time_text::{duration, local};
 
 /// One pair, its project and the colours.
 pub(crate) struct PairPage<'a> {

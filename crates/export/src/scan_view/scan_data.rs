@@ -11,7 +11,7 @@ use crate::pair_pictures::{InputFileLimits, PairPictures, PictureError};
 use crate::stage_outcomes::StageOutcomes;
 use mocban_catalog::PairResults;
 use mocban_core::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome, ThresholdMetric};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// Share of the heights below and above the range of the threshold slider.

@@ -22,7 +22,7 @@ use mocban_core::raster::{self, MaskOverlap, png_grey8, png_mask, png_rgb8};
 use mocban_export::pictures::PrintView;
 use mocban_export::scan_view::ScanView;
 use mocban_export::{InputFileLimits, SourcePrint};
-use mocban_report::pair_artifacts::PairArtifacts;
+use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
 /// Longer side of an image in pixels.

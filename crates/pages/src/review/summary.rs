@@ -6,7 +6,7 @@ use super::review_queue::ReviewQueue;
 use super::state::ServerState;
 use mocban_catalog::CatalogError;
 use mocban_core::domain::Verdict;
-use mocban_report::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
+use mocban_results::{ReviewerPair, ReviewerRecord, agreement, is_inattentive};
 
 /// The summary of a review.
 #[derive(Debug, Serialize)]

@@ -3,12 +3,12 @@
 use super::block_table::blocks;
 use super::comparison_tables::mean_intervals;
 use super::table::Table;
-use crate::manual_alignment::ManualAlignmentErrors;
 use crate::model::{MetricRow, Report};
-use crate::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
-use crate::stats::Rate;
 use crate::truth_summary::TruthSummary;
 use mocban_core::domain::Reason;
+use mocban_results::manual_alignment::ManualAlignmentErrors;
+use mocban_results::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds, Share};
+use mocban_results::stats::Rate;
 
 /// Returns the tables of a report. A table without content is left out, except the table of scores.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
@@ -216,8 +216,9 @@ pub(super) fn times(report: &Report) -> Option<Table> {
 mod tests {
     use super::{attention_checks, fail_reasons, thresholds, times};
     use crate::render::table::Table;
-    use crate::{AttentionCheckRates, Rate, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{ReportAccumulator, test_fixtures};
     use mocban_core::domain::{Reason, Stage, Verdict};
+    use mocban_results::{AttentionCheckRates, Rate, TruthEvaluation};
 
     fn cells(table: &Table, row: usize) -> Vec<&str> {
         table.rows[row]

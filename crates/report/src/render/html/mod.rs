@@ -9,9 +9,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::album::Album;
 use self::markup::sentence;
-use crate::gallery::Gallery;
 use crate::model::Report;
 use mocban_core::domain::visible;
+use mocban_results::gallery::Gallery;
 
 /// Maximum size of a page in bytes.
 pub const MAX_PAGE_BYTES: usize = 10_000_000;
@@ -83,9 +83,10 @@ fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::{Cover, MAX_PAGE_BYTES, page};
-    use crate::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
-    use crate::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::{Report, ReportAccumulator, test_fixtures};
     use mocban_core::domain::{PairName, ThresholdMetric, Verdict};
+    use mocban_results::TruthEvaluation;
+    use mocban_results::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
 
     fn report() -> Report {
         let mut report = ReportAccumulator::default();

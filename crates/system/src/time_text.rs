@@ -1,33 +1,31 @@
-//! Times and durations as text.
+//! Times and durations as text. A time is in milliseconds since the Unix epoch.
 
 use jiff::Timestamp;
 use jiff::civil::DateTime;
 use jiff::tz::TimeZone;
 
-use mocban_core::domain::UnixMillis;
-
 /// Formats a time in the time zone of the computer, with its offset from UTC: `2026-11-21 11:10:03 +07:00`.
-pub fn local(at: UnixMillis) -> String {
+pub fn local(at: i64) -> String {
     in_zone(at, TimeZone::system())
 }
 
-fn in_zone(at: UnixMillis, zone: TimeZone) -> String {
+fn in_zone(at: i64, zone: TimeZone) -> String {
     let time = timestamp(at).to_zoned(zone);
     time.strftime("%Y-%m-%d %H:%M:%S %:z").to_string()
 }
 
 /// Formats a day in UTC: `2026-11-21`.
-pub fn day(at: UnixMillis) -> String {
+pub fn day(at: i64) -> String {
     TimeZone::UTC.to_datetime(timestamp(at)).date().to_string()
 }
 
 /// Returns a time; the Unix epoch for times outside the years -9999 to 9999.
-fn timestamp(at: UnixMillis) -> Timestamp {
+fn timestamp(at: i64) -> Timestamp {
     Timestamp::from_millisecond(at).unwrap_or(Timestamp::UNIX_EPOCH)
 }
 
 /// Parses a time: `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`. A time without an offset is in UTC.
-pub fn parse_utc(text: &str) -> Option<UnixMillis> {
+pub fn parse_utc(text: &str) -> Option<i64> {
     let time = text.parse::<Timestamp>().or_else(|_| {
         let local: DateTime = text.parse()?;
         TimeZone::UTC.to_timestamp(local)

@@ -45,7 +45,7 @@ enum_names! { pub IntervalMethod, "an interval": Wilson = "wilson", Exact = "exa
 /// without continuity correction. Source: Wilson 1927, doi:10.1080/01621459.1927.10502953.
 ///
 /// ```
-/// use mocban_report::stats::wilson_95;
+/// use mocban_results::stats::wilson_95;
 ///
 /// // statsmodels: proportion_confint(584, 587, method="wilson") is 0.98508, 0.99826.
 /// let [low, high] = wilson_95(584, 587).unwrap();
@@ -71,7 +71,7 @@ pub fn wilson_95(count: u64, n: u64) -> Option<[f64; 2]> {
 /// successes have that probability. Source: Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404.
 ///
 /// ```
-/// use mocban_report::stats::clopper_pearson_95;
+/// use mocban_results::stats::clopper_pearson_95;
 ///
 /// // All of n succeed: the lower bound solves p^n = 0.025.
 /// let [low, high] = clopper_pearson_95(10, 10).unwrap();

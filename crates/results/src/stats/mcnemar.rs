@@ -45,7 +45,7 @@ impl McNemarTest {
 /// 1/2. Source: McNemar 1947, doi:10.1007/BF02295996, in its exact (binomial) form.
 ///
 /// ```
-/// use mocban_report::stats::mcnemar_exact;
+/// use mocban_results::stats::mcnemar_exact;
 ///
 /// // Five discordant pairs, all for the same method: 2 / 2^5.
 /// assert!((mcnemar_exact(0, 5).unwrap() - 0.0625).abs() < 1e-12);
@@ -65,7 +65,7 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
 /// slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
 ///
 /// ```
-/// use mocban_report::stats::mcnemar_sample_size;
+/// use mocban_results::stats::mcnemar_sample_size;
 ///
 /// // Published calculators give 23 pairs for discordant shares of 0.45 and 0.05, and 155 for 0.30 and 0.15.
 /// assert_eq!(mcnemar_sample_size(45, 5, 100).unwrap().ceil(), 23.0);

@@ -26,7 +26,7 @@ pub type QuantitySums = Vec<[f64; 2]>;
 /// 1,000 for larger samples. Returns 0 for an empty sample.
 ///
 /// ```
-/// use mocban_report::stats::resample_count;
+/// use mocban_results::stats::resample_count;
 ///
 /// assert_eq!([0, 587, 10_000, 1_000_000].map(resample_count), [0, 10_000, 5_000, 1_000]);
 /// ```
@@ -44,7 +44,7 @@ pub fn resample_count(units: usize) -> usize {
 /// result depends on the order of the units, not on the number of threads.
 ///
 /// ```
-/// use mocban_report::stats::{percentile_interval_95, resampled_means};
+/// use mocban_results::stats::{percentile_interval_95, resampled_means};
 ///
 /// // Forty units, half of them 0 and half 1: the standard error of the mean is 0.079.
 /// let units: Vec<_> = (0..40).map(|i| vec![[f64::from(i % 2), 1.0]]).collect();
@@ -121,7 +121,7 @@ pub fn percentile_interval_95(means: &mut [f64]) -> Option<[f64; 2]> {
 /// doi:10.1017/CBO9780511802843.
 ///
 /// ```
-/// use mocban_report::stats::bootstrap_p;
+/// use mocban_results::stats::bootstrap_p;
 ///
 /// // None of 99 differences is at or below 0: 2 * (0 + 1) / (99 + 1).
 /// assert_eq!(bootstrap_p(&[0.5; 99]), Some(0.02));

@@ -25,26 +25,6 @@ pub struct TruthEvaluation {
     pub problem: Option<String>,
 }
 
-/// Ground truth that could not be used.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct TruthProblems {
-    /// Number of pairs.
-    pub(super) count: u64,
-    /// The first pair with its problem.
-    pub(super) first: Option<String>,
-}
-
-impl TruthProblems {
-    /// Counts one pair, if its ground truth cannot be used.
-    pub(super) fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
-        if let Some(problem) = &truth.problem {
-            self.count += 1;
-            let first = || format!("{}: {problem}", pair.attributes.name);
-            self.first.get_or_insert_with(first);
-        }
-    }
-}
-
 /// Why a pair cannot be measured.
 #[derive(Debug, thiserror::Error)]
 enum EvaluationError {

@@ -26,7 +26,7 @@ const MIN_CHECKS: u64 = 4;
 
 impl AttentionCheckRates {
     /// Returns the rates of detected faults among the answers of one or more reviewers. Ignores answers to duplicates.
-    pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
+    pub fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut rates = Self::default();
         for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {
             let is_detected = answer.verdict == Verdict::Fail;
@@ -38,7 +38,7 @@ impl AttentionCheckRates {
     }
 
     /// Returns the reviewers who detected fewer than half of at least [`MIN_CHECKS`] planted faults.
-    pub(super) fn inattentive(&self) -> Vec<(&str, &Rate)> {
+    pub fn inattentive(&self) -> Vec<(&str, &Rate)> {
         let reviewers = self.by_reviewer.iter();
         let reviewers = reviewers.filter(|(_, rate)| is_inattentive(rate));
         reviewers
@@ -47,7 +47,7 @@ impl AttentionCheckRates {
     }
 
     /// Computes the intervals by `method`.
-    pub(super) fn set_interval(&mut self, method: IntervalMethod) {
+    pub fn set_interval(&mut self, method: IntervalMethod) {
         let rates = self.by_kind.values_mut();
         let rates = rates.chain(self.by_reviewer.values_mut());
         for rate in rates.chain([&mut self.all]) {
@@ -65,7 +65,7 @@ pub fn is_inattentive(rate: &Rate) -> bool {
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read.
-pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
+pub async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
     let answers = answers_by_reviewer(catalog).await?;
     let mut rates = AttentionCheckRates::of(answers.values().flat_map(|answers| newest(answers)));
     let by_reviewer = answers.iter().map(|(reviewer, answers)| {
@@ -80,7 +80,7 @@ pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRat
 ///
 /// # Errors
 /// Returns an error if the catalog cannot be read.
-pub(super) async fn answers_by_reviewer(
+pub async fn answers_by_reviewer(
     catalog: &Catalog,
 ) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
     let mut by_reviewer: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
@@ -94,7 +94,7 @@ pub(super) async fn answers_by_reviewer(
 }
 
 /// Returns a reviewer's newest answer to each item. `answers` must be sorted with the oldest first.
-pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
+pub fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);
         (answer.pair.clone(), answer.check.name(), hashes)

@@ -3,7 +3,7 @@
 /// Returns the middle value, or the mean of the two middle values. Returns `None` without values. Sorts `values`.
 ///
 /// ```
-/// use mocban_report::stats::median;
+/// use mocban_results::stats::median;
 ///
 /// assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
 /// assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), Some(2.5));
@@ -23,7 +23,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
 /// Sorts `values`. Source: Hyndman and Fan 1996, doi:10.2307/2684934, definition 7 (the default of `NumPy` and R).
 ///
 /// ```
-/// use mocban_report::stats::quantile;
+/// use mocban_results::stats::quantile;
 ///
 /// // NumPy: np.quantile([1, 2, 3, 4, 10], 0.95) is 8.8.
 /// let found = quantile(&mut [4.0, 1.0, 3.0, 2.0, 10.0], 0.95).unwrap();

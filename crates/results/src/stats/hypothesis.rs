@@ -9,7 +9,7 @@ pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 /// Source: Holm 1979, <https://www.jstor.org/stable/4615733>.
 ///
 /// ```
-/// use mocban_report::stats::holm;
+/// use mocban_results::stats::holm;
 ///
 /// // R: p.adjust(c(0.04, 0.01, 0.6), "holm") is 0.08, 0.03, 0.60.
 /// let adjusted = holm(&[0.04, 0.01, 0.6]);
@@ -35,7 +35,7 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
 /// the size of the family.
 ///
 /// ```
-/// use mocban_report::stats::holm_of_known;
+/// use mocban_results::stats::holm_of_known;
 ///
 /// assert_eq!(holm_of_known(&[Some(0.25), None]), [Some(0.5), None]);
 /// ```

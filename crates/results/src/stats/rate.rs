@@ -7,7 +7,7 @@ use super::interval::IntervalMethod;
 /// Returns `sum / n`, or `None` if `n` is 0.
 ///
 /// ```
-/// use mocban_report::stats::ratio;
+/// use mocban_results::stats::ratio;
 ///
 /// assert_eq!((ratio(3.0, 4), ratio(3.0, 0)), (Some(0.75), None));
 /// ```
@@ -32,7 +32,7 @@ impl Rate {
     /// Returns the rate of `count` out of `n` with Wilson's interval.
     ///
     /// ```
-    /// use mocban_report::stats::Rate;
+    /// use mocban_results::stats::Rate;
     ///
     /// let rate = Rate::new(19, 20);
     /// assert_eq!(rate.share, Some(0.95));

@@ -49,7 +49,7 @@ impl AgreementTable {
     /// may be near 0 even if the raters almost always agree. Source: Cohen 1960, doi:10.1177/001316446002000104.
     ///
     /// ```
-    /// use mocban_report::stats::AgreementTable;
+    /// use mocban_results::stats::AgreementTable;
     ///
     /// // a = 40/60; each rater failed half, so c = 1/2 and kappa = 1/3.
     /// let table = AgreementTable { both_pass: 20, first_fails: 10, second_fails: 10, both_fail: 20 };
@@ -66,7 +66,7 @@ impl AgreementTable {
     /// 2008, doi:10.1348/000711006X126600.
     ///
     /// ```
-    /// use mocban_report::stats::AgreementTable;
+    /// use mocban_results::stats::AgreementTable;
     ///
     /// // a = 36/40 and f = 2/40: c = 0.095, AC1 = (0.9 - 0.095) / 0.905.
     /// let table = AgreementTable { both_pass: 36, first_fails: 2, second_fails: 2, both_fail: 0 };

@@ -6,7 +6,7 @@
 /// the lower tail are added, so even a tiny result is accurate. Otherwise the upper tail is subtracted from 1.
 ///
 /// ```
-/// use mocban_report::stats::binomial_cdf;
+/// use mocban_results::stats::binomial_cdf;
 ///
 /// // Four tosses of a fair coin show at most one head in (1 + 4) of 16 cases.
 /// assert!((binomial_cdf(1, 4, 0.5) - 5.0 / 16.0).abs() < 1e-12);

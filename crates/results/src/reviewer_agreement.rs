@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::attention_checks::{self, AttentionCheckRates};
-use super::build::PAIRS_PER_PAGE;
 use super::consensus::{Consensus, partition_verdicts};
 use super::pair_artifacts::group_identical;
 use super::stats::{AgreementTable, Rate};
@@ -92,6 +91,9 @@ pub struct ReviewerRecord {
     /// Share of answered planted faults that they failed.
     pub attention_checks: AttentionCheckRates,
 }
+
+/// Pairs in memory at a time.
+const PAIRS_PER_PAGE: usize = 256;
 
 /// Computes the agreement of a project's reviewers from the current state of its catalog.
 ///

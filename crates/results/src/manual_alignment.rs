@@ -106,7 +106,7 @@ impl ManualErrors {
 #[cfg(any(test, feature = "test-helpers"))]
 impl ManualErrors {
     /// Returns errors of an unmirrored result.
-    pub(super) const fn of(angle_deg: f64, shift_pct: f64, scale_pct: f64) -> Self {
+    pub const fn of(angle_deg: f64, shift_pct: f64, scale_pct: f64) -> Self {
         Self {
             angle_deg,
             shift_pct,
@@ -120,7 +120,7 @@ impl ManualErrors {
 ///
 /// # Errors
 /// Returns an error if the pair's result of the fit or depth stage cannot be read.
-pub(super) fn errors(
+pub fn errors(
     project: &Project,
     pair: &PairResults,
     manual: &StoredAlignment,
@@ -145,7 +145,7 @@ pub(super) fn errors(
 
 impl ManualAlignmentErrors {
     /// Returns the summary of one metric's errors, or `None` if there are no errors.
-    pub(super) fn of(found: &[ManualErrors]) -> Option<Self> {
+    pub fn of(found: &[ManualErrors]) -> Option<Self> {
         let median_and_p95 = |read: fn(&ManualErrors) -> f64| -> [Option<f64>; 2] {
             let mut values: Vec<f64> = found.iter().map(read).collect();
             [median(&mut values), quantile(&mut values, 0.95)]
