@@ -8,3 +8,4 @@ pub(super) mod via_csv;
 pub(super) mod via_json;
 mod via_shape;
 pub(super) mod yolo;
+mod yolo_columns;

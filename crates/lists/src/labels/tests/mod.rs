@@ -7,3 +7,4 @@ mod limits;
 mod page_fit;
 mod round_trips;
 mod samples;
+mod yolo;
