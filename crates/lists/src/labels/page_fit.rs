@@ -42,6 +42,7 @@ pub(super) fn fit_to_page(
     }
     check_count(file.regions.len())?;
     let mut warnings = page_warnings(&file, page);
+    warnings.extend(file.warnings);
     let scale = scale(file.size, page, &mut warnings)?;
     let placed = with_area(file.regions, scale, &mut warnings);
     if placed.is_empty() {

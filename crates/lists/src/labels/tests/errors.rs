@@ -148,6 +148,14 @@ fn damaged_boxes() {
             "COCO with three numbers",
             text(COCO.replace("[1400,100,100,120]", "[1400,100,100]")),
         ),
+        (
+            "COCO without an image",
+            text(COCO.replace("\"image_id\":8,", "")),
+        ),
+        (
+            "COCO with an id twice",
+            text(COCO.replace("{\"id\":8", "{\"id\":\"7\"")),
+        ),
         ("an odd polygon", text(COCO.replace("[[1250,", "[["))),
         (
             "labelme shape",
