@@ -3,6 +3,7 @@
 pub(super) mod bboxes;
 pub(super) mod coco;
 pub(super) mod labelme;
+mod page_levels;
 pub(super) mod page_xml;
 pub(super) mod via_csv;
 pub(super) mod via_json;
