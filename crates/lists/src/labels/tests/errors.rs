@@ -174,6 +174,18 @@ fn damaged_boxes() {
             text(VIA_2.replace("c01-r02", "c01/r02")),
         ),
         ("a name twice", text(VIA_2.replace("c01-r02", "c01-r01"))),
+        (
+            "a name in other case",
+            text(VIA_2.replace("c01-r02", "C01-r01")),
+        ),
+        (
+            "a name in another form",
+            text(
+                VIA_2
+                    .replace("c01-r01", "ch\u{1eef}")
+                    .replace("c01-r02", "chu\u{31b}\u{303}"),
+            ),
+        ),
     ];
     insta::assert_snapshot!(messages(&files, &PAGE));
 }
