@@ -61,6 +61,8 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         | CatalogError::MayNotReview(_)
         | CatalogError::OtherReviewer { .. }
         | CatalogError::NotEmpty(_)
+        | CatalogError::SimilarName { .. }
+        | CatalogError::SameFiles { .. }
         | CatalogError::SameCatalog(_)
         | CatalogError::FinishedCopy { .. } => Some(ExitCode::Usage),
         error if error.is_of_pooler() => Some(ExitCode::Usage),

@@ -1,13 +1,12 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
 use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
-use mocban_core::domain::{ContentHash, LengthUnit, PairName, sanitize};
+use mocban_core::domain::{LengthUnit, sanitize};
 use mocban_lists::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
 };
@@ -76,15 +75,10 @@ impl Listing {
         } else {
             read_csv
         };
-        let mut similar = SimilarIds::default();
         let mut misspelt = MisspeltColumns::default();
-        let mut each = |row: ManifestRow| {
-            similar.add(&row.name);
-            misspelt.add(&row);
-        };
+        let mut each = |row: ManifestRow| misspelt.add(&row);
         let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let mut warnings = misspelt.warnings();
-        warnings.extend(similar.warning());
+        let warnings = misspelt.warnings();
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -110,16 +104,13 @@ impl Listing {
         let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
             .map_err(|problems| refuse(meshes, &problems))?;
         let mut rows = found.rows;
-        let mut similar = SimilarIds::default();
         for row in &mut rows {
             row.unit = unit;
-            similar.add(&row.name);
         }
         let warnings = [
             ignored_files("mesh without print", &found.meshes_alone),
             ignored_files("print without mesh", &found.prints_alone),
             ignored_files("neither mesh nor print", &found.ignored),
-            similar.warning(),
         ];
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
@@ -176,40 +167,6 @@ impl Listing {
     }
 }
 
-/// Finds ids that differ only in upper and lower case.
-#[derive(Debug, Default)]
-struct SimilarIds {
-    /// Hash prefixes of the lower-case ids: a list may have millions of rows.
-    seen: HashSet<[u8; 8]>,
-    first: Option<PairName>,
-    more: usize,
-}
-
-impl SimilarIds {
-    fn add(&mut self, name: &PairName) {
-        let hash = ContentHash::of(name.as_str().to_lowercase().as_bytes());
-        let prefix = std::array::from_fn(|at| hash.as_bytes()[at]);
-        let is_new = self.seen.insert(prefix);
-        match (is_new, &self.first) {
-            (true, _) => {}
-            (false, None) => self.first = Some(name.clone()),
-            (false, Some(_)) => self.more += 1,
-        }
-    }
-
-    fn warning(self) -> Option<String> {
-        let name = self.first?;
-        let more = match self.more {
-            0 => String::new(),
-            more => format!(", and so do {more} more ids"),
-        };
-        Some(format!(
-            "id {name} differs from another id only in case{more}; an export to a file system that ignores case \
-             (Windows, macOS, memory sticks) would mix their directories"
-        ))
-    }
-}
-
 /// Maximum number of missing files for which a similar name is searched.
 const MAX_SEARCHES: usize = 10;
 
@@ -254,20 +211,6 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{Listing, Project};
-
-    #[test]
-    fn ids_that_differ_only_in_case_are_reported() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let file = dir.path().join("pairs.csv");
-        std::fs::write(&file, "id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\nB,m,p\n").expect("written");
-        let warnings = Listing::from_file(&file).expect("valid").warnings;
-        assert_eq!(warnings.len(), 1);
-        assert!(
-            warnings[0]
-                .starts_with("id a1 differs from another id only in case, and so do 1 more ids"),
-            "{warnings:?}"
-        );
-    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {

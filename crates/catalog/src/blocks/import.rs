@@ -7,6 +7,7 @@ use crate::db::row::FromRow as _;
 use crate::handle::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
+use crate::records::similar_names;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
@@ -51,7 +52,8 @@ impl Catalog {
     /// stages of a changed block are stale.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the names of two blocks differ only in case, or if a database operation fails. In that case
+    /// nothing is imported.
     pub async fn import_blocks(
         &self,
         rows: Vec<BlockAttributes>,
@@ -61,6 +63,9 @@ impl Catalog {
             let mut summary = BlockImportSummary::default();
             for row in &rows {
                 import_block(conn, row, now, &mut summary).await?;
+            }
+            if summary.added > 0 {
+                similar_names::refuse_blocks(conn).await?;
             }
             Ok(summary)
         })

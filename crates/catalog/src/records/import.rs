@@ -17,6 +17,7 @@ use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::ground_truth;
 use crate::records::model::PairAttributes;
+use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{PairName, UnixMillis};
 
@@ -115,8 +116,8 @@ impl Catalog {
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// Returns an error if the channel closes before `ImportChunk::End`, if a true alignment names an unknown pair, or
-    /// if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a new pair is similar to a known one, if a true
+    /// alignment names an unknown pair, or if a database operation fails. In that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
@@ -126,6 +127,7 @@ impl Catalog {
         in_transaction!(self, |conn| {
             let mut summary = ImportSummary::default();
             let mut deltas = Deltas::default();
+            let last = similar_names::last_pair(conn).await?;
             loop {
                 match chunks.recv().await {
                     Some(ImportChunk::Rows(rows)) => {
@@ -137,6 +139,7 @@ impl Catalog {
                     None => return Err(CatalogError::CutShort),
                 }
             }
+            similar_names::refuse_pairs(conn, last).await?;
             deltas.apply(conn).await?;
             summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
             let stored = ground_truth::set(conn, &truths).await?;
