@@ -1,13 +1,13 @@
 //! Reader of Wavefront OBJ files (<https://paulbourke.net/dataformats/obj/>).
 //!
-//! The module `parser` reads a file in a single pass over its bytes. If it rejects the file, the `v` and `f` lines are
+//! The module `plain` reads a file in a single pass over its bytes. If it rejects the file, the `v` and `f` lines are
 //! rewritten without continuations, comments and extra columns, and parsed again. If that fails too, the first fault is
 //! reported with its position in the file.
 //!
 //! Normals, texture coordinates, colours, groups and materials are not used. The tests compare the results with the
 //! crate `tobj`, which takes 6 times as long on 500,000 vertices and does not report where a fault is.
 
-mod parser;
+mod plain;
 #[cfg(test)]
 mod tests;
 
@@ -26,7 +26,7 @@ use crate::domain::cancel::polled;
 /// vertex, or a used coordinate is not finite.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
-    if let Some(parsed) = parser::parse(bytes, limits) {
+    if let Some(parsed) = plain::parse(bytes, limits) {
         limits.check_vertices(parsed.vertices.len() as u64)?;
         limits.check_triangles(parsed.triangles.len() as u64)?;
         if let Some(mesh) = parsed.into_mesh() {
@@ -39,8 +39,8 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     let [vertices, triangles] = count(bytes);
     limits.check_vertices(vertices)?;
     limits.check_triangles(triangles)?;
-    parser::parse(&plain_lines(bytes), limits)
-        .and_then(parser::ParsedObj::into_mesh)
+    plain::parse(&plain_lines(bytes), limits)
+        .and_then(plain::ParsedObj::into_mesh)
         .ok_or_else(|| find_fault(bytes))
 }
 

@@ -4,7 +4,7 @@ use std::io::BufReader;
 
 use proptest::prelude::*;
 
-use super::{find_fault, parser, plain_lines};
+use super::{find_fault, plain, plain_lines};
 use crate::mesh::{Mesh, MeshError, MeshLimits};
 
 fn read(text: &str) -> Result<Mesh, MeshError> {
@@ -243,8 +243,8 @@ fn usual_files_are_read_in_one_pass() {
             "f 4/1 2//1 -2 +1",
             "",
         ];
-        let parsed = parser::parse(lines.join(end).as_bytes(), &MeshLimits::SUGGESTED)
-            .expect("a usual file");
+        let parsed =
+            plain::parse(lines.join(end).as_bytes(), &MeshLimits::SUGGESTED).expect("a usual file");
         let mesh = parsed.into_mesh().expect("indices in range");
         assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);
