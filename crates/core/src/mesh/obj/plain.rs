@@ -1,7 +1,7 @@
-//! Single-pass parser of OBJ text: `v` lines with decimal numbers, `f` lines with any form of index.
+//! Single-pass reader of OBJ files with usual lines only.
 
 use crate::domain::cancel::{PollCounter, polled};
-use crate::mesh::error::MeshLimits;
+use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
@@ -23,82 +23,113 @@ const MAX_INDEX_DIGITS: usize = 18;
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 
-/// The geometry of a file as written.
-pub(super) struct ParsedObj {
-    /// Positions, in the mesh's unit.
-    pub(super) vertices: PageVec<[f64; 3]>,
-    /// Indices of vertices, from 0; they may lie beyond the last vertex.
-    pub(super) triangles: PageVec<[u32; 3]>,
-    /// Whether every coordinate is finite.
-    is_finite: bool,
-}
+/// A line that [`read`] leaves to another reader, counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct OddLine(pub(super) u64);
 
-/// Parses a file, up to the vertex or face that exceeds the limits. Returns `None` if its lines end in CR only, a line is continued on the next, or a `v` or `f` line
-/// contains an invalid number or index.
-pub(super) fn parse(bytes: &[u8], limits: &MeshLimits) -> Option<ParsedObj> {
-    // Lines of classic Mac OS end in a carriage return only.
-    if !text::contains(bytes, b'\n') && text::contains(bytes, b'\r') {
-        return None;
+/// Reads a file with these lines only:
+///
+/// - an empty line or a comment, or one that begins with `vn`, `vt`, `g`, `o`, `s`, `usemtl` or `mtllib`
+/// - `v` with three numbers, and then nothing, a weight of 1 or a colour
+/// - `f` with corners: an integer, which up to two more and slashes may follow
+///
+/// # Errors
+/// Returns the first other line. The inner error says that the file exceeds the limits, that a face refers to a missing
+/// vertex, or that a used coordinate is not finite.
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, MeshError>, OddLine> {
+    if text::is_classic_mac(bytes) {
+        return Err(OddLine(1));
     }
-    let mut vertices: PageVec<[f64; 3]> = PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX);
-    let mut triangles = PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE);
-    let mut cursor = LineCursor {
+    let mut reader = PlainReader {
         rest: bytes,
+        line: 1,
+        vertices: PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX),
+        triangles: PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
         is_finite: true,
+        last_used: (0, 1),
     };
     let mut counter = PollCounter::default();
-    while !cursor.rest.is_empty() && limits.allow(vertices.len(), triangles.len()) {
-        let before = cursor.rest.len();
-        cursor.skip_space();
-        match cursor.rest {
-            [b'v', space, rest @ ..] if is_space(*space) => {
-                cursor.rest = rest;
-                vertices.push(cursor.position()?);
-            }
-            [b'f', space, rest @ ..] if is_space(*space) => {
-                cursor.rest = rest;
-                cursor.face(vertices.len(), &mut triangles, limits)?;
-            }
-            _ => {}
-        }
-        cursor.next_line()?;
-        counter.add(text::poll_items(before - cursor.rest.len()));
+    while !reader.rest.is_empty() && limits.allow(reader.vertices.len(), reader.triangles.len()) {
+        let before = reader.rest.len();
+        reader.line(limits).ok_or(OddLine(reader.line))?;
+        counter.add(text::poll_items(before - reader.rest.len()));
     }
-    Some(ParsedObj {
-        vertices,
-        triangles,
-        is_finite: cursor.is_finite,
-    })
+    Ok(reader.into_mesh(limits))
 }
 
-impl ParsedObj {
+/// The unread part of a file, and the geometry read so far.
+struct PlainReader<'a> {
+    rest: &'a [u8],
+    /// The line that `rest` begins with, counted from 1.
+    line: u64,
+    /// Positions, in the mesh's unit.
+    vertices: PageVec<[f64; 3]>,
+    /// Indices of vertices, from 0; they may lie beyond the last vertex.
+    triangles: PageVec<[u32; 3]>,
+    /// Whether every coordinate is finite.
+    is_finite: bool,
+    /// The highest index in a face, and the first line with it.
+    last_used: (u32, u64),
+}
+
+impl PlainReader<'_> {
     /// Keeps the vertices that faces use, in the order of their first use, or all vertices if there are no faces.
-    /// Returns `None` if an index is out of range or a kept coordinate is not finite.
-    pub(super) fn into_mesh(self) -> Option<Mesh> {
-        let Self {
-            mut vertices,
-            mut triangles,
-            is_finite,
-        } = self;
-        if !triangles.is_empty() {
-            vertices = in_order_of_use(&vertices, &mut triangles)?;
+    fn into_mesh(mut self, limits: &MeshLimits) -> Result<Mesh, MeshError> {
+        limits.check_vertices(self.vertices.len() as u64)?;
+        limits.check_triangles(self.triangles.len() as u64)?;
+        if !self.triangles.is_empty() {
+            let (index, line) = self.last_used;
+            if index as usize >= self.vertices.len() {
+                let reason = "a corner refers to a vertex that the file does not have".into();
+                return Err(MeshError::Line { line, reason });
+            }
+            self.vertices = in_order_of_use(&self.vertices, &mut self.triangles);
         }
-        let is_kept_finite = || vertices.as_flattened().iter().all(|v| v.is_finite());
-        (is_finite || is_kept_finite()).then_some(Mesh {
-            vertices: Vertices::Double(vertices),
-            triangles,
+        if !self.is_finite {
+            error::check_all_finite(&self.vertices, 0)?;
+        }
+        Ok(Mesh {
+            vertices: Vertices::Double(self.vertices),
+            triangles: self.triangles,
         })
     }
-}
 
-/// The unread part of a file.
-struct LineCursor<'a> {
-    rest: &'a [u8],
-    /// Whether every number so far is finite.
-    is_finite: bool,
-}
+    /// Reads a line; returns `None` if it is another than [`read`] lists.
+    #[inline]
+    fn line(&mut self, limits: &MeshLimits) -> Option<()> {
+        self.skip_space();
+        match self.rest {
+            [b'v', space, rest @ ..] if is_space(*space) => {
+                self.rest = rest;
+                self.vertex()?;
+            }
+            [b'f', space, rest @ ..] if is_space(*space) => {
+                self.rest = rest;
+                self.face(limits)?;
+            }
+            [b'#' | b'\n', ..] => {}
+            rest => {
+                let len = rest.iter().position(u8::is_ascii_whitespace);
+                let keyword = &rest[..len.unwrap_or(rest.len())];
+                if !matches!(
+                    keyword,
+                    b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib" | b""
+                ) {
+                    return None;
+                }
+            }
+        }
+        self.next_line();
+        Some(())
+    }
 
-impl LineCursor<'_> {
+    fn next_line(&mut self) {
+        let len = self.rest.iter().position(|byte| *byte == b'\n');
+        let len = len.map_or(self.rest.len(), |len| len + 1);
+        self.rest = &self.rest[len..];
+        self.line += 1;
+    }
+
     fn skip_space(&mut self) {
         while let [byte, rest @ ..] = self.rest
             && is_space(*byte)
@@ -107,22 +138,31 @@ impl LineCursor<'_> {
         }
     }
 
-    /// Moves to the next line; returns `None` if this one is continued there.
-    fn next_line(&mut self) -> Option<()> {
-        let len = self.rest.iter().position(|byte| *byte == b'\n');
-        let (line, rest) = self.rest.split_at(len.unwrap_or(self.rest.len()));
-        self.rest = rest.get(1..).unwrap_or_default();
-        (!line.trim_ascii_end().ends_with(b"\\")).then_some(())
-    }
-
-    /// Parses the first three words; a weight and colours may follow.
-    fn position(&mut self) -> Option<[f64; 3]> {
+    /// Parses three numbers, and skips a weight of 1 or the three or four words of a colour.
+    fn vertex(&mut self) -> Option<()> {
         let mut position = [0.0; 3];
         for value in &mut position {
             self.skip_space();
             *value = self.number()?;
         }
-        Some(position)
+        self.vertices.push(position);
+        let (mut words, mut len, mut was_space) = (0, 0, true);
+        for byte in self.rest {
+            match byte {
+                b'\n' | b'#' => break,
+                byte if is_space(*byte) => was_space = true,
+                _ => words += u32::from(std::mem::take(&mut was_space)),
+            }
+            len += 1;
+        }
+        let (rest, end) = self.rest.split_at(len);
+        self.rest = end;
+        let is_plain = match words {
+            1 => text::parse(rest.trim_ascii()) == Some(1.0),
+            0 => true,
+            words => matches!(words, 3 | 4) && !rest.trim_ascii_end().ends_with(b"\\"),
+        };
+        is_plain.then_some(())
     }
 
     /// Parses a number up to the end of its word.
@@ -153,50 +193,51 @@ impl LineCursor<'_> {
     /// Reads decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps around.
     #[inline]
     fn digits(&mut self, number: &mut u64) -> usize {
-        let before = self.rest.len();
-        while let [digit @ b'0'..=b'9', rest @ ..] = self.rest {
-            *number = number
-                .wrapping_mul(10)
-                .wrapping_add(u64::from(digit - b'0'));
-            self.rest = rest;
+        let mut count = 0;
+        for digit in self.rest.iter().map(|byte| byte.wrapping_sub(b'0')) {
+            if digit > 9 {
+                break;
+            }
+            *number = number.wrapping_mul(10).wrapping_add(u64::from(digit));
+            count += 1;
         }
-        before - self.rest.len()
+        self.rest = &self.rest[count..];
+        count
     }
 
     fn is_at_end_of_word(&self) -> bool {
         self.rest.first().is_none_or(|byte| is_end_of_word(*byte))
     }
 
-    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner.
-    /// `vertices` is the number of vertices parsed so far. Polygons of fewer than three corners add nothing. Stops at the
-    /// first triangle that exceeds the limits.
-    fn face(
-        &mut self,
-        vertices: usize,
-        triangles: &mut PageVec<[u32; 3]>,
-        limits: &MeshLimits,
-    ) -> Option<()> {
-        let (mut first, mut last) = (0, 0);
+    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons of
+    /// fewer than three corners add nothing. Stops at the first triangle that exceeds the limits.
+    fn face(&mut self, limits: &MeshLimits) -> Option<()> {
+        let before = self.triangles.len();
+        let (mut first, mut last, mut highest) = (0, 0, 0);
         for count in polled(0..) {
             self.skip_space();
             let is_end = matches!(self.rest, [] | [b'\n' | b'#', ..]);
-            if is_end || triangles.len() as u64 > limits.max_triangles {
+            if is_end || self.triangles.len() as u64 > limits.max_triangles {
                 break;
             }
-            let corner = self.corner(vertices)?;
+            let corner = self.corner()?;
             match count {
                 0 => first = corner,
                 1 => {}
-                _ => triangles.push([first, last, corner]),
+                _ => self.triangles.push([first, last, corner]),
             }
             last = corner;
+            highest = highest.max(corner);
+        }
+        if self.triangles.len() > before && highest > self.last_used.0 {
+            self.last_used = (highest, self.line);
         }
         Some(())
     }
 
-    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. `vertices` is the number of
-    /// vertices parsed so far. A negative index counts back from the last of them.
-    fn corner(&mut self, vertices: usize) -> Option<u32> {
+    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. A negative index counts back from
+    /// the last vertex so far. An index that no vertex can have is returned as the highest.
+    fn corner(&mut self) -> Option<u32> {
         let index = self.index()?;
         let mut parts = 1;
         while let [b'/', rest @ ..] = self.rest {
@@ -207,12 +248,12 @@ impl LineCursor<'_> {
             }
         }
         let place = if index < 0 {
-            vertices as i64 + index
+            self.vertices.len() as i64 + index
         } else {
             index - 1
         };
-        let place = u32::try_from(place).ok();
-        place.filter(|_| self.is_at_end_of_word())
+        let place = u32::try_from(place).unwrap_or(u32::MAX);
+        self.is_at_end_of_word().then_some(place)
     }
 
     /// Parses an integer.
@@ -240,21 +281,17 @@ const fn is_end_of_word(byte: u8) -> bool {
 }
 
 /// Returns the vertices that triangles use, in the order of their first use, and renumbers the triangles to match.
-/// Returns `None` if an index is out of range.
-fn in_order_of_use(
-    all: &[[f64; 3]],
-    triangles: &mut PageVec<[u32; 3]>,
-) -> Option<PageVec<[f64; 3]>> {
+fn in_order_of_use(all: &[[f64; 3]], triangles: &mut PageVec<[u32; 3]>) -> PageVec<[f64; 3]> {
     const UNUSED: u32 = u32::MAX;
     let mut new_index = vec![UNUSED; all.len()];
     let mut vertices = PageVec::with_capacity(all.len());
     for index in polled(triangles.as_flattened_mut()) {
-        let new = new_index.get_mut(*index as usize)?;
+        let new = &mut new_index[*index as usize];
         if *new == UNUSED {
             *new = vertices.len() as u32;
             vertices.push(all[*index as usize]);
         }
         *index = *new;
     }
-    Some(vertices)
+    vertices
 }
