@@ -224,13 +224,3 @@ impl Catalog {
         .await
     }
 }
-
-/// Runs a block with a connection in a write transaction of its own: see [`Catalog::in_transaction`].
-macro_rules! in_transaction {
-    ($catalog:expr, |$conn:ident| $work:block) => {
-        $catalog
-            .in_transaction(move |$conn| Box::pin(async move $work))
-            .await
-    };
-}
-pub(crate) use in_transaction;

@@ -2,7 +2,7 @@
 
 use crate::blocks::block_job::BlockJob;
 use crate::db::conn::Conn;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::pair_job::PairJob;
 use crate::queue::recovery::{
     self as recovery, DeadWorker, Recovered, RecoveredJobs, holders_but, mark_dead,

@@ -242,6 +242,11 @@ fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Resul
     context.print(&json, || {
         plan_text(plan, running) + &block_plan_text(blocks)
     })?;
+    if plan.changes_method() {
+        context.info(
+            "the results of the other method would be replaced; to keep both, import the pairs into a second project, and compare the two with `report --compare`",
+        );
+    }
     if plan.pairs() > 0 || !blocks.is_empty() || plan.leased > 0 && !running {
         context.next("run");
     }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::Row;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::fingerprint::hash_of;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};

@@ -9,7 +9,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::query;
 use crate::db::rows::json_array;
 use crate::db::schema::{self, SchemaDifference, wanted_objects};
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::Deltas;
 use crate::queue::fragments::{fingerprint_before, inconsistent};
 use crate::queue::job_counts::count_jobs;

@@ -1,7 +1,7 @@
 //! Stores the control points of blocks.
 
 use crate::db::query::{query, query_scalar};
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, ContentHash, ControlPoints};

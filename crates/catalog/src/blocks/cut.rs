@@ -10,7 +10,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::names_json;
 use crate::db::script::Script;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;

@@ -4,7 +4,7 @@ use crate::blocks::model::BlockAttributes;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::similar_names;

@@ -9,7 +9,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow as _, from_row};
 use crate::db::script::Script;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
 use crate::queue::counters::Deltas;
 use crate::queue::kind::StoredKind as _;

@@ -19,5 +19,6 @@ pub(crate) mod row;
 pub(crate) mod rows;
 pub(crate) mod schema;
 pub(crate) mod script;
+pub(crate) mod transaction;
 pub(crate) mod unplaced;
 pub(crate) mod value;

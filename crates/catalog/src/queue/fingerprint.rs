@@ -8,9 +8,9 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
-use crate::handle::in_transaction;
-use crate::queue::plan::FieldChange;
+use crate::queue::plan::{FieldChange, METHOD};
 use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
@@ -223,7 +223,8 @@ pub(crate) fn differences(stage: &str, old: &Value, new: &Value) -> Vec<FieldCha
     changes.collect()
 }
 
-/// Flattens nested objects. The key `settings` is left out of the names.
+/// Flattens nested objects, with the names of the settings: the key `settings` is left out. The method, which every stage has,
+/// is returned for the first stage only.
 fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.to_owned(), fields)];
@@ -235,6 +236,8 @@ fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
         for (key, value) in inner {
             let path = match key.as_str() {
                 "settings" => path.clone(),
+                "method" if path == Stage::Fit.name() => METHOD.to_owned(),
+                "method" if path == stage => continue,
                 key => format!("{path}.{key}"),
             };
             open.push((path, value));
@@ -249,6 +252,19 @@ mod tests {
 
     use super::{Fingerprints, differences};
     use mocban_core::domain::Stage;
+
+    #[test]
+    fn the_method_is_a_setting_of_the_pipeline_and_named_once() {
+        let fields = |method| json!({ "method": method, "settings": { "seed": 1 } });
+        let of = |stage| differences(stage, &fields("default"), &fields("paper"));
+        let found = of("fit");
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            found[0].to_string(),
+            "pipeline.method: \"default\" -> \"paper\""
+        );
+        assert_eq!(of("register"), []);
+    }
 
     #[test]
     fn a_changed_setting_changes_its_stage_and_those_after_it() {

@@ -10,7 +10,7 @@ use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::db::script::Script;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::queue::fail::{add_records, merged};
 use crate::queue::kind::{JobKind, StoredKind, Template};

@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::fingerprint::{differences, fields_of};
 use crate::queue::plan::FieldChange;
 use crate::queue::provenance::FingerprintId;

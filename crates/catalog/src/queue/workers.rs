@@ -3,7 +3,7 @@
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::block_settings::BlockSettings;
 use crate::queue::claim::release_due;
 use crate::queue::counters::{Cursor, Deltas, cursor};

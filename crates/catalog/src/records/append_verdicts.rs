@@ -8,7 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query_as, query_scalar};
 use crate::db::rows::json_array;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::review_context::ReviewContext;
 use crate::records::verdicts::NewVerdict;

@@ -10,7 +10,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::db::query::{query_as, query_scalar};
 use crate::db::row::from_row;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::review_answers::pair_id;

@@ -6,7 +6,7 @@ use crate::db::query::{query, query_as};
 use crate::db::row::{FromRow, Row, from_row};
 use crate::db::rows::{input_version, json_array};
 use crate::db::script::Script;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::queue::kind::StoredKind as _;
 use crate::queue::lease::Lease;
 use crate::queue::pair_job::PairJob;

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use crate::db::query::{query, query_scalar};
 use crate::db::rows::json_array;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::faulty_rows::FaultyRow;
 use crate::records::left_out::LeftOut;
 use crate::{Catalog, Result};

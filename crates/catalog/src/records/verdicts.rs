@@ -8,7 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::query::{As, Query, query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::json_array;
-use crate::handle::in_transaction;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::{LeftOut, is_counted};
 use crate::records::review_context::ReviewContext;
