@@ -365,7 +365,7 @@ async fn verdicts_make_acc(run: &FinishedRun) {
         assert_eq!((row.judged, row.passed, row.failed), (2, 1, 1));
         assert_eq!(row.acc, Some(0.5));
     }
-    assert_eq!(report.comparisons.len(), 8);
+    assert!(report.comparisons.is_empty(), "two pairs are too few");
     let verdicts: Vec<Value> = lines(&run.export("judged").await)
         .into_iter()
         .map(|line| line["verdict"].clone())

@@ -178,6 +178,8 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         let missed = text.contains("Most attention checks were missed");
         assert_eq!(missed, noticed == 0, "{text}");
         assert!(text.contains("report -o report.html"), "{text}");
+        let same_results = "review --reviewer NAME --metric density --sample 3";
+        assert!(text.contains(same_results), "{text}");
         let agrees = text.contains("3 of 3 answers are the same as those of bo");
         assert_eq!(agrees, reviewer == "lan", "{text}");
         tab.key("Backspace");

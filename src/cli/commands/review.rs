@@ -48,7 +48,7 @@ pub(crate) struct ReviewArgs {
     #[arg(long)]
     metric: Vec<ThresholdMetric>,
     /// Seed of the random order
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value_t = QueueOptions::DEFAULT_SEED)]
     seed: u64,
     /// Review only the first N results; attention checks and duplicates are added to them
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -161,6 +161,9 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     signals.abort();
     context.info(closing_line(kept == 0));
     context.next("report");
+    if !args.adjudicate {
+        context.next(&queue_options(&args).for_another_reviewer());
+    }
     Ok(ExitCode::Done)
 }
 

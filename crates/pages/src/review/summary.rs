@@ -21,6 +21,8 @@ pub(super) struct ReviewSummary {
     others: Vec<ReviewerPair>,
     /// The command line that names this project, for the next commands.
     command: String,
+    /// The rest of the command with which another person judges the same results.
+    next_reviewer: String,
 }
 
 /// Number of results by verdict.
@@ -73,6 +75,7 @@ impl ReviewSummary {
             reviewer,
             others,
             command: state.options.command.clone(),
+            next_reviewer: state.options.queue.for_another_reviewer(),
         }))
     }
 }
