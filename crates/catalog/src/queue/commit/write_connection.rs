@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use sqlx::{Connection as _, PgConnection};
 
 use crate::db::busy_retry::retry_while_busy;
-use crate::db::conn::{Conn, Held, Work};
+use crate::db::conn::{Conn, ConnectionKind, Work};
 use crate::db::dialect::Sql;
 use crate::db::error::{CatalogError, Result};
 use crate::db::log_watch::LogWatch;
@@ -77,7 +77,7 @@ impl WriteConnection {
         retry_wait: Arc<RetryWait>,
     ) -> Self {
         Self {
-            conn: Conn::Postgres(Held::Owned(conn)),
+            conn: Conn::Postgres(ConnectionKind::Owned(conn)),
             path: Path::new(&address.text()).into(),
             log: None,
             server: Some(Server {
@@ -145,7 +145,7 @@ impl WriteConnection {
         loop {
             match retry_wait.limit(server.address.reconnect()).await {
                 Ok(conn) => {
-                    self.conn = Conn::Postgres(Held::Owned(conn));
+                    self.conn = Conn::Postgres(ConnectionKind::Owned(conn));
                     self.is_broken = false;
                     server.state.leases.replies_may_be_lost();
                     server.state.has_folded_all = false;
@@ -263,13 +263,13 @@ impl WriteConnection {
         let is_lost = self.log.as_ref().is_some_and(LogWatch::is_lost);
         let closed = match self.conn {
             // Closing would copy pages of the damaged log to the catalog. Exiting without closing does not.
-            Conn::Sqlite(Held::Owned(conn)) if is_lost => {
+            Conn::Sqlite(ConnectionKind::Owned(conn)) if is_lost => {
                 std::mem::forget(conn);
                 return;
             }
-            Conn::Sqlite(Held::Owned(conn)) => conn.close().await,
-            Conn::Postgres(Held::Owned(_)) if self.is_broken => return,
-            Conn::Postgres(Held::Owned(conn)) => conn.close().await,
+            Conn::Sqlite(ConnectionKind::Owned(conn)) => conn.close().await,
+            Conn::Postgres(ConnectionKind::Owned(_)) if self.is_broken => return,
+            Conn::Postgres(ConnectionKind::Owned(conn)) => conn.close().await,
             Conn::Sqlite(_) | Conn::Postgres(_) => return,
         };
         if let Err(error) = closed {
