@@ -16,7 +16,7 @@ use crate::db::postgres::LOCK_FOR_ANY_PLAN;
 use crate::db::postgres_address::PostgresAddress;
 use crate::db::query::query;
 use crate::db::retry_wait::RetryWait;
-use crate::queue::claim_start::ClaimStart;
+use crate::queue::claim_tracker::ClaimTracker;
 use crate::queue::commit::known_leases::KnownLeases;
 use crate::queue::worker_lock::WorkerLock;
 use mocban_core::domain::WorkerId;
@@ -51,7 +51,7 @@ struct Server {
 #[derive(Debug, Default)]
 pub(crate) struct CatalogServerState {
     pub(crate) leases: KnownLeases,
-    pub(crate) claim_start: ClaimStart,
+    pub(crate) claim_tracker: ClaimTracker,
     /// Whether the counters of all earlier slots were added up over this connection.
     pub(crate) has_folded_all: bool,
     pub(crate) worker_lock: WorkerLock,
@@ -244,7 +244,7 @@ impl WriteConnection {
             rollback(&mut self.conn).await;
         }
         if let Some(server) = &mut self.server {
-            server.state.claim_start.begin_again();
+            server.state.claim_tracker.begin_again();
         }
         self.check_log().await?;
         outcome
