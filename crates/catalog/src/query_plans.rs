@@ -82,7 +82,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
 async fn recovery_and_holders_use_the_index_of_leases() {
     for sql in [
         recovery::RECOVER.of::<PairJob>(),
-        recovery::LEFT_BY.into(),
+        recovery::ORPHANED.into(),
         recovery::OVERDUE.of::<PairJob>(),
         recovery::HOLDERS.into(),
         recovery::AFFECTED.of::<PairJob>(),

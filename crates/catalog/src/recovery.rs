@@ -20,7 +20,7 @@ impl Catalog {
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         in_transaction!(self, |conn| {
             let workers = mark_dead(conn, &dead).await?;
-            let items = recovery::left_by(conn, &workers).await?;
+            let items = recovery::orphaned(conn, &workers).await?;
             let deaths = recovery::deaths(conn).await?;
             let left = [&*workers, &items];
             let pairs = recovery::recover::<PairJob>(conn, left, deaths, now).await?;

@@ -317,7 +317,7 @@ impl PairFields {
             depth_from_plane: scale.map(|scale| scale.depth_from_plane),
             height_from_mesh: plane_from_mesh
                 .zip(scale)
-                .map(|(plane, scale)| HeightFromMesh::new(&plane, scale.bow.as_ref())),
+                .map(|(plane, scale)| HeightFromMesh::new(&plane, scale.curvature.as_ref())),
             height_min: scale.map(|scale| scale.height_min),
             height_per_level: scale.map(|scale| scale.height_per_level),
             mesh_unit_per_px: scale.map(|scale| scale.mesh_unit_per_px),
@@ -325,7 +325,7 @@ impl PairFields {
             depth_size_px: outcomes.map(|found| [found.depth.width, found.depth.height]),
             threshold_print: ink.map(|ink| ink.threshold_print),
             light_on_dark: ink.map(|ink| ink.light_on_dark),
-            print_orientation: outcomes.and_then(|found| found.normalize.print_turned),
+            print_orientation: outcomes.and_then(|found| found.normalize.print_orientation),
             canvas_px: outcomes.map(|found| found.normalize.canvas_px),
             canvas_from_print: ink.map(|ink| ink.canvas_from_print),
             picture_from_print: outcomes.map(|_| Affine2::IDENTITY),

@@ -73,7 +73,7 @@ SELECT w.id FROM json_each(?1) AS seen CROSS JOIN worker AS w ON w.id = CAST(see
 WHERE w.heartbeat = CAST(seen.value ->> 1 AS bigint)";
 
 /// Selects the given workers that hold leases, of pairs or blocks. `died` is 1 if the worker did not end properly.
-pub(crate) const LEFT_BY: &str = "
+pub(crate) const ORPHANED: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases FROM (
         SELECT worker FROM job WHERE status = 1 AND worker IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
         UNION ALL
@@ -177,7 +177,7 @@ impl Catalog {
     }
 }
 
-/// Recovers the jobs of dead workers, given as a JSON array and as the items of [`left_by`].
+/// Recovers the jobs of dead workers, given as a JSON array and as the items of [`orphaned`].
 pub(crate) async fn recover<K: StoredKind>(
     conn: &mut Conn,
     [workers, items]: [&str; 2],
@@ -209,8 +209,8 @@ pub(crate) async fn deaths(conn: &mut Conn) -> Result<i64> {
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
-pub(crate) async fn left_by(conn: &mut Conn, workers: &str) -> Result<String> {
-    let found: Vec<(i64, bool, i64)> = query_as(LEFT_BY).bind(workers).fetch_all(conn).await?;
+pub(crate) async fn orphaned(conn: &mut Conn, workers: &str) -> Result<String> {
+    let found: Vec<(i64, bool, i64)> = query_as(ORPHANED).bind(workers).fetch_all(conn).await?;
     let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
         json!([worker, i64::from(died), i64::from(blamed)])

@@ -124,7 +124,7 @@ pub(crate) fn exclusive_texts() -> [String; 2] {
 
 /// Where a claim on a server begins: behind this pair among those with the same next stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Behind {
+pub(crate) struct ClaimCursor {
     /// The next stage.
     pub(crate) turn: Cursor,
     pub(crate) pair: i64,
@@ -132,7 +132,7 @@ pub(crate) struct Behind {
     pub(crate) or_anywhere: bool,
 }
 
-impl Behind {
+impl ClaimCursor {
     /// Begins behind the pair of a lease.
     pub(crate) const fn pair_of(lease: &Lease) -> Self {
         Self {
@@ -161,7 +161,7 @@ impl Behind {
 pub(crate) async fn claim<K: StoredKind>(
     conn: &mut Conn,
     request: &ClaimRequest<K>,
-    behind: Option<Behind>,
+    behind: Option<ClaimCursor>,
 ) -> Result<Vec<Lease<K>>> {
     let text = match (&request.among, request.exclusive, behind) {
         (Some(_), false, _) => &CLAIM_AMONG,

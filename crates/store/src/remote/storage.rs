@@ -10,7 +10,7 @@ use super::bucket_error::BucketError;
 use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
 use super::pack::{key, read_pack};
-use super::recent::Recent;
+use super::small_cache::SmallCache;
 use mocban_core::domain::is_address;
 
 /// The settings of a storage.
@@ -43,9 +43,9 @@ pub struct ProjectStorage {
     cache: ObjectCache,
     lists: FolderLists,
     /// Packs read last.
-    packs: Recent<Arc<Vec<u8>>>,
+    packs: SmallCache<Arc<Vec<u8>>>,
     /// Lengths in bytes of the packs asked for last.
-    lengths: Recent<u64>,
+    lengths: SmallCache<u64>,
 }
 
 /// Why a storage cannot be used.
@@ -152,8 +152,8 @@ impl ProjectStorage {
             roots,
             cache: ObjectCache::new(cache, options.cache_bytes),
             lists: FolderLists::default(),
-            packs: Recent::default(),
-            lengths: Recent::default(),
+            packs: SmallCache::default(),
+            lengths: SmallCache::default(),
         }))
     }
 
@@ -166,8 +166,8 @@ impl ProjectStorage {
             roots: BTreeMap::from([("scans".to_owned(), Root::Bucket(bucket.clone()))]),
             cache: ObjectCache::new(cache, 1 << 20),
             lists: FolderLists::default(),
-            packs: Recent::default(),
-            lengths: Recent::default(),
+            packs: SmallCache::default(),
+            lengths: SmallCache::default(),
         };
         (storage, bucket)
     }

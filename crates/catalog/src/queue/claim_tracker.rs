@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::queue::claim::ClaimRequest;
 use crate::queue::counters::cursor;
 use crate::queue::lease::Lease;
-use crate::queue::server_claim::Behind;
+use crate::queue::server_claim::ClaimCursor;
 use mocban_core::domain::{Stage, WorkerId};
 
 /// Time between searches from the beginning, which find earlier pairs that other processes made ready.
@@ -24,25 +24,25 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 /// Where the claims of this process begin.
 #[derive(Debug, Default)]
-pub(crate) struct ClaimStart {
+pub(crate) struct ClaimTracker {
     /// Position of the last claimed pair, and the last stage that the claim permitted.
-    last: Option<(Behind, Stage)>,
+    last: Option<(ClaimCursor, Stage)>,
     /// `None` if the next claim must search from the beginning.
     search_all_at: Option<Instant>,
     /// A worker whose last claim found too few pairs, and the end of its pause.
     pause: Option<(WorkerId, Instant)>,
 }
 
-impl ClaimStart {
+impl ClaimTracker {
     /// Returns where a claim begins, or `None` if it begins at the first pair.
-    pub(crate) fn of(&self, request: &ClaimRequest, now: Instant) -> Option<Behind> {
+    pub(crate) fn of(&self, request: &ClaimRequest, now: Instant) -> Option<ClaimCursor> {
         let (last, until) = self.last?;
         let is_due = self.search_all_at.is_none_or(|at| at <= now);
         if is_due || until != request.until || !Self::applies_to(request) {
             return None;
         }
         let is_paused = |(worker, end)| worker == request.worker && now < end;
-        Some(Behind {
+        Some(ClaimCursor {
             or_anywhere: !self.pause.is_some_and(is_paused),
             ..last
         })
@@ -52,7 +52,7 @@ impl ClaimStart {
     pub(crate) fn note(
         &mut self,
         request: &ClaimRequest,
-        behind: Option<Behind>,
+        behind: Option<ClaimCursor>,
         leases: &[Lease],
         times: [Instant; 2],
     ) {
@@ -79,7 +79,7 @@ impl ClaimStart {
             (None, _) => leases.last(),
         };
         if let Some(lease) = next {
-            self.last = Some((Behind::pair_of(lease), request.until));
+            self.last = Some((ClaimCursor::pair_of(lease), request.until));
         }
     }
 
@@ -107,10 +107,10 @@ impl ClaimStart {
 
 #[cfg(test)]
 mod tests {
-    use super::{ClaimStart, PAUSE, SEARCH_ALL_EVERY};
+    use super::{ClaimTracker, PAUSE, SEARCH_ALL_EVERY};
     use crate::queue::claim::ClaimRequest;
     use crate::queue::lease::Lease;
-    use crate::queue::server_claim::Behind;
+    use crate::queue::server_claim::ClaimCursor;
     use mocban_core::domain::{PairId, Stage, WorkerId};
     use std::time::Instant;
 
@@ -131,8 +131,8 @@ mod tests {
         }
     }
 
-    const fn behind(pair: i64, or_anywhere: bool) -> Behind {
-        Behind {
+    const fn behind(pair: i64, or_anywhere: bool) -> ClaimCursor {
+        ClaimCursor {
             turn: 0,
             pair,
             or_anywhere,
@@ -140,8 +140,8 @@ mod tests {
     }
 
     /// Returns a start after a claim of one slot that leased pair 7.
-    fn after_one(now: Instant) -> ClaimStart {
-        let mut start = ClaimStart::default();
+    fn after_one(now: Instant) -> ClaimTracker {
+        let mut start = ClaimTracker::default();
         assert_eq!(start.of(&request(1), now), None);
         start.note(&request(1), None, &[lease(7, Stage::Fit)], [now; 2]);
         start
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn slow_searches_from_the_beginning_are_rarer() {
         let now = Instant::now();
-        let mut start = ClaimStart::default();
+        let mut start = ClaimTracker::default();
         let ended = now + SEARCH_ALL_EVERY / 10;
         start.note(&request(1), None, &[lease(7, Stage::Fit)], [now, ended]);
         let later = ended + SEARCH_ALL_EVERY;
@@ -211,7 +211,7 @@ mod tests {
             until,
             ..request(1)
         };
-        let mut start = ClaimStart::default();
+        let mut start = ClaimTracker::default();
         start.note(&one, None, &[lease(7, Stage::Fit)], [now; 2]);
         start.note_release(&lease(7, Stage::Depth));
         assert_eq!(start.of(&one, now), Some(behind(7, true)));

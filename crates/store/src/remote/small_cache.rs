@@ -10,15 +10,15 @@ const MAX_VALUES: usize = 16;
 
 /// The values of the names used last, newest first.
 #[derive(Debug)]
-pub(super) struct Recent<T>(Mutex<VecDeque<(String, T)>>);
+pub(super) struct SmallCache<T>(Mutex<VecDeque<(String, T)>>);
 
-impl<T> Default for Recent<T> {
+impl<T> Default for SmallCache<T> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<T: Clone> Recent<T> {
+impl<T: Clone> SmallCache<T> {
     /// Returns the value of a name, or computes it. Threads that need the same value may compute it twice.
     pub(super) fn get_or_insert(
         &self,

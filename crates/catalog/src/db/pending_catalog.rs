@@ -16,7 +16,7 @@ use mocban_system::platform::{let_all_read, open_folder, sync_file, sync_names};
 
 /// A catalog file under a hidden name. The file is removed when this value is dropped.
 #[derive(Debug)]
-pub(crate) struct UnplacedFile {
+pub(crate) struct PendingCatalog {
     file: TempPath,
     sidecars: HiddenSidecars,
     target: PathBuf,
@@ -37,7 +37,7 @@ impl Drop for HiddenSidecars {
     }
 }
 
-impl UnplacedFile {
+impl PendingCatalog {
     /// Creates an empty file beside `target`, and removes the files of creators that were killed.
     ///
     /// # Errors
