@@ -202,8 +202,8 @@ fn with_unmatched(
     let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
     let unmatched = Unmatched::of(canvas, range);
     PoseFeatures {
-        unmatched_tops: unmatched.unmatched_tops,
-        unmatched_ink: unmatched.unmatched_ink,
+        unmatched_tops: unmatched.tops,
+        unmatched_ink: unmatched.ink,
         edge_scatter: unmatched.edge_scatter,
         ink_area: unmatched.ink_area,
         ..features
