@@ -62,10 +62,16 @@ fn shown(tab: &Tab<'_>) -> String {
         .to_owned()
 }
 
-/// Waits until the next item is prefetched, presses a verdict key, and waits until the next item is shown.
+/// Waits until the next item is prefetched and no answer waits for the server, which accepts at most three at a time.
+pub(crate) fn accepts_an_answer(tab: &Tab<'_>) {
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    tab.wait("!document.getElementById('saved').classList.contains('waiting')");
+}
+
+/// Presses a verdict key as soon as the page is ready, and waits until the next item is shown.
 pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     let before = shown(tab);
-    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+    accepts_an_answer(tab);
     tab.key(key);
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::browser::{Browser, Tab};
 use crate::page::{Page, open_review, read_project};
-use crate::review_browser::{PLAIN, enter, judge, on_a_page_of};
+use crate::review_browser::{PLAIN, accepts_an_answer, enter, judge, on_a_page_of};
 
 /// Position and size of the large image.
 fn picture(tab: &Tab<'_>) -> Value {
@@ -158,7 +158,7 @@ fn the_end_page_sums_up_and_names_the_next_commands() {
         for _ in 1..all as usize {
             judge(&tab, key);
         }
-        tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
+        accepts_an_answer(&tab);
         tab.key(key);
         tab.wait("document.getElementById('end').dataset.ready");
         tab.screenshot(&format!("end-{reviewer}"));
