@@ -270,11 +270,11 @@ pub struct PoseFeatures {
     #[serde(default)]
     pub spread: f64,
     /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
-    #[serde(default)]
-    pub tops_alone: f64,
+    #[serde(default, rename = "tops_alone")]
+    pub unmatched_tops: f64,
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
-    #[serde(default)]
-    pub ink_alone: f64,
+    #[serde(default, rename = "ink_alone")]
+    pub unmatched_ink: f64,
     /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a share of the stroke
     /// width.
     #[serde(default)]

@@ -98,7 +98,7 @@ pub(super) fn of_character(features: &PoseFeatures) -> f64 {
 /// often have tops without ink together with ink without tops, or tops without ink together with sharp edges. A stroke
 /// without a partner says less if the character has many strokes.
 fn character_inputs(features: &PoseFeatures) -> [f64; CHARACTER_INPUTS] {
-    let (tops, ink) = (features.tops_alone, features.ink_alone);
+    let (tops, ink) = (features.unmatched_tops, features.unmatched_ink);
     let size = |area: f64| (area / SMALL_AREA).ln_1p();
     let scatter = features.edge_scatter.min(ROUGHEST);
     let [one, correlation, tops_covered, ink_covered, other, mirrored] = pose_inputs(features);
@@ -180,8 +180,8 @@ mod tests {
         other_angle: 0.3,
         mirrored: 0.4,
         spread: 0.0,
-        tops_alone: 0.0,
-        ink_alone: 0.0,
+        unmatched_tops: 0.0,
+        unmatched_ink: 0.0,
         edge_scatter: 0.03,
         ink_area: 40.0,
     };
@@ -234,10 +234,10 @@ mod tests {
 
     #[test]
     fn strokes_without_a_partner_are_evidence_against_the_character() {
-        let probability = |tops_alone, ink_alone, edge_scatter, ink_area| {
+        let probability = |unmatched_tops, unmatched_ink, edge_scatter, ink_area| {
             of_character(&PoseFeatures {
-                tops_alone,
-                ink_alone,
+                unmatched_tops,
+                unmatched_ink,
                 edge_scatter,
                 ink_area,
                 other_angle: 0.7,
@@ -258,8 +258,8 @@ mod tests {
     #[test]
     fn a_close_competitor_is_evidence_against_the_character() {
         let strokes = PoseFeatures {
-            tops_alone: 0.8,
-            ink_alone: 0.8,
+            unmatched_tops: 0.8,
+            unmatched_ink: 0.8,
             edge_scatter: 0.08,
             ..PLAIN
         };

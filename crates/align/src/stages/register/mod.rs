@@ -202,8 +202,8 @@ fn with_unmatched(
     let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
     let unmatched = Unmatched::of(canvas, range);
     PoseFeatures {
-        tops_alone: unmatched.tops_alone,
-        ink_alone: unmatched.ink_alone,
+        unmatched_tops: unmatched.tops,
+        unmatched_ink: unmatched.ink,
         edge_scatter: unmatched.edge_scatter,
         ink_area: unmatched.ink_area,
         ..features

@@ -171,8 +171,8 @@ impl CompetingPoses {
             mirrored,
             spread,
             // Measured when the thresholds are known.
-            tops_alone: 0.0,
-            ink_alone: 0.0,
+            unmatched_tops: 0.0,
+            unmatched_ink: 0.0,
             edge_scatter: 0.0,
             ink_area: 0.0,
         }
