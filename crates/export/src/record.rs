@@ -325,7 +325,7 @@ impl PairFields {
             depth_size_px: outcomes.map(|found| [found.depth.width, found.depth.height]),
             threshold_print: ink.map(|ink| ink.threshold_print),
             light_on_dark: ink.map(|ink| ink.light_on_dark),
-            print_orientation: outcomes.and_then(|found| found.normalize.print_turned),
+            print_orientation: outcomes.and_then(|found| found.normalize.print_orientation),
             canvas_px: outcomes.map(|found| found.normalize.canvas_px),
             canvas_from_print: ink.map(|ink| ink.canvas_from_print),
             picture_from_print: outcomes.map(|_| Affine2::IDENTITY),

@@ -221,9 +221,11 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
         format!("print threshold {threshold:.0} of 65535, {polarity}")
     };
     let texts: Vec<String> = found.inks.iter().map(text).collect();
-    let turned = found.print_turned.map_or_else(String::new, |orientation| {
-        format!("; turned upright by its EXIF orientation {orientation}")
-    });
+    let turned = found
+        .print_orientation
+        .map_or_else(String::new, |orientation| {
+            format!("; turned upright by its EXIF orientation {orientation}")
+        });
     format!("{}{turned}", texts.join("; or "))
 }
 

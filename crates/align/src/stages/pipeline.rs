@@ -89,7 +89,7 @@ pub fn normalize(
             paper_method::normalize::normalize(depth, print, &settings.normalize)
         }
     }?;
-    normalized.outcome.print_turned = print.image().turned;
+    normalized.outcome.print_orientation = print.image().turned;
     Ok(normalized)
 }
 

@@ -216,8 +216,12 @@ pub struct NormalizeOutcome {
     /// ensemble. The default method selects none.
     pub thresholds: Vec<ThresholdChoice>,
     /// EXIF orientation of the print (2 to 8), if its pixels were turned to make it upright.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub print_turned: Option<u8>,
+    #[serde(
+        default,
+        rename = "print_turned",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub print_orientation: Option<u8>,
 }
 
 /// Similarity of the print mask and the depth mask of a metric on the canvas. See `stages::score` for the formulas.
