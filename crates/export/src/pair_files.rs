@@ -204,7 +204,7 @@ fn sidecar(scale: &DepthScale) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,
-        curvature: scale.bow.map_or([0.0; 6], |bow| bow.0),
+        curvature: scale.curvature.map_or([0.0; 6], |curvature| curvature.0),
         mm_per_mesh_unit: scale.unit.map(LengthUnit::mm),
     };
     let text = serde_json::to_string_pretty(&sidecar)

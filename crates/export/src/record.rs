@@ -317,7 +317,7 @@ impl PairFields {
             depth_from_plane: scale.map(|scale| scale.depth_from_plane),
             height_from_mesh: plane_from_mesh
                 .zip(scale)
-                .map(|(plane, scale)| HeightFromMesh::new(&plane, scale.bow.as_ref())),
+                .map(|(plane, scale)| HeightFromMesh::new(&plane, scale.curvature.as_ref())),
             height_min: scale.map(|scale| scale.height_min),
             height_per_level: scale.map(|scale| scale.height_per_level),
             mesh_unit_per_px: scale.map(|scale| scale.mesh_unit_per_px),

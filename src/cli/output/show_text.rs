@@ -198,12 +198,12 @@ fn numbers(record: &StageRecord, unit: &str) -> String {
 }
 
 fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
-    let bow = match fit.bow {
-        Some(_) => format!(", curvature {:.3} {unit}", fit.bow_height),
+    let curvature = match fit.curvature {
+        Some(_) => format!(", curvature {:.3} {unit}", fit.curvature_height),
         None => String::new(),
     };
     format!(
-        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
+        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }

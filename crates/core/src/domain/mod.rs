@@ -58,7 +58,7 @@ pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
-    Bow, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
+    Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };

@@ -10,17 +10,17 @@ use super::{Affine2, LengthUnit, PrintOutline, Rigid3, ThresholdMetric};
 ///
 /// The height over the plane is `z = c[0] + c[1] x + c[2] y + c[3] x^2 + c[4] x y + c[5] y^2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Bow(pub [f64; 6]);
+pub struct Curvature(pub [f64; 6]);
 
-impl Bow {
+impl Curvature {
     /// Returns the height of the surface at a point of the plane, in mesh units.
     ///
     /// # Examples
     /// ```
-    /// use mocban_core::domain::Bow;
+    /// use mocban_core::domain::Curvature;
     ///
-    /// let bow = Bow([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]);
-    /// assert_eq!(bow.height(2.0, 9.0), 2.0);
+    /// let curvature = Curvature([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]);
+    /// assert_eq!(curvature.height(2.0, 9.0), 2.0);
     /// ```
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let c = &self.0;
@@ -66,9 +66,11 @@ pub struct FitOutcome {
     /// Maps mesh coordinates to the right-handed plane frame, in mesh units. The z axis points out of the block.
     pub plane_from_mesh: Rigid3,
     /// Curved surface of the stroke tops. `None` if the block is flat.
-    pub bow: Option<Bow>,
+    #[serde(rename = "bow")]
+    pub curvature: Option<Curvature>,
     /// Largest minus smallest height of the curved surface within the scan's bounds, in mesh units; 0 for a flat block.
-    pub bow_height: f64,
+    #[serde(rename = "bow_height")]
+    pub curvature_height: f64,
     /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
     /// Root mean square distance of the inliers to the surface, in mesh units.
@@ -101,7 +103,8 @@ pub struct DepthScale {
     /// Maps plane x, y to depth-map pixels. Includes a reflection, so that the depth map reads like the print.
     pub depth_from_plane: Affine2,
     /// Curved surface from which heights are measured; `None` for the plane.
-    pub bow: Option<Bow>,
+    #[serde(rename = "bow")]
+    pub curvature: Option<Curvature>,
     /// Unit of the mesh, if known.
     pub unit: Option<LengthUnit>,
 }
@@ -190,7 +193,7 @@ impl ReliefHeights {
     ///     height_per_level: 0.001,
     ///     mesh_unit_per_px: 0.02,
     ///     depth_from_plane: Affine2::IDENTITY,
-    ///     bow: None,
+    ///     curvature: None,
     ///     unit: None,
     /// };
     /// let level = relief.level_at(&scale, relief.tops_end);

@@ -50,7 +50,7 @@ const LEAST_GROUND: f64 = 0.3;
 const SPARSE: f64 = 0.2;
 /// Soft tops fall to zero at this share of the relief below the surface.
 const SOFT_SPAN: f64 = 0.5;
-/// Ratio of supports by which a bow must beat the plane.
+/// Ratio of supports by which a curved surface must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in units of the extent, and how well it fits.

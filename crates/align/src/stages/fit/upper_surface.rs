@@ -104,8 +104,8 @@ pub fn fit(
 fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
     FitOutcome {
         plane_from_mesh: fine.plane_from_mesh,
-        bow: fine.bow,
-        bow_height: fine.bow_height,
+        curvature: fine.curvature,
+        curvature_height: fine.curvature_height,
         inlier_ratio: fine.surface.tops,
         rms: fine.surface.rms,
         relief: fine.relief,

@@ -225,7 +225,7 @@ impl SideSearch<'_> {
 /// Cuts off the area that lies deeper than any carving, such as the foot of a block or a table below it. Returns `None`
 /// if that area is a small share of the visible area, or if almost nothing would remain.
 fn without_depths(mesh: &Mesh, side: &FittedSide) -> Option<Mesh> {
-    let deepest = -DEEPEST_CARVING * side.extent - side.bow_height;
+    let deepest = -DEEPEST_CARVING * side.extent - side.curvature_height;
     let heights = side.samples.residuals(&side.surface);
     let deep = heights.iter().filter(|height| **height < deepest).count();
     if (deep as f64) < DEEP_AREA * heights.len() as f64 {
@@ -270,7 +270,7 @@ fn bounds(mesh: &Mesh, frame: &Rigid3) -> [[f64; 3]; 2] {
 
 /// Returns the height over the plane, in mesh units, above which nothing belongs to the carving.
 fn top(side: &FittedSide) -> f64 {
-    HIGHEST * side.relief + side.bow_height
+    HIGHEST * side.relief + side.curvature_height
 }
 
 /// Returns whether a side shows floating debris or spikes above the carving.
@@ -299,7 +299,7 @@ pub(super) fn region(
         .iter()
         .map(|vertex| box_from_mesh.apply(vertex)[2]);
     let lowest = heights.fold(f64::INFINITY, f64::min) - slack;
-    let down = lowest.max(-DEEPEST * side.relief - side.bow_height);
+    let down = lowest.max(-DEEPEST * side.relief - side.curvature_height);
     ScanRegion {
         box_from_mesh,
         bounds: [
