@@ -349,7 +349,7 @@ async fn verdicts_make_acc(run: &FinishedRun) {
         reviewer: "lan".to_owned(),
         reason: None,
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     };
     let set = vec![

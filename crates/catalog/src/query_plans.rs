@@ -150,8 +150,8 @@ async fn jobs_are_counted_by_ranges_of_their_key() {
 
 #[tokio::test]
 async fn inspected_jobs_are_found_by_key() {
-    let among = plan(staleness::INSPECT).await;
-    assert_only(&among, &["VIRTUAL TABLE", "SCAN found"]);
+    let selection = plan(staleness::INSPECT).await;
+    assert_only(&selection, &["VIRTUAL TABLE", "SCAN found"]);
 }
 
 #[tokio::test]

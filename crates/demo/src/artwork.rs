@@ -16,7 +16,7 @@ const MARGIN_MM: f64 = 2.2;
 const STEP_MM: f64 = 0.035;
 /// Sample spacing for scenes that show 3 x 3 characters, mm.
 const WIDE_STEP_MM: f64 = 0.05;
-/// Margin of crops that show 3 x 3 characters, as a share of the character's size.
+/// Margin of crops that show 3 x 3 characters, as a fraction of the character's size.
 pub(super) const WIDE_MARGIN: f64 = 1.1;
 /// Minimum gap between the character and its neighbours, mm.
 const CLEARANCE_MM: f64 = 0.35;

@@ -107,7 +107,7 @@ impl Inking {
         })
     }
 
-    /// Returns the share of ink that is missing inside a stroke because of dry patches and gaps.
+    /// Returns the fraction of ink that is missing inside a stroke because of dry patches and gaps.
     fn missing_share(&self, point: [f64; 2], px_mm: f64) -> f64 {
         let [u, v] = point;
         let dry = self.dryness * smoothstep(0.0, 0.8, self.dry_patches.at(u / 2.4, v / 2.4));

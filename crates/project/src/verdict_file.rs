@@ -173,7 +173,7 @@ fn row(
         metric: cell(3).map(|text| value(text, line)).transpose()?,
         reason: cell(4).map(|text| value(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     let judged = None;

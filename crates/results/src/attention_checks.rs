@@ -96,7 +96,7 @@ pub async fn answers_by_reviewer(
 /// Returns a reviewer's newest answer to each item. `answers` must be sorted with the oldest first.
 pub fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
-        let hashes = (answer.result_hash, answer.look.seen);
+        let hashes = (answer.result_hash, answer.context.seen);
         (answer.pair.clone(), answer.check.name(), hashes)
     };
     let newest: BTreeMap<_, _> = answers

@@ -274,7 +274,7 @@ mod tests {
             reviewer: "lan".to_owned(),
             reason: None,
             note: None,
-            look: ReviewContext::default(),
+            context: ReviewContext::default(),
             at: 0,
             undone_at: None,
         }

@@ -17,12 +17,12 @@ const PAGE: usize = 1_000;
 pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
-    among: Option<&PairSelection>,
+    selection: Option<&PairSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
     let read = async |after| {
         let page = catalog
-            .retry_while_unavailable(async || catalog.known_inputs(after, PAGE, among).await);
+            .retry_while_unavailable(async || catalog.known_inputs(after, PAGE, selection).await);
         page.await
     };
     let mut page = read(None).await?;
@@ -63,9 +63,11 @@ pub(super) async fn store_inputs_of_quarantined(
         number,
         "pairs failed because their workers died or hung, several times or alone"
     );
-    let among = PairSelection::of(pairs);
+    let selection = PairSelection::of(pairs);
     let known = catalog.retry_while_unavailable(async || {
-        catalog.known_inputs(None, pairs.len(), Some(&among)).await
+        catalog
+            .known_inputs(None, pairs.len(), Some(&selection))
+            .await
     });
     let known = known.await?;
     let unread = known.into_iter().map(|known| UnreadInputs {

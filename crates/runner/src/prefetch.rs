@@ -279,7 +279,7 @@ impl Prefetch {
             slots: count,
             until: context.until,
             exclusive,
-            among: self.selection.clone(),
+            selection: self.selection.clone(),
             deadline: context.deadline() + wait,
             alive_since: context.alive_since(),
         };

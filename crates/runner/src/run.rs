@@ -198,8 +198,8 @@ impl RunStart<'_> {
         let ended = catalog
             .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
         ended.await?;
-        let among = self.selection.map(|selection| &selection.blocks);
-        let what = (options.rerun, among);
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let what = (options.rerun, blocks);
         plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
     }
 

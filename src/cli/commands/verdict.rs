@@ -121,7 +121,7 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         reviewer: args.reviewer,
         reason: args.reason,
         note: args.note,
-        look: ReviewContext {
+        context: ReviewContext {
             angle_read_deg: args.angle,
             ..ReviewContext::default()
         },
@@ -294,16 +294,16 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         palette.paint(tone, event.verdict),
         event.reviewer.clone(),
         event.reason.map_or("", Reason::name).to_owned(),
-        view_text(&event.look),
+        view_text(&event.context),
         event.note.clone().unwrap_or_default(),
         state,
     ]
 }
 
 /// Formats how long the result was shown, and by how many degrees the reviewer would still rotate the relief.
-fn view_text(look: &ReviewContext) -> String {
-    let shown = look.shown_ms.map(duration);
-    let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
+fn view_text(context: &ReviewContext) -> String {
+    let shown = context.shown_ms.map(duration);
+    let angle = context.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();
     parts.join(" ")
 }

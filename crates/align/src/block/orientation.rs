@@ -22,7 +22,7 @@ const SIDE_BY_DEVIATION: f64 = 3.464_101_615_137_754_6;
 const REACH: f64 = 3.0;
 /// Margin of the extent, mm.
 const EXTENT_MARGIN_MM: f64 = 3.0;
-/// Thickness of the layer of a face, as a share of the long side: 12 mm of 320 mm.
+/// Thickness of the layer of a face, as a fraction of the long side: 12 mm of 320 mm.
 const LAYER_SHARE: f64 = 0.0375;
 /// Area looks along a direction if the cosine is at least this.
 const ALONG: f64 = 0.85;

@@ -50,7 +50,7 @@ impl OutstandingBlocks {
 }
 
 impl Catalog {
-    /// Leases one ready block, with the data that its stages need. If `among` is given, considers only its blocks.
+    /// Leases one ready block, with the data that its stages need. If `selection` is given, considers only its blocks.
     /// Returns `None` if no block is ready, or if the worker has ended or its last heartbeat is before `alive_since`. A
     /// worker has at most one block: it gets the same lease again if the reply to the claim before was lost.
     pub async fn claim_block(
@@ -58,14 +58,14 @@ impl Catalog {
         worker: WorkerId,
         deadline: UnixMillis,
         alive_since: UnixMillis,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<Option<(Lease<BlockJob>, BlockWork)>> {
         let request = ClaimRequest {
             worker,
             slots: 1,
             until: BlockStage::Cut,
             exclusive: false,
-            among: among.cloned(),
+            selection: selection.cloned(),
             deadline,
             alive_since,
         };
@@ -134,14 +134,14 @@ impl Catalog {
         })
     }
 
-    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `among` is given, counts only
+    /// Counts the blocks that are ready, leased or backing off, and the failed ones. If `selection` is given, counts only
     /// its blocks.
     pub async fn outstanding_blocks(
         &self,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<OutstandingBlocks> {
         let mut conn = self.read_conn().await?;
-        let counts = query_as(OUTSTANDING).bind(among.map(BlockSelection::json));
+        let counts = query_as(OUTSTANDING).bind(selection.map(BlockSelection::json));
         counts.fetch_one(&mut conn).await
     }
 

@@ -200,16 +200,16 @@ impl PlannedBlock {
 }
 
 impl Catalog {
-    /// Returns the blocks that a run with these settings would work on, and why. If `among` is given, considers only
+    /// Returns the blocks that a run with these settings would work on, and why. If `selection` is given, considers only
     /// its blocks.
     pub async fn plan_blocks(
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<Vec<BlockPlanEntry>> {
         let mut conn = self.snapshot().await?;
-        let planned = decisions(&mut conn, settings, policy, among).await?;
+        let planned = decisions(&mut conn, settings, policy, selection).await?;
         let entries = planned.into_iter().map(|(job, from, why)| BlockPlanEntry {
             block: job.attributes.name,
             from,
@@ -218,17 +218,17 @@ impl Catalog {
         Ok(entries.collect())
     }
 
-    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `among` is given,
+    /// Requeues blocks whose settings or inputs changed, and blocks that `policy` selects. If `selection` is given,
     /// considers only its blocks. Returns their number.
     pub async fn requeue_stale_blocks(
         &self,
         settings: &BlockSettings,
         policy: RerunPolicy,
-        among: Option<&BlockSelection>,
+        selection: Option<&BlockSelection>,
     ) -> Result<u64> {
-        let (settings, among) = (settings.clone(), among.cloned());
+        let (settings, selection) = (settings.clone(), selection.cloned());
         in_transaction!(self, |conn| {
-            let decided = decisions(conn, &settings, policy, among.as_ref()).await?;
+            let decided = decisions(conn, &settings, policy, selection.as_ref()).await?;
             let stale = decided.iter().filter(|(job, from, why)| {
                 let waits = matches!(why, BlockReason::New | BlockReason::Unfinished);
                 !waits || job.next() != Some(*from)
@@ -253,7 +253,7 @@ async fn decisions(
     conn: &mut Conn,
     settings: &BlockSettings,
     policy: RerunPolicy,
-    among: Option<&BlockSelection>,
+    selection: Option<&BlockSelection>,
 ) -> Result<Vec<(PlannedBlock, BlockStage, BlockReason)>> {
     let jobs: Vec<PlannedBlock> = query_as(JOBS).fetch_all(&mut *conn).await?;
     let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, MadeWith>> = BTreeMap::new();
@@ -264,7 +264,8 @@ async fn decisions(
     }
     let none = BTreeMap::new();
     let wanted = jobs.into_iter();
-    let wanted = wanted.filter(|job| among.is_none_or(|among| among.contains(job.block)));
+    let wanted =
+        wanted.filter(|job| selection.is_none_or(|selection| selection.contains(job.block)));
     let decided = wanted.filter_map(|job| {
         let results = results.get(&job.block).unwrap_or(&none);
         let (from, why) = job.decide(results, settings, policy)?;

@@ -101,7 +101,7 @@ impl ClaimTracker {
 
     /// Returns whether claims of this kind have a start. Others are rare or read few jobs.
     const fn applies_to(request: &ClaimRequest) -> bool {
-        !request.exclusive && request.among.is_none()
+        !request.exclusive && request.selection.is_none()
     }
 }
 

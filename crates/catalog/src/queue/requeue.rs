@@ -86,7 +86,7 @@ WHERE named.name IN (SELECT atom FROM json_each(?1)) AND j.status IN (2, 4) ORDE
 );
 
 impl Catalog {
-    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `among` is given, considers
+    /// Requeues pairs whose settings or inputs changed, and pairs that `policy` selects. If `selection` is given, considers
     /// only its pairs. Returns the number of requeued pairs.
     ///
     /// # Errors
@@ -94,13 +94,13 @@ impl Catalog {
     pub async fn requeue_stale(
         &self,
         fingerprints: &Fingerprints,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
         policy: RerunPolicy,
     ) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;
         let mut moves = Vec::new();
-        if among.is_none() {
+        if selection.is_none() {
             // Jobs without the dirty mark are requeued in groups. Dirty and quarantined jobs are inspected below.
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
             let groups = groups(&mut conn, &chains).await?;
@@ -116,11 +116,11 @@ impl Catalog {
                 .requeue_pages(move |conn, after| Box::pin(requeue_group(conn, key, to, after)))
                 .await?;
         }
-        let among = among.cloned();
+        let selection = selection.cloned();
         requeued += self
             .requeue_pages(move |conn, after| {
-                let (current, among) = (current.clone(), among.clone());
-                Box::pin(requeue_inspected(conn, current, among, policy, after))
+                let (current, selection) = (current.clone(), selection.clone());
+                Box::pin(requeue_inspected(conn, current, selection, policy, after))
             })
             .await?;
         Ok(requeued)
@@ -229,19 +229,19 @@ async fn requeue_group(
 }
 
 /// Inspects one page of jobs whose pairs follow `after`, and requeues the stale ones. Returns their number, and the
-/// last pair of the page. If `among` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
+/// last pair of the page. If `selection` is `None`, inspects dirty and quarantined jobs, and unmarks jobs that are
 /// consistent again.
 async fn requeue_inspected(
     conn: &mut Conn,
     current: String,
-    among: Option<PairSelection>,
+    selection: Option<PairSelection>,
     policy: RerunPolicy,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let (jobs, last) = match &among {
+    let (jobs, last) = match &selection {
         None => inspect_marked(conn, &current, after).await?,
-        Some(among) => {
-            let jobs = inspect(conn, &current, after, among).await?;
+        Some(selection) => {
+            let jobs = inspect(conn, &current, after, selection).await?;
             let last = jobs.last().map(|(pair, _)| *pair);
             (jobs, last)
         }
@@ -252,7 +252,7 @@ async fn requeue_inspected(
         Some((KeyedJob { unit: pair, key }, cursor(to)))
     });
     let moved = requeue_counted(conn, &stale.collect::<Vec<_>>()).await?;
-    if let (None, Some(last)) = (among, last) {
+    if let (None, Some(last)) = (selection, last) {
         clear_dirty(conn, after, last).await?;
     }
     Ok((moved, last))

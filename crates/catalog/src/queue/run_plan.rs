@@ -17,11 +17,11 @@ impl Catalog {
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
         policy: RerunPolicy,
     ) -> Result<Plan> {
         let mut conn = self.snapshot().await?;
-        plan(&mut conn, fingerprints, among, policy).await
+        plan(&mut conn, fingerprints, selection, policy).await
     }
 
     /// Counts the pairs that have a result with outdated settings or inputs.
@@ -41,11 +41,17 @@ impl Catalog {
         fingerprints: &Fingerprints,
     ) -> Result<Option<PlanEntry>> {
         let mut conn = self.snapshot().await?;
-        let among = select(&mut conn, std::slice::from_ref(pair)).await?;
-        if among.is_empty() {
+        let selection = select(&mut conn, std::slice::from_ref(pair)).await?;
+        if selection.is_empty() {
             return Err(CatalogError::UnknownPair(pair.clone()));
         }
-        let plan = plan(&mut conn, fingerprints, Some(&among), RerunPolicy::Changed).await?;
+        let plan = plan(
+            &mut conn,
+            fingerprints,
+            Some(&selection),
+            RerunPolicy::Changed,
+        )
+        .await?;
         Ok(plan.entries.into_iter().next())
     }
 }
@@ -53,7 +59,7 @@ impl Catalog {
 async fn plan(
     conn: &mut Conn,
     fingerprints: &Fingerprints,
-    among: Option<&PairSelection>,
+    selection: Option<&PairSelection>,
     policy: RerunPolicy,
 ) -> Result<Plan> {
     let current = current_json(conn, fingerprints).await?;
@@ -63,10 +69,10 @@ async fn plan(
         Some(key) => *entries.entry(key).or_default() += pairs,
         None => plan.add_unchanged(job.key.status, pairs),
     };
-    if let Some(among) = among {
+    if let Some(selection) = selection {
         let mut after = Some(0);
         while let Some(from) = after {
-            let page = inspect(conn, &current, from, among).await?;
+            let page = inspect(conn, &current, from, selection).await?;
             after = page.last().map(|(pair, _)| *pair);
             for (_, job) in &page {
                 add(job, 1);

@@ -120,27 +120,33 @@ impl Catalog {
         })
     }
 
-    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `among`, counts
+    /// Counts the ready, leased and backing-off pairs whose next stage is `until` or earlier. Without `selection`, counts
     /// all pairs, but at most 1000 ready ones.
     pub async fn outstanding(
         &self,
         until: Stage,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
     ) -> Result<Outstanding> {
         let mut conn = self.read_conn().await?;
-        let query = match among {
+        let query = match selection {
             None => query_as(LEFT_ALL).bind(cursor(until)),
-            Some(among) => query_as(LEFT_AMONG).bind(cursor(until)).bind(&among.json),
+            Some(selection) => query_as(LEFT_AMONG)
+                .bind(cursor(until))
+                .bind(&selection.json),
         };
         query.fetch_one(&mut conn).await
     }
 
-    /// Counts the stages up to `until` that pairs have yet to run. Without `among`, reads the counters, not the jobs.
-    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+    /// Counts the stages up to `until` that pairs have yet to run. Without `selection`, reads the counters, not the jobs.
+    pub async fn work_left(
+        &self,
+        until: Stage,
+        selection: Option<&PairSelection>,
+    ) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
-        let query = match among {
+        let query = match selection {
             None => query_as(COUNT_ALL),
-            Some(among) => query_as(COUNT_AMONG).bind(&among.json),
+            Some(selection) => query_as(COUNT_AMONG).bind(&selection.json),
         };
         let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut conn).await?;
         let mut left = WorkLeft::default();

@@ -133,13 +133,13 @@ impl VerdictRowDraft<'_> {
     /// Returns whether the verdict counts as stored if it equals the reviewer's newest one. Without a time, a verdict with
     /// a context, such as an angle, is always new.
     fn is_compared_with_newest(&self) -> bool {
-        self.new.at.is_none() && self.new.look == ReviewContext::default()
+        self.new.at.is_none() && self.new.context == ReviewContext::default()
     }
 
     /// Returns the item for a statement. `first` is its number, or the number of its action.
     fn item(&self, first: i64, now: UnixMillis) -> Value {
         let Self { new, result, .. } = self;
-        let look = &new.look;
+        let context = &new.context;
         json!([
             first,
             result.pair,
@@ -150,11 +150,11 @@ impl VerdictRowDraft<'_> {
             new.reason.map(Reason::name),
             new.note,
             new.at.unwrap_or(now),
-            look.event,
-            look.seen,
-            look.shown_ms,
-            look.angle_read_deg,
-            look.review_order.map(ReviewOrder::name),
+            context.event,
+            context.seen,
+            context.shown_ms,
+            context.angle_read_deg,
+            context.review_order.map(ReviewOrder::name),
         ])
     }
 }
@@ -314,7 +314,7 @@ async fn without_stored<'v>(
         let content = candidate.content();
         let is_known = stored.contains(&number)
             || candidate.is_compared_with_newest() && last.get(&of_result) == Some(&content);
-        let event = candidate.new.look.event.clone();
+        let event = candidate.new.context.event.clone();
         if !is_known && event.is_none_or(|event| events.insert((event, candidate.result.metric))) {
             last.insert(of_result, content);
             new.push(candidate);
@@ -330,7 +330,7 @@ async fn stored_events(
 ) -> Result<BTreeSet<(String, ThresholdMetric)>> {
     let events: BTreeSet<_> = candidates
         .iter()
-        .filter_map(|new| new.new.look.event.as_deref())
+        .filter_map(|new| new.new.context.event.as_deref())
         .collect();
     if events.is_empty() {
         return Ok(BTreeSet::new());

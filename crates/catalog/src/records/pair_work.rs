@@ -89,22 +89,22 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `among` is given,
+    /// Returns the input files of up to `limit` pairs with ids above `after`, sorted by id. If `selection` is given,
     /// returns only its pairs. Returns an empty list at the end.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
         limit: usize,
-        among: Option<&PairSelection>,
+        selection: Option<&PairSelection>,
     ) -> Result<Vec<KnownInputs>> {
         let mut conn = self.read_conn().await?;
         let after = after.map_or(0, |pair| pair.0);
-        let query = match among {
+        let query = match selection {
             None => query_as(INPUTS).bind(after).bind(limit as i64),
-            Some(among) => query_as(INPUTS_AMONG)
+            Some(selection) => query_as(INPUTS_AMONG)
                 .bind(after)
                 .bind(limit as i64)
-                .bind(&among.json),
+                .bind(&selection.json),
         };
         query.fetch_all(&mut conn).await
     }

@@ -97,14 +97,14 @@ pub struct AttentionCheckAnswer {
     pub note: Option<String>,
     /// Context in which it was given.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
 }
 
-from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, look in row, at, undone_at } }
+from_row! { AttentionCheckAnswer { id, pair, metric, result_hash, check, verdict, reviewer, reason, note, context in row, at, undone_at } }
 
 const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
@@ -178,13 +178,13 @@ SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 A
 
 impl Catalog {
     /// Appends an answer to a shown item durably, even if the shown result is outdated. Returns `false`, and stores
-    /// nothing, if an answer with the same `look.event` exists.
+    /// nothing, if an answer with the same `context.event` exists.
     ///
     /// # Errors
     /// Returns an error if there is no such pair, if `shown` lists no result, or if a database operation fails.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         in_transaction!(self, |conn| {
-            let known = query_scalar(KNOWN).bind(&given.look.event);
+            let known = query_scalar(KNOWN).bind(&given.context.event);
             if known.fetch_one(&mut *conn).await? {
                 return Ok(false);
             }
@@ -300,17 +300,17 @@ async fn insert_check(
     check: &AttentionCheck,
     now: UnixMillis,
 ) -> Result<()> {
-    let look = &given.look;
+    let context = &given.context;
     let row: i64 = query_scalar(INSERT_CHECK)
-        .bind(&look.event)
+        .bind(&context.event)
         .bind(pair)
         .bind(metric.name())
         .bind(&result_hash.as_bytes()[..])
         .bind(check.name())
         .bind(serde_json::to_string(check)?)
-        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
-        .bind(look.shown_ms.map(u64::cast_signed))
-        .bind(look.angle_read_deg)
+        .bind(context.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(context.shown_ms.map(u64::cast_signed))
+        .bind(context.angle_read_deg)
         .bind(given.verdict.name())
         .bind(&given.reviewer)
         .bind(given.reason.map(Reason::name))

@@ -34,7 +34,7 @@ pub struct NewVerdict {
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When the verdict was given, if not at the time of storing.
     pub at: Option<UnixMillis>,
 }
@@ -62,7 +62,7 @@ pub struct VerdictEvent {
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
-    pub look: ReviewContext,
+    pub context: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was undone, if it was.
@@ -71,7 +71,7 @@ pub struct VerdictEvent {
     pub current: bool,
 }
 
-from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, look in row, at, undone_at, current } }
+from_row! { VerdictEvent { id, act, pair, metric, result_hash, verdict, reviewer, reason, note, context in row, at, undone_at, current } }
 
 /// A reviewer's newest verdict on a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -201,12 +201,12 @@ pub(crate) async fn insert(
     act: Option<i64>,
     now: UnixMillis,
 ) -> Result<Option<i64>> {
-    let look = &new.look;
+    let context = &new.context;
     let act = if let Some(act) = act {
         act
     } else {
         let begun = query_scalar(NEW_ACT).bind(&new.reviewer);
-        let begun = begun.bind(&look.event).bind(metric.name());
+        let begun = begun.bind(&context.event).bind(metric.name());
         let Some(act) = begun.fetch_optional(&mut *conn).await? else {
             return Ok(None);
         };
@@ -222,11 +222,11 @@ pub(crate) async fn insert(
         .bind(new.reason.map(Reason::name))
         .bind(&new.note)
         .bind(new.at.unwrap_or(now))
-        .bind(&look.event)
-        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
-        .bind(look.shown_ms.map(u64::cast_signed))
-        .bind(look.angle_read_deg)
-        .bind(look.review_order.map(ReviewOrder::name))
+        .bind(&context.event)
+        .bind(context.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(context.shown_ms.map(u64::cast_signed))
+        .bind(context.angle_read_deg)
+        .bind(context.review_order.map(ReviewOrder::name))
         .fetch_optional(&mut *conn)
         .await?;
     let Some(row) = inserted else {

@@ -31,10 +31,10 @@ impl Curvature {
 /// Evidence for the side of the plane that was chosen as the carved one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SideEvidence {
-    /// Share of the faces that are wound outward on the chosen side, weighted by projected area, 0..=1. `None` if there
-    /// are no faces, and under the paper's method.
+    /// Fraction of the faces that are wound outward on the chosen side, weighted by projected area, 0..=1. `None` if
+    /// there are no faces, and under the paper's method.
     pub winding: Option<f64>,
-    /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
+    /// Fraction of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's method
     /// stores `|a - b| / (a + b)` instead, where `a` and `b` measure the two sides: the mean distance of a side's
     /// points from their centroid.
     pub flatness: f64,
@@ -71,7 +71,7 @@ pub struct FitOutcome {
     /// Largest minus smallest height of the curved surface within the scan's bounds, in mesh units; 0 for a flat block.
     #[serde(rename = "bow_height")]
     pub curvature_height: f64,
-    /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
+    /// Fraction of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
     /// Root mean square distance of the inliers to the surface, in mesh units.
     pub rms: f64,
@@ -125,7 +125,7 @@ pub struct DepthOutcome {
     pub height: u32,
     /// Conversion of levels and pixels to mesh units.
     pub scale: DepthScale,
-    /// Share of pixels with data, 0..=1.
+    /// Fraction of pixels with data, 0..=1.
     pub coverage: f64,
 }
 
@@ -162,7 +162,7 @@ pub struct ReliefHeights {
     pub top: f64,
     /// Median height of the carved background, in mesh units.
     pub ground: f64,
-    /// Depth below `top` at which the stroke tops end and the walls begin, as a share of [`Self::depth`].
+    /// Depth below `top` at which the stroke tops end and the walls begin, as a fraction of [`Self::depth`].
     pub tops_end: f64,
     /// Standard deviation of the logarithm of [`Self::tops_end`]: about 0.1 on new blocks, and above 0.5 where wear has
     /// rounded the strokes.
@@ -240,9 +240,9 @@ pub struct Scores {
     pub iou_box: f64,
     /// Dice coefficient of the masks by pixel.
     pub dice: f64,
-    /// Share of the canvas that is ink.
+    /// Fraction of the canvas that is ink.
     pub density_print: f64,
-    /// Share of the canvas that is stroke top.
+    /// Fraction of the canvas that is stroke top.
     pub density_depth: f64,
 }
 
@@ -252,9 +252,9 @@ pub struct Scores {
 pub struct Disagreement {
     /// Number of connected pieces of stroke tops without ink and of ink without wood.
     pub pieces: u32,
-    /// Area of the stroke tops without ink, as a share of the mask's area.
+    /// Area of the stroke tops without ink, as a fraction of the mask's area.
     pub missing_ink: f64,
-    /// Area of the ink without wood, as a share of the ink's area.
+    /// Area of the ink without wood, as a fraction of the ink's area.
     pub missing_wood: f64,
 }
 
@@ -263,9 +263,9 @@ pub struct Disagreement {
 pub struct PoseFeatures {
     /// Normalized correlation of relief and ink where both images have data, at most 1.
     pub correlation: f64,
-    /// Share of the stroke tops that are covered by ink, 0..=1.
+    /// Fraction of the stroke tops that are covered by ink, 0..=1.
     pub tops_covered: f64,
-    /// Share of the ink that is covered by stroke tops, 0..=1.
+    /// Fraction of the ink that is covered by stroke tops, 0..=1.
     pub ink_covered: f64,
     /// Score of the best pose at a different angle, divided by the score of the best pose.
     pub other_angle: f64,
@@ -273,7 +273,7 @@ pub struct PoseFeatures {
     pub mirrored: f64,
     /// Sensitivity of the pose to its start. The pose is refined from three starts with slightly different sizes. Two
     /// results differ by the mean distance between their depth-map corners. This is the largest difference from the
-    /// best result, as a share of the map's longest side.
+    /// best result, as a fraction of the map's longest side.
     #[serde(default)]
     pub spread: f64,
     /// Area of the largest connected piece of stroke tops without ink, in squares of the stroke width.
@@ -282,8 +282,8 @@ pub struct PoseFeatures {
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
     #[serde(default, rename = "ink_alone")]
     pub unmatched_ink: f64,
-    /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a share of the stroke
-    /// width.
+    /// Mean deviation between the edges of ink and stroke tops, after the spread of the ink, as a fraction of the
+    /// stroke width.
     #[serde(default)]
     pub edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width: how many strokes the print shows.

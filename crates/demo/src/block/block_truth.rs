@@ -18,7 +18,7 @@ const LANDMARKS: usize = 12;
 const CANDIDATE_MM: f64 = 0.12;
 /// Least distance of landmarks from the edge of the stroke, mm, in the order in which they are tried.
 const INSIDE_MM: [f64; 4] = [0.18, 0.12, 0.06, 0.02];
-/// Share of a character's stroke area that must be lost before it counts as damaged.
+/// Fraction of a character's stroke area that must be lost before it counts as damaged.
 const DAMAGED_SHARE: f64 = 0.25;
 /// Spacing of the points at which the map is recorded, mm.
 const MAP_STEP_MM: f64 = 20.0;
@@ -92,7 +92,7 @@ pub struct BlockCharacterTruth {
     /// To which part of the text it belongs.
     #[serde(flatten)]
     pub part: BlockTextPart,
-    /// Share of its stroke area that the block lost.
+    /// Fraction of its stroke area that the block lost.
     pub lost: f64,
     /// Whether more than a quarter of its stroke area is lost.
     pub damaged: bool,

@@ -18,7 +18,7 @@ const MIN_WEIGHT_MM: f64 = 0.1;
 /// The hand of the carver of one side.
 pub(super) struct TextCarver<'a> {
     glyphs: &'a Glyphs,
-    /// Distance by which outlines are moved outwards, as a share of the em.
+    /// Distance by which outlines are moved outwards, as a fraction of the em.
     weight: f64,
 }
 

@@ -72,9 +72,9 @@ pub(super) enum BlockSupport {
 /// Ranges from which the conditions of a block and its page are drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockRanges {
-    /// Size of the characters as a share of the usual size.
+    /// Size of the characters as a fraction of the usual size.
     pub scale: NumberRange,
-    /// Share of the columns that contain notes.
+    /// Fraction of the columns that contain notes.
     pub notes: NumberRange,
     /// Probability that the page is folded in the middle.
     pub folded: f64,

@@ -59,8 +59,8 @@ fn grey_page(world: &BlockWorld) -> Grid<f64> {
         .map(|pixel| pixel.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0 / 257.0)
 }
 
-/// Returns the share of the pixels of a box that are darker than `limit`. The box includes its last column and row and
-/// must lie in the image.
+/// Returns the fraction of the pixels of a box that are darker than `limit`. The box includes its last column and row
+/// and must lie in the image.
 fn dark_share(page: &Grid<f64>, [x0, y0, x1, y1]: [i64; 4], limit: f64) -> f64 {
     let pixels = (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (x, y)));
     let found: Vec<f64> = pixels.filter_map(|(x, y)| page.get(x, y)).collect();

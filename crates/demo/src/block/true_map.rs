@@ -11,7 +11,7 @@ use mocban_core::domain::Affine2;
 
 /// Wavelengths of the warp, mm.
 const WAVELENGTH_MM: [f64; 2] = [80.0, 320.0];
-/// Shares of the warp's amplitude that its waves have.
+/// Fractions of the warp's amplitude that its waves have.
 const WAVE_SHARES: [f64; 3] = [0.5, 0.3, 0.2];
 /// Largest number of steps of the iteration that inverts the warp. It converges by a factor of ten per step.
 const INVERSION_STEPS: usize = 20;

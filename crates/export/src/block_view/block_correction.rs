@@ -59,7 +59,7 @@ pub struct PicturePoint {
 pub struct TriedAlignment {
     /// The points as they are stored.
     pub points: ControlPoints,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     /// Relief and ink over each other, as JPEG.
     pub overlay: Vec<u8>,

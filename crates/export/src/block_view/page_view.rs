@@ -25,7 +25,7 @@ pub struct BlockView {
     pub layers: PageLayers,
     /// The characters that have a box.
     pub characters: Vec<CharacterView>,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     pairs: Vec<Option<PairResults>>,
     metric: Option<ThresholdMetric>,

@@ -19,7 +19,7 @@ pub(crate) struct RegisteredFace {
     pub(crate) side: BlockSide,
     /// Unit of the scan.
     pub(crate) unit: LengthUnit,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub(crate) agreement: f64,
     /// Where they agree.
     pub(crate) support: Support,

@@ -12,7 +12,7 @@ const LEGEND_FONTS: [f32; 2] = [14.0, 34.0];
 const NAME_FONTS: [f32; 5] = [17.0, 15.0, 13.0, 12.0, 11.0];
 /// Width of the outline of a box, pixels.
 const OUTLINE: usize = 3;
-/// Share of the page that is left under a name, of 4.
+/// Fraction of the page that is left under a name, of 4.
 const UNDER_NAME: u16 = 1;
 
 /// A box on a picture of a page.

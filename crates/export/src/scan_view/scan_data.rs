@@ -14,7 +14,7 @@ use mocban_core::domain::{Affine2, DepthScale, LengthUnit, MetricOutcome, Thresh
 use mocban_results::pair_artifacts::PairArtifacts;
 use mocban_store::Project;
 
-/// Share of the heights below and above the range of the threshold slider.
+/// Fraction of the heights below and above the range of the threshold slider.
 const OUTSIDE_RANGE: f64 = 0.002;
 
 /// The data of the 3D view of a result: a scan in the frame of its print, and textures.

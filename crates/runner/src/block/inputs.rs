@@ -11,18 +11,19 @@ use mocban_catalog::{
 use mocban_core::domain::{BlockId, BlockStage, ContentHash, ControlPoints, Failure, FailureClass};
 use mocban_store::{Input, InputError, Project, hash_input, stat_input};
 
-/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `among`. Skips scans
+/// Stores the new versions of changed input files of blocks in the catalog, of all or of those in `selection`. Skips scans
 /// and pages that no stage has read; labels may have been added to a block that was finished without them. A file
 /// counts as unchanged if reading it fails or is ended by `limits`.
 pub(crate) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
-    among: Option<&BlockSelection>,
+    selection: Option<&BlockSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
     let known = catalog.retry_while_unavailable(async || catalog.known_blocks().await);
     let known = known.await?.into_iter();
-    let known = known.filter(|known| among.is_none_or(|among| among.contains(known.block)));
+    let known =
+        known.filter(|known| selection.is_none_or(|selection| selection.contains(known.block)));
     let compared = known.map(|known| ComparedBlock {
         project: project.clone(),
         known,

@@ -9,20 +9,22 @@ use mocban_catalog::{BlockSelection, Catalog, RerunPolicy};
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
 
-/// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `among`, and ends
+/// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `selection`, and ends
 /// back-offs that are due.
 pub(crate) async fn requeue(
     project: &Project,
     catalog: &Catalog,
     stages: &dyn BlockStages,
-    (policy, among): (RerunPolicy, Option<&BlockSelection>),
+    (policy, selection): (RerunPolicy, Option<&BlockSelection>),
     limits: &ReadLimits,
     now: UnixMillis,
 ) -> Result<(), RunError> {
-    inputs::store_changes(project, catalog, among, limits).await?;
+    inputs::store_changes(project, catalog, selection, limits).await?;
     let settings = block_settings(stages);
     let requeued = catalog.retry_while_unavailable(async || {
-        catalog.requeue_stale_blocks(&settings, policy, among).await
+        catalog
+            .requeue_stale_blocks(&settings, policy, selection)
+            .await
     });
     requeued.await?;
     let longest = policy::longest_backoff_ms();

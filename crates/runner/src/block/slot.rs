@@ -30,7 +30,7 @@ pub(crate) struct BlockRunCounts {
 pub(crate) struct BlockSlot {
     context: Arc<RunContext>,
     /// The blocks of this run; `None` for all.
-    among: Option<BlockSelection>,
+    selection: Option<BlockSelection>,
     image_limits: raster::ImageLimits,
     /// Memory for the height maps of a block.
     map_bytes: u64,
@@ -45,13 +45,15 @@ pub(crate) struct BlockSlot {
 impl BlockSlot {
     pub(crate) fn new(
         context: Arc<RunContext>,
-        among: Option<BlockSelection>,
+        selection: Option<BlockSelection>,
         options: &RunOptions,
     ) -> Self {
         Self {
             context,
-            may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
-            among,
+            may_find_one: selection
+                .as_ref()
+                .is_none_or(|selection| !selection.is_empty()),
+            selection,
             image_limits: options.image_limits,
             map_bytes: map_bytes(options.memory),
             waits_for_memory: false,
@@ -85,9 +87,9 @@ impl BlockSlot {
         }
         let context = &self.context;
         let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
-        let (catalog, among) = (&context.catalog, self.among.as_ref());
+        let (catalog, selection) = (&context.catalog, self.selection.as_ref());
         let claimed = catalog.retry_while_unavailable(async || {
-            let claim = catalog.claim_block(worker, deadline, alive_since, among);
+            let claim = catalog.claim_block(worker, deadline, alive_since, selection);
             claim.await
         });
         let Some((lease, work)) = claimed.await? else {
@@ -150,9 +152,9 @@ impl BlockSlot {
 
     /// Returns how many blocks any process has yet to finish.
     pub(crate) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
-        let (catalog, among) = (&self.context.catalog, self.among.as_ref());
+        let (catalog, selection) = (&self.context.catalog, self.selection.as_ref());
         let left =
-            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(among).await);
+            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(selection).await);
         Ok(left.await?)
     }
 

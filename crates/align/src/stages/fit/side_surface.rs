@@ -12,15 +12,15 @@ use mocban_core::raster::Grid;
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// If more than this share of the visible area lies on the fitted surface, the side counts as uncarved.
+/// If more than this fraction of the visible area lies on the fitted surface, the side counts as uncarved.
 const MAX_TOPS: f64 = 0.85;
-/// If less than this share of the visible area lies on the fitted surface, the side counts as uncarved. The surface
+/// If less than this fraction of the visible area lies on the fitted surface, the side counts as uncarved. The surface
 /// then rests on walls or specks, not on strokes.
 const MIN_TOPS: f64 = 0.02;
 /// When the depth of the carving is measured, one height in this many is ignored at either end.
 const TRIMMED_ONE_IN: usize = 100;
 
-/// Largest share of the visible area that is debris.
+/// Largest fraction of the visible area that is debris.
 const DEBRIS: f64 = 0.04;
 
 /// Surface and measurements of one side.

@@ -6,7 +6,7 @@
 //! mirrored meshes and uncarved plates. It prints the weights, and a reliability table for pairs of other seeds.
 //! `POSE` was fitted on 1,010 pairs of two independent generators, and `CHARACTER` on the pairs that its comment
 //! describes. `MASK` was set manually, because few masks are wrong. It lowers the confidence if the pose is a few
-//! percent off. On generated pairs, the mean confidence is slightly below the share that is right.
+//! percent off. On generated pairs, the mean confidence is slightly below the fraction that is right.
 
 use mocban_core::domain::{MetricOutcome, PoseFeatures};
 
@@ -37,13 +37,13 @@ const ROUGHEST: f64 = 0.12;
 /// Lower bound of the ink's area before its logarithm is taken. In squares of the stroke width. A character of a single
 /// stroke has a larger area.
 const LEAST_INK: f64 = 2.0;
-/// `spread_input` divides the spread by this share of the depth map's longest side. Smaller spreads are invisible.
+/// `spread_input` divides the spread by this fraction of the depth map's longest side. Smaller spreads are invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Range to which the probability that a mask is right is clamped.
 const PROBABILITY: [f64; 2] = [0.02, 0.995];
-/// Lower bound of shares before their logarithm is taken.
+/// Lower bound of fractions before their logarithm is taken.
 const FLOOR: f64 = 0.02;
-/// Range to which the competitors' scores are clamped, as shares of the best score.
+/// Range to which the competitors' scores are clamped, as fractions of the best score.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
 /// Inputs of the three logistic models. The confidence of an alignment is the product of their probabilities.

@@ -8,12 +8,12 @@ use super::ink_edge::{InkEdge, REACH};
 use mocban_core::raster::Mask;
 use mocban_core::raster::components::ConnectedComponents;
 
-/// Distance from the strokes of the other image, as a share of the stroke width, from which a pixel has no partner.
+/// Distance from the strokes of the other image, as a fraction of the stroke width, from which a pixel has no partner.
 /// Smaller distances are due to the spread of ink and to local misalignment.
 const TOLERANCE: f64 = 0.3;
 /// Least tolerance in pixels of the half canvas.
 const TOLERANCE_PX: f64 = 1.5;
-/// Edges that deviate by at least this share of the stroke width do not count for the scatter.
+/// Edges that deviate by at least this fraction of the stroke width do not count for the scatter.
 const NEAR: f64 = 0.5;
 /// Pieces within this many pixels of the border of the common area are left out. Walls, stains and neighbouring strokes
 /// lie there.
@@ -34,7 +34,7 @@ pub(super) struct Unmatched {
     /// Area of the largest connected piece of ink without wood, in squares of the stroke width.
     pub(super) ink: f64,
     /// Mean absolute deviation of the distances from the ink's edge to the edge of the strokes, from their median, as a
-    /// share of the stroke width. The median is the spread of the ink.
+    /// fraction of the stroke width. The median is the spread of the ink.
     pub(super) edge_scatter: f64,
     /// Area of the ink, in squares of the stroke width.
     pub(super) ink_area: f64,
