@@ -10,6 +10,7 @@ use super::generator::PairGenerator;
 use super::pair::DemoPair;
 use super::scene::pair_id;
 use super::tier::Tier;
+use mocban_core::domain::Explained;
 use mocban_core::raster::png_grey8;
 
 /// Increased whenever the same options produce different bytes.
@@ -76,6 +77,8 @@ pub enum DatasetError {
     #[error("stopped while the demo files were written")]
     Stopped,
 }
+
+impl Explained for DatasetError {}
 
 /// Content of `dataset.json`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]

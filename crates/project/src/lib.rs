@@ -5,13 +5,13 @@
 //! - [`backup`], [`restore`]: copy a project to one file, and make a project of it
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`]: what a demo may replace
-//! - [`exit`], [`error_text`]: the code of an error, and one sentence that says what was seen and what to do
+//! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
 //!
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
 pub mod backup;
 pub mod demo_folder;
-pub mod error_text;
+pub mod error;
 pub mod exit;
 pub mod files;
 pub mod import_blocks;
@@ -25,3 +25,6 @@ pub mod restore;
 pub mod shell;
 pub mod truth_file;
 pub mod verdict_file;
+
+pub use error::{ProjectError, ProjectResult};
+pub use exit::{ExitCode, Refusal};
