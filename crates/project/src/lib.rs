@@ -10,6 +10,7 @@
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
 pub mod backup;
+pub mod closing;
 pub mod demo_folder;
 pub mod error;
 pub mod exit;
@@ -22,9 +23,11 @@ pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
 pub mod restore;
+pub mod selection;
 pub mod shell;
 pub mod truth_file;
 pub mod verdict_file;
+pub mod worker_totals;
 
 pub use error::{ProjectError, ProjectResult};
 pub use exit::{ExitCode, Refusal};

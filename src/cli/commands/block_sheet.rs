@@ -4,7 +4,6 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
@@ -14,6 +13,7 @@ use mocban_core::raster::png_rgb8;
 use mocban_export::block_view::{BlockView, BlockViewError};
 use mocban_project::error::TaskStopped;
 use mocban_project::files::{self, input_file_limits};
+use mocban_project::selection;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::Project;
 
@@ -87,7 +87,7 @@ pub(crate) async fn read(
     catalog: &Catalog,
     context: &Context,
 ) -> ProjectResult<BlockView> {
-    let name = select::existing_block(catalog, typed).await?;
+    let name = selection::existing_block(catalog, typed).await?;
     let limits = input_file_limits(&context.settings()?.config);
     match BlockView::read(catalog, project, &name, metric, limits).await {
         Ok(view) => Ok(view),

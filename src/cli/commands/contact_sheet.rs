@@ -6,7 +6,6 @@ use clap::Args;
 use serde_json::json;
 
 use super::block_sheet::{self, BlockSheetOptions};
-use crate::cli::input::select;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
@@ -14,6 +13,7 @@ use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
 use mocban_export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
 use mocban_project::files;
+use mocban_project::selection;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// Arguments of `contact-sheet`.
@@ -112,7 +112,7 @@ pub(crate) async fn write(
     let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
     let options = ContactSheetOptions {
         metric,
-        pairs: select::some_or_all(&catalog, &args.pairs).await?,
+        pairs: selection::some_or_all(&catalog, &args.pairs).await?,
         order: args.order,
         limit: usize::from(args.limit),
         columns: usize::from(args.columns),

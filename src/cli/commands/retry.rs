@@ -3,11 +3,11 @@
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
 use mocban_catalog::{BlockJob, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
+use mocban_project::selection;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::NamedWork;
 
@@ -54,7 +54,7 @@ async fn selection(
     if args.names.is_empty() {
         return Ok((RetrySelection::All, RetrySelection::All));
     }
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(catalog, &args.names).await?;
+    let NamedWork { pairs, blocks } = selection::pairs_and_blocks(catalog, &args.names).await?;
     Ok((RetrySelection::Names(pairs), RetrySelection::Names(blocks)))
 }
 

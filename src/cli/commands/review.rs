@@ -6,7 +6,6 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
 use crate::cli::input::signals;
@@ -20,6 +19,7 @@ use mocban_pages::review::{
     self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
     ReviewServer,
 };
+use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
 use mocban_project::files::input_file_limits;
 use mocban_project::location::now;

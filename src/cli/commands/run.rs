@@ -5,10 +5,8 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::closing::close;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use crate::cli::input::select;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::Failures;
@@ -17,7 +15,9 @@ use crate::cli::output::progress::ProgressReporter;
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_config::Config;
 use mocban_core::domain::{ErrorCode, Stage};
+use mocban_project::closing::close;
 use mocban_project::location::now;
+use mocban_project::selection;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use mocban_store::Project;
@@ -139,7 +139,7 @@ pub(crate) async fn options(
 ) -> ProjectResult<RunOptions> {
     let only = match args.names.as_slice() {
         [] => None,
-        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
+        typed => Some(selection::pairs_and_blocks(catalog, typed).await?),
     };
     let plain = from_config(config);
     Ok(RunOptions {

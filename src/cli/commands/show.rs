@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use super::show_block::show_block;
 use super::verdict;
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::may_succeed_unchanged;
 use crate::cli::output::screen::{Palette, Tone};
@@ -17,6 +16,7 @@ use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, 
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
+use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_results::ManualCorrection;
@@ -37,7 +37,7 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<Exi
         return list_names(&catalog, context).await;
     };
     let typed = std::slice::from_ref(&typed);
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(&catalog, typed).await?;
+    let NamedWork { pairs, blocks } = selection::pairs_and_blocks(&catalog, typed).await?;
     let (pair, block) = (pairs.into_iter().next(), blocks.into_iter().next());
     let name = match (pair, block) {
         (_, Some(block)) => return show_block(&block, &project, catalog, context).await,

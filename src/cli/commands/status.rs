@@ -7,7 +7,6 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::review::review_step;
 use super::status_hosts;
 use crate::cli::output::context::Context;
@@ -18,6 +17,7 @@ use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
+use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult};

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
@@ -18,6 +17,7 @@ use mocban_catalog::{
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::files::{self, RefusedLine};
 use mocban_project::location::now;
+use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::verdict_file::{self, VerdictList};
 use mocban_project::{ExitCode, ProjectResult, Refusal};
@@ -112,7 +112,7 @@ async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode>
     let rights = catalog.review_rights().await?;
     rights.require_verdicts(&args.reviewer)?;
     let new = NewVerdict {
-        pair: select::pair(&catalog, &args.pair).await?,
+        pair: selection::pair(&catalog, &args.pair).await?,
         metric: args.metric,
         verdict: args.verdict,
         reviewer: args.reviewer,
@@ -206,7 +206,7 @@ async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<Exi
 async fn log(args: VerdictLogArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
     let pair = match &args.pair {
-        Some(typed) => Some(select::pair(&catalog, typed).await?),
+        Some(typed) => Some(selection::pair(&catalog, typed).await?),
         None => None,
     };
     let (sound, mut damaged) = catalog.without_faulty_rows().await?;

@@ -8,7 +8,6 @@ use serde_json::json;
 use super::block_points::BlockPoints;
 use super::block_sheet;
 use crate::cli::input::browser::open;
-use crate::cli::input::select;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
@@ -19,6 +18,7 @@ use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::view::{self, ViewServer};
 use mocban_project::error::TaskStopped;
+use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
@@ -44,7 +44,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
     page_vec::keep_few_pages();
     let (project, catalog) = context.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
-    if select::block(&catalog, &args.pair).await?.is_some() {
+    if selection::block(&catalog, &args.pair).await?.is_some() {
         let page = block_page(address, &args, &project, &catalog, context).await;
         catalog.close().await;
         return serve(page?, &args, context).await;
@@ -54,7 +54,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         mesh: limits.mesh,
         image: limits.image,
     };
-    let name = select::pair(&catalog, &args.pair).await?;
+    let name = selection::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;
     let Some(pair) = detail.map(|detail| detail.results) else {
@@ -91,7 +91,7 @@ async fn block_page(
     catalog: &Catalog,
     context: &Context,
 ) -> ProjectResult<ViewServer> {
-    let name = select::existing_block(catalog, &args.pair).await?;
+    let name = selection::existing_block(catalog, &args.pair).await?;
     let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
         Ok(view) => Some(view),
         Err(error) => {

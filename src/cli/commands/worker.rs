@@ -3,7 +3,6 @@
 use clap::Args;
 use serde_json::json;
 
-use super::closing::close;
 use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use crate::cli::input::signals;
@@ -11,6 +10,7 @@ use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
 use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
+use mocban_project::closing::close;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{self as runner, RunPart, Stop};
 
