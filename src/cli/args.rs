@@ -31,7 +31,7 @@ use super::commands::view;
 use super::commands::worker;
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
-use mocban_project::exit::ExitCode;
+use mocban_project::ExitCode;
 use mocban_project::shell::shell_quoted;
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.

@@ -11,6 +11,7 @@ use super::pair::DemoPair;
 use super::scene::pair_id;
 use super::tier::Tier;
 use super::truth_line::tops_file;
+use mocban_core::domain::Explained;
 use mocban_core::raster::png_grey8;
 
 /// Increased whenever the same options produce different bytes.
@@ -77,6 +78,8 @@ pub enum DatasetError {
     #[error("stopped while the demo files were written")]
     Stopped,
 }
+
+impl Explained for DatasetError {}
 
 /// Content of `dataset.json`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use super::pictures::{
 };
 use super::source_print::result_images;
 use mocban_catalog::{Catalog, CatalogError, PairResults, SetApart};
-use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
+use mocban_core::domain::{JobStatus, PairName, ThresholdMetric, enum_names, explained_by_cause};
 use mocban_core::raster::ImageLimits;
 use mocban_results::ground_truth::TruthErrors;
 use mocban_results::number_format::NumberStyle::{Degrees, Percent, Score};
@@ -93,6 +93,8 @@ pub enum DrawError {
     #[error("drawing stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
+
+explained_by_cause! { DrawError: Catalog }
 
 /// A pair that may be drawn.
 struct SheetCandidate {

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, MANIFEST};
+use mocban_core::domain::{ErrorCode, Explained};
 use mocban_store::{Leftover, ReplaceError, ReplacementFolder};
 
 /// An export that is written next to its target and then replaces the target.
@@ -33,6 +34,16 @@ pub enum FolderError {
         /// Why.
         source: io::Error,
     },
+}
+
+impl Explained for FolderError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NotAnExport(_) | Self::IsFile(_) => ErrorCode::Usage,
+            Self::Replace(error) => error.code(),
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
 }
 
 impl Folder {

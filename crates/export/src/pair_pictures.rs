@@ -9,7 +9,7 @@ use super::source_print::{SourcePrint, SourcePrintError};
 use super::stage_outcomes::StageOutcomes;
 use mocban_catalog::{MetricRecord, PairResults};
 use mocban_core::domain::artifact_role::DEPTH;
-use mocban_core::domain::{Affine2, ArtifactRef, MetricOutcome, Stage};
+use mocban_core::domain::{Affine2, ArtifactRef, Explained, MetricOutcome, Stage};
 use mocban_core::mesh::{self, Mesh, MeshError, MeshLimits, MeshReadError};
 use mocban_core::raster::{
     DepthMap, Grid, ImageLimits, Mask, png_rgb8, warp_depth, warp_mask, warp_rgb,
@@ -44,6 +44,8 @@ pub enum PictureError {
     #[error("{0}")]
     Unencodable(String),
 }
+
+impl Explained for PictureError {}
 
 /// Limits of the input files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

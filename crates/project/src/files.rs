@@ -4,12 +4,12 @@ use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
 use mocban_config::Config;
-use mocban_core::domain::sanitize;
+use mocban_core::domain::{ErrorCode, sanitize};
 use mocban_export::InputFileLimits;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
@@ -45,7 +45,7 @@ const MAX_SMALL: u64 = 1 << 20;
 ///
 /// # Errors
 /// Returns an error if the file cannot be read or is longer than 1 MiB.
-pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
     // A link to a missing file exists, and cannot be read.
@@ -60,7 +60,9 @@ pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
         .read_to_end(&mut bytes)
         .with_context(failed)?;
     if bytes.len() as u64 > MAX_SMALL {
-        anyhow::bail!("{shown} is longer than 1 MiB");
+        return Err(ProjectError::unexpected(format!(
+            "{shown} is longer than 1 MiB"
+        )));
     }
     Ok(Some(bytes))
 }
@@ -116,7 +118,7 @@ pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
     catalog: &Catalog,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     refuse_project_file(path)?;
     // A file that does not exist is not an input.
     let Ok(real) = path.canonicalize() else {
@@ -165,7 +167,7 @@ pub fn is_backup(file: &Path) -> std::io::Result<bool> {
 ///
 /// # Errors
 /// Returns an error if an incomplete output would replace a file, or the file cannot be written.
-pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResult<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {
@@ -181,9 +183,9 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Res
 ///
 /// # Errors
 /// Returns the error of the write.
-pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow::Result<()> {
+pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> ProjectResult<()> {
     match written {
-        Err(error) if named.is_none() && !error.is::<Refusal>() => {
+        Err(error) if named.is_none() && error.code() != ErrorCode::Incomplete => {
             Err(error.context("name a file elsewhere with -o"))
         }
         written => written,

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use crate::files;
 use crate::import_pairs::PairSource;
@@ -75,7 +76,7 @@ impl ListedItems {
     ///
     /// # Errors
     /// Returns an error if the list cannot be read.
-    pub fn of(file: &Path) -> anyhow::Result<Self> {
+    pub fn of(file: &Path) -> ProjectResult<Self> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
             bytes,
@@ -104,7 +105,7 @@ pub async fn import_blocks(
     source: &BlockSource,
     allow_missing: bool,
     location: &Location,
-) -> anyhow::Result<BlockImportOutcome> {
+) -> ProjectResult<BlockImportOutcome> {
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
@@ -127,7 +128,7 @@ pub async fn import_blocks(
     })
 }
 
-fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
+fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     let (file, bytes) = match source {
         BlockSource::List { file, bytes } => (file, bytes),
         BlockSource::One(files) => {
@@ -160,7 +161,7 @@ fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
 }
 
 /// Returns the given name, or the name of the mesh file without its extension.
-fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
+fn name(given: Option<&str>, mesh: &Path) -> ProjectResult<BlockName> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
     BlockName::new(given.unwrap_or(&stem)).map_err(|error| {
         let text = format!("{}: {error}; give another one with --name", mesh.display());
@@ -179,7 +180,7 @@ fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut Miss
     }
 }
 
-fn stored_row(row: &BlockRow, project: &Project) -> anyhow::Result<BlockAttributes> {
+fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttributes> {
     let stored = |path: &PathBuf| project.stored_path(path);
     Ok(BlockAttributes {
         name: row.name.clone(),

@@ -5,13 +5,14 @@
 //! - [`backup`], [`restore`]: copy a project to one file, and make a project of it
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`]: what a demo may replace
-//! - [`exit`], [`error_text`]: the code of an error, and one sentence that says what was seen and what to do
+//! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
 //!
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
 pub mod backup;
+pub mod closing;
 pub mod demo_folder;
-pub mod error_text;
+pub mod error;
 pub mod exit;
 pub mod files;
 pub mod import_blocks;
@@ -22,6 +23,11 @@ pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
 pub mod restore;
+pub mod selection;
 pub mod shell;
 pub mod truth_file;
 pub mod verdict_file;
+pub mod worker_totals;
+
+pub use error::{ProjectError, ProjectResult};
+pub use exit::{ExitCode, Refusal};

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use crate::error::ProjectResult;
 use crate::exit::Refusal;
 use mocban_catalog::Catalog;
 use mocban_config::{BaseLayer, ConfigError, Loaded, Sources, load};
@@ -60,7 +61,7 @@ impl Location {
     ///
     /// # Errors
     /// Returns an error if there is no project, a setting of the storage is invalid, or the catalog cannot be read.
-    pub async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub async fn open_read_only(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
             Some(url) => Catalog::connect_read_only(&url).await?,
@@ -73,7 +74,7 @@ impl Location {
     ///
     /// # Errors
     /// Returns an error under the conditions of [`Self::open_read_only`], or if the catalog cannot be written.
-    pub async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub async fn open(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
             Some(url) => Catalog::connect(&url, false).await?,
@@ -83,7 +84,7 @@ impl Location {
     }
 
     /// Returns the project, and the URL of its catalog if that is in PostgreSQL.
-    fn project(&self) -> anyhow::Result<(Project, Option<String>)> {
+    fn project(&self) -> ProjectResult<(Project, Option<String>)> {
         let (storage, url) = self.data_locations()?;
         let project = match url {
             Some(_) => Project::open_directory(&self.dir)?,
@@ -96,20 +97,18 @@ impl Location {
     ///
     /// # Errors
     /// Returns an error under the conditions of [`Self::catalog_url`], or if a setting of the storage is invalid.
-    pub fn data_locations(&self) -> anyhow::Result<(Option<ProjectStorage>, Option<String>)> {
-        let settings = self.settings();
-        if let Err(error) = &settings
-            && self.may_name_places(error)
-        {
-            return settings.map(|_| (None, None));
-        }
+    pub fn data_locations(&self) -> ProjectResult<(Option<ProjectStorage>, Option<String>)> {
+        let settings = match self.settings() {
+            Err(error) if self.may_name_places(&error) => return Err(error.into()),
+            settings => settings,
+        };
         let storage = Self::storage(settings.as_ref().ok())?;
         Ok((storage, self.catalog_of(settings)?))
     }
 
     /// Returns the named roots and the object store of the settings. Sends no request. Returns `None` if the settings
     /// name none, or are invalid.
-    fn storage(settings: Option<&Loaded>) -> anyhow::Result<Option<ProjectStorage>> {
+    fn storage(settings: Option<&Loaded>) -> ProjectResult<Option<ProjectStorage>> {
         let Some(settings) = settings.map(|settings| &settings.config.storage) else {
             return Ok(None);
         };
@@ -127,11 +126,11 @@ impl Location {
     /// # Errors
     /// Returns an error if the URL on the command line has a password, or if the settings are invalid and may name a
     /// catalog elsewhere, or no catalog file shows where the catalog is.
-    pub fn catalog_url(&self) -> anyhow::Result<Option<String>> {
+    pub fn catalog_url(&self) -> ProjectResult<Option<String>> {
         self.catalog_of(self.settings())
     }
 
-    fn catalog_of(&self, settings: anyhow::Result<Loaded>) -> anyhow::Result<Option<String>> {
+    fn catalog_of(&self, settings: Result<Loaded, ConfigError>) -> ProjectResult<Option<String>> {
         if let Some(url) = &self.catalog {
             refuse_password(url)?;
             return Ok(Some(url.clone()).filter(|url| !url.is_empty()));
@@ -145,7 +144,7 @@ impl Location {
             Err(error) if self.dir.join(CATALOG_FILE).exists() && !self.may_name_places(&error) => {
                 Ok(None)
             }
-            Err(error) => Err(error),
+            Err(error) => Err(error.into()),
         }
     }
 
@@ -154,16 +153,12 @@ impl Location {
     ///
     /// # Errors
     /// Returns an error if a layer cannot be read or has an invalid setting.
-    pub fn settings(&self) -> anyhow::Result<Loaded> {
+    pub fn settings(&self) -> Result<Loaded, ConfigError> {
         if let Some(settings) = self.settings.get() {
             return Ok(settings.clone());
         }
-        let settings = self.load_settings()?;
+        let settings = load(&self.sources())?;
         Ok(self.settings.get_or_init(|| settings).clone())
-    }
-
-    fn load_settings(&self) -> anyhow::Result<Loaded> {
-        Ok(load(&self.sources())?)
     }
 
     fn sources(&self) -> Sources {
@@ -185,7 +180,7 @@ impl Location {
     ///
     /// # Errors
     /// Returns an error with the setting, where it comes from, and how to do without it.
-    pub fn require_local(&self, project: &str) -> anyhow::Result<()> {
+    pub fn require_local(&self, project: &str) -> ProjectResult<()> {
         let settings = self.settings()?;
         let storage = &settings.config.storage;
         let catalog = self.catalog_url()?.unwrap_or_default();
@@ -215,8 +210,8 @@ impl Location {
 
     /// Returns whether invalid settings may name a catalog or artifacts elsewhere. Then a command must not use the files in
     /// the project's folder instead.
-    fn may_name_places(&self, error: &anyhow::Error) -> bool {
-        is_unread(error) || self.sources().may_set("storage")
+    fn may_name_places(&self, error: &ConfigError) -> bool {
+        matches!(error, ConfigError::Read { .. }) || self.sources().may_set("storage")
     }
 }
 
@@ -229,11 +224,6 @@ pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
         base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
         ..Sources::default()
     })
-}
-
-/// Returns whether the settings could not be read.
-fn is_unread(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(ConfigError::Read { .. }))
 }
 
 /// Refuses an address of PostgreSQL with a password, which other users of the machine could read.

@@ -6,6 +6,7 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
+use crate::error::ProjectResult;
 use mocban_core::domain::{LengthUnit, sanitize};
 use mocban_lists::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
@@ -54,7 +55,7 @@ impl Listing {
     ///
     /// # Errors
     /// Returns an error if the list cannot be read or is refused.
-    pub fn from_file(file: &Path) -> anyhow::Result<Self> {
+    pub fn from_file(file: &Path) -> ProjectResult<Self> {
         let shown = file.display();
         if file.is_dir() {
             let text =
@@ -68,7 +69,7 @@ impl Listing {
     ///
     /// # Errors
     /// Returns an error if the list is refused.
-    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
             read_jsonl
@@ -100,7 +101,7 @@ impl Listing {
         meshes: &Path,
         prints: &Path,
         unit: Option<LengthUnit>,
-    ) -> anyhow::Result<Self> {
+    ) -> ProjectResult<Self> {
         let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
             .map_err(|problems| refuse(meshes, &problems))?;
         let mut rows = found.rows;

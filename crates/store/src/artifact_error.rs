@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::input_error::InputError;
 use super::open_file::file_kind;
 use super::remote::BucketError;
+use mocban_core::domain::Explained;
 
 /// Why an artifact could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +47,8 @@ pub enum ArtifactError {
         source: std::io::Error,
     },
 }
+
+impl Explained for ArtifactError {}
 
 impl ArtifactError {
     /// Returns whether an object store did not answer, so that the same request may succeed later.

@@ -5,11 +5,9 @@ use std::sync::Arc;
 
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
-use mocban_core::domain::ARTIFACTS;
+use mocban_core::domain::{ARTIFACTS, CATALOG_FILE, ErrorCode, Explained};
 use mocban_system::platform::{FileId, stat, with_slashes};
 
-/// Name of the catalog file in a project.
-pub const CATALOG_FILE: &str = "catalog.sqlite";
 /// Name of the settings file in a project.
 pub const SETTINGS_FILE: &str = "mocban.toml";
 
@@ -43,6 +41,16 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl Explained for StoreError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NoProject(_) => ErrorCode::NoProject,
+            Self::NotAFolder(_) | Self::NotUtf8(_) => ErrorCode::Usage,
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
 }
 
 impl StoreError {

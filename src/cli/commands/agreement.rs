@@ -1,11 +1,11 @@
 //! `agreement`: how reliable the reviewers are.
 
 use crate::cli::output::context::Context;
-use mocban_project::exit::ExitCode;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_report::agreement_text;
 use mocban_results as results;
 
-pub(crate) async fn agreement(context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn agreement(context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
     let found = results::agreement(&catalog).await?;
     catalog.close().await;

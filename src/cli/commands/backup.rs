@@ -9,7 +9,7 @@ use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use mocban_project::backup::{self, Backup};
-use mocban_project::exit::ExitCode;
+use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
@@ -20,7 +20,7 @@ pub(crate) struct BackupArgs {
     pub(crate) file: PathBuf,
 }
 
-pub(crate) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn backup(args: BackupArgs, context: &Context) -> ProjectResult<ExitCode> {
     let file = &args.file;
     let shown = file.display();
     let busy = Busy::start(context, "copying the catalog");

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
@@ -12,8 +11,10 @@ use mocban_catalog::Catalog;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
 use mocban_export::block_view::{BlockView, BlockViewError};
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::error::TaskStopped;
 use mocban_project::files::{self, input_file_limits};
+use mocban_project::selection;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::Project;
 
 /// What to draw of a block, and where to.
@@ -36,7 +37,7 @@ pub(crate) struct BlockSheetOptions<'a> {
 pub(crate) async fn write(
     options: &BlockSheetOptions<'_>,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     let default = ["page.png", "overlay.png"][usize::from(options.is_overlay)];
     let given = options.output.map(Path::to_owned);
@@ -58,7 +59,7 @@ async fn draw(
     project: &Project,
     catalog: &Catalog,
     context: &Context,
-) -> anyhow::Result<(Vec<u8>, usize)> {
+) -> ProjectResult<(Vec<u8>, usize)> {
     let view = read(options.block, options.metric, project, catalog, context).await?;
     let is_overlay = options.is_overlay;
     let draw = move || {
@@ -69,7 +70,9 @@ async fn draw(
         };
         (png_rgb8(&picture), view.characters.len())
     };
-    Ok(tokio::task::spawn_blocking(draw).await?)
+    Ok(tokio::task::spawn_blocking(draw)
+        .await
+        .map_err(TaskStopped)?)
 }
 
 /// Reads a block by the id that the user typed.
@@ -83,8 +86,8 @@ pub(crate) async fn read(
     project: &Project,
     catalog: &Catalog,
     context: &Context,
-) -> anyhow::Result<BlockView> {
-    let name = select::existing_block(catalog, typed).await?;
+) -> ProjectResult<BlockView> {
+    let name = selection::existing_block(catalog, typed).await?;
     let limits = input_file_limits(&context.settings()?.config);
     match BlockView::read(catalog, project, &name, metric, limits).await {
         Ok(view) => Ok(view),
@@ -95,7 +98,7 @@ pub(crate) async fn read(
     }
 }
 
-fn report(path: &Path, characters: usize, context: &Context) -> anyhow::Result<()> {
+fn report(path: &Path, characters: usize, context: &Context) -> ProjectResult<()> {
     context.print_json(&json!({"schema": 1, "file": path, "characters": characters}))?;
     let number = count(characters as u64, "character");
     context.info(&format!("{number} on {}", path.display()));

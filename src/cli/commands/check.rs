@@ -5,7 +5,6 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Context as _;
 use clap::Args;
 
 use crate::cli::output::busy::Busy;
@@ -13,10 +12,11 @@ use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::table::{columns, count, pairs_and_blocks};
 use mocban_catalog::{Catalog, CatalogError};
-use mocban_core::domain::one_line;
-use mocban_project::error_text;
-use mocban_project::exit::ExitCode;
+use mocban_core::domain::{ErrorCode, one_line};
+use mocban_project::error::WithContext as _;
+use mocban_project::error::without_error_numbers;
 use mocban_project::location::now;
+use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
@@ -53,7 +53,7 @@ pub(crate) struct CheckArgs {
 /// Findings of each kind, and inputs, that are listed.
 const MAX_LISTED: usize = 5;
 
-pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn check(args: CheckArgs, context: &Context) -> ProjectResult<ExitCode> {
     let busy = Busy::start(context, "checking the catalog and the files");
     let mut checked = once(&args, context).await;
     if is_database_damage(&checked) {
@@ -67,7 +67,7 @@ pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
     }
     let summary = match checked {
         Ok(summary) => summary,
-        Err(error) => return report_unreadable(error, context),
+        Err(error) => return Err(unreadable(error, context)),
     };
     if let Some(reason) = &summary.foreign_artifacts {
         context.warn(reason);
@@ -85,7 +85,7 @@ pub(crate) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
 
 /// Checks the project. Without `--repair`, nothing is changed and a run may be active. A repair holds the run's lock,
 /// and fails if another process works on the project.
-async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
+async fn once(args: &CheckArgs, context: &Context) -> ProjectResult<CheckSummary> {
     // What removes files or names an owner needs a project that can be written to, and says so at once.
     let writes = args.repair || args.take_over || args.collect.is_some();
     let (project, catalog) = if writes {
@@ -97,7 +97,8 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
     let asks = !args.repair || catalog.is_shared();
     let running = asks && runner::is_running(&project, &catalog, now()).await?;
     let lock = if args.repair {
-        exclusive_lock(&project, &catalog, running).context("nothing was repaired")?
+        exclusive_lock(&project, &catalog, running)
+            .with_context(|| "nothing was repaired".to_owned())?
     } else {
         None
     };
@@ -117,10 +118,10 @@ async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummar
 }
 
 /// Returns whether the database itself is reported as damaged.
-fn is_database_damage(checked: &anyhow::Result<CheckSummary>) -> bool {
+fn is_database_damage(checked: &ProjectResult<CheckSummary>) -> bool {
     match checked {
         Ok(summary) => summary.damage.contains_key(&Kind::Database) && summary.left() > 0,
-        Err(error) => error_text::catalog_error(error).is_some_and(error_text::is_damaged_file),
+        Err(error) => error.code() == ErrorCode::DamagedFile,
     }
 }
 
@@ -148,23 +149,18 @@ fn exclusive_lock(
     }
 }
 
-/// Reports a catalog that cannot be opened as damage.
-fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<ExitCode> {
-    let of_catalog = error_text::catalog_error(&error);
-    let Some(found) = of_catalog.filter(|error| error_text::is_damage(error)) else {
-        return Err(error);
-    };
+/// Returns the error of a catalog that cannot be opened, as damage if it is.
+fn unreadable(error: ProjectError, context: &Context) -> ProjectError {
     let dir = context.dir();
-    let text = match error_text::explain_catalog(found, &dir) {
-        Some(text) if !error_text::is_damaged_file(found) => text,
-        None if !error_text::is_damaged_file(found) => found.to_string(),
-        Some(_) | None => format!(
+    let text = match error.code() {
+        ErrorCode::Damaged | ErrorCode::NotACatalog => error.text(&dir),
+        ErrorCode::DamagedFile => format!(
             "{} is too damaged to be read; replace it with a backup, then run `check --repair`",
-            error_text::catalog_path(&dir)
+            dir.join(CATALOG_FILE).display()
         ),
+        _ => return error,
     };
-    context.error(&text, ExitCode::Damaged);
-    Ok(ExitCode::Damaged)
+    Refusal::Damaged(text).into()
 }
 
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
@@ -217,7 +213,7 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
     lines.extend(unreferenced(summary.unreferenced.as_ref(), args));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
-    error_text::without_error_numbers(&lines.collect::<Vec<_>>().join("\n")) + "\n"
+    without_error_numbers(&lines.collect::<Vec<_>>().join("\n")) + "\n"
 }
 
 /// Says what to do if most result files are missing and their results stay.

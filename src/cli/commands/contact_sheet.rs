@@ -6,15 +6,15 @@ use clap::Args;
 use serde_json::json;
 
 use super::block_sheet::{self, BlockSheetOptions};
-use crate::cli::input::select;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use mocban_core::domain::ThresholdMetric;
 use mocban_core::raster::png_rgb8;
 use mocban_export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files;
+use mocban_project::selection;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
@@ -66,7 +66,7 @@ impl Default for ContactSheetArgs {
 pub(crate) async fn contact_sheet(
     args: ContactSheetArgs,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     if let Some(block) = &args.block {
         let options = BlockSheetOptions {
             block,
@@ -102,7 +102,7 @@ const MAX_WARNINGS: usize = 5;
 pub(crate) async fn write(
     args: &ContactSheetArgs,
     context: &Context,
-) -> anyhow::Result<(PathBuf, ContactSheet)> {
+) -> ProjectResult<(PathBuf, ContactSheet)> {
     let (project, catalog) = context.open_read_only().await?;
     let path = match &args.output {
         Some(path) => path.clone(),
@@ -112,7 +112,7 @@ pub(crate) async fn write(
     let metric = args.metric.unwrap_or(ThresholdMetric::DEFAULT);
     let options = ContactSheetOptions {
         metric,
-        pairs: select::some_or_all(&catalog, &args.pairs).await?,
+        pairs: selection::some_or_all(&catalog, &args.pairs).await?,
         order: args.order,
         limit: usize::from(args.limit),
         columns: usize::from(args.columns),

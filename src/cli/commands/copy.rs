@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
@@ -11,9 +10,8 @@ use crate::cli::output::context::Context;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{Catalog, CatalogCopy, CatalogError, CopiedTable};
 use mocban_core::domain::is_address;
-use mocban_project::error_text::ErrorPlace;
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::location::{now, refuse_password, settings_of};
+use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner as runner;
 use mocban_store::{Project, SETTINGS_FILE};
 
@@ -27,7 +25,7 @@ pub(crate) struct CopyArgs {
     pub(crate) to: String,
 }
 
-pub(crate) async fn copy(args: CopyArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn copy(args: CopyArgs, context: &Context) -> ProjectResult<ExitCode> {
     let CopyArgs { from, to } = args;
     // Before these addresses are part of any message.
     for place in [&from, &to] {
@@ -38,16 +36,12 @@ pub(crate) async fn copy(args: CopyArgs, context: &Context) -> anyhow::Result<Ex
         }
     }
     let source = open(&from, context).await;
-    let source = source.with_context(|| of_source(&from))?;
+    let source = source.map_err(|error| of_source(error, &from))?;
     let busy = Busy::start(context, "copying the catalog");
-    let copied = write(&source, &to).await;
+    let copied = write(&source, &from, &to).await;
     drop(busy);
     source.close().await;
-    let CatalogCopy { tables, existed } = copied.map_err(|error| match error.downcast() {
-        Ok(CatalogError::Original(error)) => anyhow::Error::new(*error).context(of_source(&from)),
-        Ok(error) => anyhow::Error::new(error).context(of_target(&to)),
-        Err(error) => error.context(of_target(&to)),
-    })?;
+    let CatalogCopy { tables, existed } = copied?;
     let document = json!({"schema": 1, "tables": tables, "existed": existed});
     context.print(&document, || text(&tables))?;
     context.info(&if existed {
@@ -60,16 +54,18 @@ pub(crate) async fn copy(args: CopyArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-fn of_source(from: &str) -> ErrorPlace {
-    ErrorPlace::new(from, format!("cannot copy {from}"))
+fn of_source(error: impl Into<ProjectError>, from: &str) -> ProjectError {
+    let error = error.into().context(format!("cannot copy {from}"));
+    error.of_project(from)
 }
 
-fn of_target(to: &str) -> ErrorPlace {
-    ErrorPlace::new(to, format!("cannot copy to {to}"))
+fn of_target(error: impl Into<ProjectError>, to: &str) -> ProjectError {
+    let error = error.into().context(format!("cannot copy to {to}"));
+    error.of_project(to)
 }
 
 /// Opens the catalog of a project folder or an address for reading. Warns if a run is active.
-async fn open(place: &str, context: &Context) -> anyhow::Result<Catalog> {
+async fn open(place: &str, context: &Context) -> ProjectResult<Catalog> {
     let (catalog, is_running) = if is_address(place) {
         let catalog = Catalog::connect_read_only(place).await?;
         let workers = catalog.active_workers(now()).await?;
@@ -89,24 +85,28 @@ async fn open(place: &str, context: &Context) -> anyhow::Result<Catalog> {
 }
 
 /// Copies the catalog to a project folder or an address, and creates what is missing there.
-async fn write(source: &Catalog, place: &str) -> anyhow::Result<CatalogCopy> {
+async fn write(source: &Catalog, from: &str, to: &str) -> ProjectResult<CatalogCopy> {
     let progress = |table, rows| tracing::info!(table, rows, "copied");
-    if is_address(place) {
-        return Ok(source.copy_to_server(place, progress).await?);
+    let failed = |error| match error {
+        CatalogError::Original(error) => of_source(*error, from),
+        error => of_target(error, to),
+    };
+    if is_address(to) {
+        return source.copy_to_server(to, progress).await.map_err(failed);
     }
-    let dir = Path::new(place);
+    let dir = Path::new(to);
     let existed = dir.exists();
-    let project = Project::create(dir)?;
+    let project = Project::create(dir).map_err(|error| of_target(error, to))?;
     let copied = source.copy_to_file(&project.catalog_path(), progress).await;
     if copied.is_err() && !existed {
         // Fails unless the directory is empty.
         let _ = std::fs::remove_dir(dir);
     }
-    Ok(copied?)
+    copied.map_err(failed)
 }
 
 /// Refuses a folder whose settings name a catalog on a server, because commands in it do not use its file.
-fn require_own_catalog(dir: &Path) -> anyhow::Result<()> {
+fn require_own_catalog(dir: &Path) -> ProjectResult<()> {
     let url = settings_of(dir)?.config.storage.catalog;
     if url.is_empty() {
         return Ok(());

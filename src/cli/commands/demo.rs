@@ -3,7 +3,6 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::Args;
 
 use super::config::{ConfigShowArgs, as_toml};
@@ -24,10 +23,11 @@ use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
 use mocban_project::demo_folder::{DemoContent, STOPPED, check_directory};
-use mocban_project::exit::ExitCode;
+use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
 use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
 
@@ -62,7 +62,7 @@ pub(crate) struct DemoArgs {
     pub(crate) no_run: bool,
 }
 
-pub(crate) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<ExitCode> {
     let dir = demo_dir(&args, context);
     let content = content(&args);
     let context = context.at(&dir);
@@ -120,7 +120,7 @@ async fn block_demo(
     options: BlockOptions,
     args: &DemoArgs,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let Some(files) = demo_block::create_files(dir, options, context).await? else {
         context.info(STOPPED);
         return Ok(ExitCode::Stopped);
@@ -141,7 +141,7 @@ async fn align(
     dir: &Path,
     block_truth: Option<&Path>,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let config = context.settings()?.config;
     let (project, catalog) = context.open().await?;
     let options = run::from_config(&config);
@@ -191,7 +191,7 @@ async fn create_dataset(
     dir: &Path,
     options: DemoOptions,
     context: &Context,
-) -> anyhow::Result<Option<DatasetFiles>> {
+) -> ProjectResult<Option<DatasetFiles>> {
     let data = dir.join("data");
     check_directory(dir, &data, &DemoContent::Pairs(options))?;
     let found = find_dataset(&data, &options);
@@ -216,7 +216,7 @@ async fn replace_dataset(
     data: &Path,
     options: DemoOptions,
     context: &Context,
-) -> anyhow::Result<Option<DatasetFiles>> {
+) -> ProjectResult<Option<DatasetFiles>> {
     let busy = Busy::of_pairs(context, "creating demo data", options.pairs);
     let write = move |folder: &Path, stop: &Stop| {
         let is_stopped = || {
@@ -237,7 +237,7 @@ async fn replace_dataset(
 /// Saves the settings of `--config` and `--set` in the project's settings file, for later commands.
 ///
 /// A file with other settings is not changed. In that case the flags apply to this call only.
-fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
+fn save_settings(dir: &Path, context: &Context) -> ProjectResult<Context> {
     let global = &context.global;
     if global.config.is_none() && global.set.is_empty() {
         return Ok(context.clone());

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use mocban_demo::DatasetError;
+use mocban_project::ProjectResult;
 use mocban_project::demo_folder;
 use mocban_runner::Stop;
 
@@ -16,7 +17,7 @@ pub(crate) async fn replace_data<T: Send + 'static>(
     data: &Path,
     context: &Context,
     write: impl FnOnce(&Path, &Stop) -> Result<T, DatasetError> + Send + 'static,
-) -> anyhow::Result<Option<T>> {
+) -> ProjectResult<Option<T>> {
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
     let replaced = demo_folder::replace_data(data, &stop, write).await;

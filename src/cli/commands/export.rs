@@ -15,8 +15,8 @@ use mocban_export::{
     ExportFormat, ExportOptions, ExportSummary, ResultFilter, SplitBy, SplitCounts, SplitSettings,
     SplitShares,
 };
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files::input_file_limits;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -121,7 +121,7 @@ impl ExportArgs {
     }
 }
 
-pub(crate) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     let loaded = context.settings()?;
     let (config, formats) = (&loaded.config, args.formats());
@@ -183,7 +183,7 @@ fn print_summary(
     summary: &ExportSummary,
     args: &ExportArgs,
     context: &Context,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     let unreadable = summary.unreadable.iter();
     let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
     let blocks = summary.unreadable_blocks.iter();

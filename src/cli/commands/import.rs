@@ -11,9 +11,9 @@ use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
 use mocban_core::domain::LengthUnit;
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -48,7 +48,7 @@ pub(crate) struct ImportArgs {
     pub(crate) allow_missing: bool,
 }
 
-pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let items = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_truths(&args)?;
@@ -80,7 +80,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
 }
 
 /// Returns what the arguments name.
-fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+fn items(args: &ImportArgs) -> ProjectResult<ListedItems> {
     if let Some(source) = args.block.source(args.unit) {
         return Ok(ListedItems::Blocks(source));
     }
@@ -91,12 +91,15 @@ fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
             prints: prints.clone(),
             unit: args.unit,
         })),
-        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+        (None, ..) => {
+            let text = "give a manifest, or --meshes and --prints";
+            Err(Refusal::Usage(text.to_owned()).into())
+        }
     }
 }
 
 /// Refuses true alignments of pairs in an import of blocks.
-fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
+fn refuse_truths(args: &ImportArgs) -> ProjectResult<()> {
     if args.truth.is_none() {
         return Ok(());
     }

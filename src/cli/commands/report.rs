@@ -12,9 +12,9 @@ use crate::cli::output::streams;
 use mocban_catalog::Catalog;
 use mocban_config::{self as config, Sources};
 use mocban_export::{GallerySelection, draw_gallery};
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files;
 use mocban_project::location::now;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_report::{
     Cover, Report, ReportFormat, build, build_with, page, quality_gate, render, summary,
 };
@@ -64,7 +64,7 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     if let Some(path) = &args.output {
         files::refuse_used_file(path, &project, &catalog).await?;
@@ -152,7 +152,7 @@ async fn pictured(
     pictures: GallerySelection,
     (project, catalog): (&Project, &Catalog),
     context: &Context,
-) -> anyhow::Result<(String, bool)> {
+) -> ProjectResult<(String, bool)> {
     let limits = context.settings()?.config.limits.image;
     let gallery = draw_gallery(pictures, catalog, project, limits).await?;
     let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
@@ -177,7 +177,7 @@ async fn compared(
     other: &Path,
     format: ReportFormat,
     context: &Context,
-) -> anyhow::Result<String> {
+) -> ProjectResult<String> {
     let there = read(&context.at(other)).await?.with_interval(here.interval);
     let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
     if format == ReportFormat::Json {
@@ -190,7 +190,7 @@ async fn compared(
 }
 
 /// Prints the beginning of the report to stdout, or with `--json` the whole report.
-pub(crate) async fn print_summary(context: &Context) -> anyhow::Result<()> {
+pub(crate) async fn print_summary(context: &Context) -> ProjectResult<()> {
     let report = read(context).await?;
     if context.global.json {
         streams::print_json_text(&render(&report, ReportFormat::Json))?;
@@ -209,7 +209,7 @@ const fn chosen_format(format: ReportFormat, context: &Context) -> ReportFormat 
     }
 }
 
-async fn read(context: &Context) -> anyhow::Result<Report> {
+async fn read(context: &Context) -> ProjectResult<Report> {
     let (project, catalog) = context.open_read_only().await?;
     let report = build(&catalog, &project).await?.without_times();
     catalog.close().await;
@@ -217,7 +217,7 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
 }
 
 /// Names the settings of the results that are not the default ones.
-fn with_defaults(mut report: Report) -> anyhow::Result<Report> {
+fn with_defaults(mut report: Report) -> ProjectResult<Report> {
     let defaults = config::load(&Sources::default())?.config.stages;
     let fields = |stage| defaults.fingerprint_fields(stage);
     report.provenance.compare_with(fields);

@@ -8,8 +8,8 @@ use serde_json::json;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_project::exit::ExitCode;
 use mocban_project::restore::{self, RestoreRequest};
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::SETTINGS_FILE;
 
 /// Arguments of `restore`.
@@ -24,7 +24,7 @@ pub(crate) struct RestoreArgs {
     pub(crate) inputs: Option<PathBuf>,
 }
 
-pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn restore(args: RestoreArgs, context: &Context) -> ProjectResult<ExitCode> {
     let request = RestoreRequest {
         backup: args.backup,
         dir: args.dir,

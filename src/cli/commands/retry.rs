@@ -3,12 +3,12 @@
 use clap::Args;
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
 use mocban_catalog::{BlockJob, Catalog, RetrySelection};
 use mocban_core::domain::FailureClass;
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::selection;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::NamedWork;
 
 /// Arguments of `retry`.
@@ -22,7 +22,7 @@ pub(crate) struct RetryArgs {
     pub(crate) class: Option<FailureClass>,
 }
 
-pub(crate) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn retry(args: RetryArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open().await?;
     let (selection, block_selection) = selection(&args, &catalog).await?;
     let [retried, blocks] = catalog
@@ -47,14 +47,14 @@ pub(crate) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
 async fn selection(
     args: &RetryArgs,
     catalog: &Catalog,
-) -> anyhow::Result<(RetrySelection, RetrySelection<BlockJob>)> {
+) -> ProjectResult<(RetrySelection, RetrySelection<BlockJob>)> {
     if let Some(class) = args.class {
         return Ok((RetrySelection::Class(class), RetrySelection::Class(class)));
     }
     if args.names.is_empty() {
         return Ok((RetrySelection::All, RetrySelection::All));
     }
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(catalog, &args.names).await?;
+    let NamedWork { pairs, blocks } = selection::pairs_and_blocks(catalog, &args.names).await?;
     Ok((RetrySelection::Names(pairs), RetrySelection::Names(blocks)))
 }
 

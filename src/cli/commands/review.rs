@@ -6,7 +6,6 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::json;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
 use crate::cli::input::signals;
@@ -20,11 +19,12 @@ use mocban_pages::review::{
     self, CheckRates, FaultShortage, Language, QueueCounts, QueueOptions, ReviewOptions,
     ReviewServer,
 };
-use mocban_project::error_text;
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::closing::{AFTER_SILENCE, close_within};
+use mocban_project::error::explanation;
 use mocban_project::files::input_file_limits;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
 
 /// Time after a signal during which answers still wait for an unavailable database server.
@@ -97,7 +97,7 @@ fn percent(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
     let settings = context.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
@@ -128,7 +128,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
         limits: input_file_limits(&settings.config),
-        explain: error_text::catalog_text,
+        explain: explanation,
         now,
         queue: queue_options(&args),
     };
@@ -203,7 +203,7 @@ fn queue_options(args: &ReviewArgs) -> QueueOptions {
 }
 
 /// Reports that there is nothing to adjudicate.
-fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+fn no_conflict(args: &ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     if context.global.json {
         streams::print_json_text(&json!({"schema": 1, "url": null}).to_string())?;
     }
@@ -232,7 +232,7 @@ fn announce(
     page: &ReviewServer,
     args: &ReviewArgs,
     context: &Context,
-) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+) -> ProjectResult<Option<tempfile::NamedTempFile>> {
     let (url, address) = (page.url(), page.address());
     if context.global.json {
         streams::print_json_text(&json!({"schema": 1, "url": url}).to_string())?;

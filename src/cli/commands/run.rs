@@ -5,10 +5,8 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::closing::close;
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
-use crate::cli::input::select;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::Failures;
@@ -16,10 +14,11 @@ use crate::cli::output::missing_results;
 use crate::cli::output::progress::ProgressReporter;
 use mocban_catalog::{Catalog, RerunPolicy};
 use mocban_config::Config;
-use mocban_core::domain::Stage;
-use mocban_project::error_text;
-use mocban_project::exit::ExitCode;
+use mocban_core::domain::{ErrorCode, Stage};
+use mocban_project::closing::close;
 use mocban_project::location::now;
+use mocban_project::selection;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{self as runner, RunOptions, RunPart, RunPlan, RunSummary, Stop};
 use mocban_store::Project;
 
@@ -66,7 +65,7 @@ pub(crate) fn rerun(text: &str) -> Result<RerunPolicy, String> {
     }
 }
 
-pub(crate) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn run(args: RunArgs, context: &Context) -> ProjectResult<ExitCode> {
     execute(args, RunPart::All, context).await
 }
 
@@ -75,11 +74,14 @@ pub(crate) async fn execute(
     args: RunArgs,
     part: RunPart,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
     let config = context.settings()?.config;
     let (project, catalog) = match context.open_for_run().await {
-        Err(error) if args.dry_run && error_text::is_not_writable(&error) => {
+        Err(error)
+            if args.dry_run
+                && matches!(error.code(), ErrorCode::NotWritable | ErrorCode::DiskFull) =>
+        {
             context.warn("the project cannot be written to, so input files that changed since the last run are not noticed");
             context.open_read_only().await?
         }
@@ -134,10 +136,10 @@ pub(crate) async fn options(
     config: &Config,
     catalog: &Catalog,
     part: RunPart,
-) -> anyhow::Result<RunOptions> {
+) -> ProjectResult<RunOptions> {
     let only = match args.names.as_slice() {
         [] => None,
-        typed => Some(select::pairs_and_blocks(catalog, typed).await?),
+        typed => Some(selection::pairs_and_blocks(catalog, typed).await?),
     };
     let plain = from_config(config);
     Ok(RunOptions {
@@ -182,7 +184,7 @@ pub(crate) async fn drive(
     config: &Config,
     options: &RunOptions,
     context: &Context,
-) -> anyhow::Result<(RunSummary, Failures)> {
+) -> ProjectResult<(RunSummary, Failures)> {
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let global = &context.global;
@@ -236,7 +238,7 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult<ExitCode> {
     let (blocks, plan) = (&plan.blocks, &plan.pairs);
     let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan, "blocks": blocks});
     context.print(&json, || {

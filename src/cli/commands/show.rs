@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 use super::show_block::show_block;
 use super::verdict;
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::may_succeed_unchanged;
 use crate::cli::output::screen::{Palette, Tone};
@@ -17,8 +16,9 @@ use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, 
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_results::ManualCorrection;
 use mocban_runner::{self as runner, NamedWork};
 use mocban_store::Project;
@@ -31,18 +31,21 @@ pub(crate) struct ShowArgs {
     pub(crate) name: Option<String>,
 }
 
-pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     let Some(typed) = args.name else {
         return list_names(&catalog, context).await;
     };
     let typed = std::slice::from_ref(&typed);
-    let NamedWork { pairs, blocks } = select::pairs_and_blocks(&catalog, typed).await?;
+    let NamedWork { pairs, blocks } = selection::pairs_and_blocks(&catalog, typed).await?;
     let (pair, block) = (pairs.into_iter().next(), blocks.into_iter().next());
     let name = match (pair, block) {
         (_, Some(block)) => return show_block(&block, &project, catalog, context).await,
         (Some(pair), None) => pair,
-        (None, None) => anyhow::bail!("{} was not looked up", typed[0]),
+        (None, None) => {
+            let text = format!("{} was not looked up", typed[0]);
+            return Err(ProjectError::unexpected(text));
+        }
     };
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     let why = catalog.why(&name, &fingerprints).await?;
@@ -53,7 +56,8 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
             );
             return Err(Refusal::NothingSelected(text).into());
         }
-        anyhow::bail!("pair {name} was removed while it was read");
+        let text = format!("pair {name} was removed while it was read");
+        return Err(ProjectError::unexpected(text));
     };
     let manual = manual_results(&catalog, &detail.results).await?;
     catalog.close().await;
@@ -77,7 +81,7 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
 const NAMES_AT_ONCE: usize = 1000;
 
 /// Prints the names of all blocks and pairs, one per line. Retired pairs are left out.
-async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<ExitCode> {
+async fn list_names(catalog: &Catalog, context: &Context) -> ProjectResult<ExitCode> {
     let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
     let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
     pairs.retain(|pair| !retired.contains(pair));
@@ -147,7 +151,7 @@ fn as_json(
     manual: &[ManualResult],
     why: Option<&PlanEntry>,
     project: &Project,
-) -> anyhow::Result<Value> {
+) -> ProjectResult<Value> {
     let mut value = serde_json::to_value(detail)?;
     let files = detail
         .results

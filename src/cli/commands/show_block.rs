@@ -10,8 +10,8 @@ use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
 use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
-use mocban_project::exit::ExitCode;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectError, ProjectResult};
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
 
@@ -27,9 +27,10 @@ pub(crate) async fn show_block(
     project: &Project,
     catalog: Catalog,
     context: &Context,
-) -> anyhow::Result<ExitCode> {
+) -> ProjectResult<ExitCode> {
     let Some(detail) = catalog.block(name).await? else {
-        anyhow::bail!("block {name} was removed while it was read");
+        let text = format!("block {name} was removed while it was read");
+        return Err(ProjectError::unexpected(text));
     };
     let characters = catalog.block_characters(name).await?;
     catalog.close().await;
@@ -54,7 +55,7 @@ fn as_json(
     detail: &BlockDetail,
     characters: &[StoredCharacter],
     project: &Project,
-) -> anyhow::Result<Value> {
+) -> ProjectResult<Value> {
     let mut value = serde_json::to_value(detail)?;
     value["schema"] = json!(1);
     value["character_list"] = serde_json::to_value(characters)?;

@@ -7,7 +7,6 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::closing::{AFTER_SILENCE, close_within};
 use super::review::review_step;
 use super::status_hosts;
 use crate::cli::output::context::Context;
@@ -18,9 +17,10 @@ use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
-use mocban_project::exit::ExitCode;
+use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{self as runner, Stop};
 use mocban_store::Project;
 
@@ -40,7 +40,7 @@ pub(crate) struct StatusArgs {
 
 const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
-pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn status(args: StatusArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     if !args.watch {
         print_once(&project, &catalog, &args, context).await?;
@@ -54,7 +54,7 @@ pub(crate) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
         }
     };
     // Also ends a read to which the database server does not reply.
-    let ended: anyhow::Result<Infallible> = tokio::select! {
+    let ended: ProjectResult<Infallible> = tokio::select! {
         ended = watching => ended,
         _ = tokio::signal::ctrl_c() => {
             close_within(catalog, &Stop::new(), AFTER_SILENCE).await;
@@ -70,7 +70,7 @@ async fn print_once(
     catalog: &Catalog,
     args: &StatusArgs,
     context: &Context,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     if args.hosts {
         let workers = status_hosts::read(catalog, now()).await?;
         let (json, text) = (workers.json(), workers.text(context.stdout));
@@ -86,7 +86,7 @@ async fn read(
     catalog: &Catalog,
     args: &StatusArgs,
     context: &Context,
-) -> anyhow::Result<ProjectStatus> {
+) -> ProjectResult<ProjectStatus> {
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     // Read before the counts: a run that ends in between leaves no leases.
     let running = runner::is_running(project, catalog, now()).await?;
@@ -129,7 +129,7 @@ impl ProjectStatus {
         u64::from(!self.running) * self.jobs(JobStatus::Leased)
     }
 
-    fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
+    fn json(&self, with_failures: bool) -> ProjectResult<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
         if !self.failures.blocks.is_empty() {
@@ -146,11 +146,7 @@ impl ProjectStatus {
     }
 }
 
-fn print_status(
-    status: &ProjectStatus,
-    args: &StatusArgs,
-    context: &Context,
-) -> anyhow::Result<()> {
+fn print_status(status: &ProjectStatus, args: &StatusArgs, context: &Context) -> ProjectResult<()> {
     let dir = context.dir().display().to_string();
     let text = screen(status, &dir, context.stdout);
     print_refreshed(args, context, &status.json(args.failed)?, text)?;
@@ -168,7 +164,7 @@ fn print_refreshed(
     context: &Context,
     json: &Value,
     mut text: String,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     if context.global.json {
         if args.watch {
             streams::print_json_text(&json.to_string())?;

@@ -6,9 +6,10 @@ use serde_json::{Value, json};
 
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::table::{columns, count};
-use crate::cli::output::worker_totals::{WorkerTotals, is_present};
 use mocban_catalog::{Catalog, WorkerRecord, WorkerState};
 use mocban_core::domain::UnixMillis;
+use mocban_project::ProjectResult;
+use mocban_project::worker_totals::{WorkerTotals, is_present};
 use mocban_system::time_text::rough_duration;
 
 /// Workers without a heartbeat for longer are not shown, in milliseconds.
@@ -21,7 +22,7 @@ pub(crate) struct WorkerTable {
 }
 
 /// Reads the workers that had a heartbeat within a day.
-pub(crate) async fn read(catalog: &Catalog, now: UnixMillis) -> anyhow::Result<WorkerTable> {
+pub(crate) async fn read(catalog: &Catalog, now: UnixMillis) -> ProjectResult<WorkerTable> {
     let workers = catalog.workers(now - SHOWN_MS).await?;
     Ok(WorkerTable::new(workers, now))
 }

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use crate::cli::input::select;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::streams;
@@ -16,11 +15,12 @@ use mocban_catalog::{
     VerdictEvent, check_reviewer,
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::files::{self, RefusedLine};
 use mocban_project::location::now;
+use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::verdict_file::{self, VerdictList};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_system::time_text::{duration, local};
 
 /// Commands on verdicts.
@@ -98,10 +98,7 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(crate) async fn verdict(
-    command: VerdictCommand,
-    context: &Context,
-) -> anyhow::Result<ExitCode> {
+pub(crate) async fn verdict(command: VerdictCommand, context: &Context) -> ProjectResult<ExitCode> {
     match command {
         VerdictCommand::Set(args) => set(args, context).await,
         VerdictCommand::Import(args) => import(args, context).await,
@@ -110,12 +107,12 @@ pub(crate) async fn verdict(
     }
 }
 
-async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn set(args: VerdictSetArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_verdicts(&args.reviewer)?;
     let new = NewVerdict {
-        pair: select::pair(&catalog, &args.pair).await?,
+        pair: selection::pair(&catalog, &args.pair).await?,
         metric: args.metric,
         verdict: args.verdict,
         reviewer: args.reviewer,
@@ -157,7 +154,7 @@ fn verdict_text(new: &NewVerdict) -> String {
     format!("{}, {metric}: {}", new.pair, new.verdict)
 }
 
-async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let bytes = files::read(&args.file)?;
     let (_project, catalog) = context.open().await?;
     let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
@@ -206,10 +203,10 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn log(args: VerdictLogArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
     let pair = match &args.pair {
-        Some(typed) => Some(select::pair(&catalog, typed).await?),
+        Some(typed) => Some(selection::pair(&catalog, typed).await?),
         None => None,
     };
     let (sound, mut damaged) = catalog.without_faulty_rows().await?;
@@ -253,7 +250,7 @@ fn damaged_text(rows: &[FaultyRow], palette: Palette) -> String {
     rows.iter().map(line).collect()
 }
 
-async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn undo(args: VerdictUndoArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (_project, catalog) = context.open().await?;
     let rights = catalog.review_rights().await?;
     let reviewer = args.reviewer.as_deref().or(rights.only_reviewer());

@@ -3,7 +3,6 @@
 use clap::Args;
 use serde_json::json;
 
-use super::closing::close;
 use super::metrics::MetricsArgs;
 use super::run::{self, RunArgs};
 use crate::cli::input::signals;
@@ -11,7 +10,8 @@ use crate::cli::output::context::Context;
 use crate::cli::output::table::pairs_and_blocks;
 use mocban_catalog::RerunPolicy;
 use mocban_core::domain::Stage;
-use mocban_project::exit::ExitCode;
+use mocban_project::closing::close;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{self as runner, RunPart, Stop};
 
 /// Arguments of `plan`.
@@ -45,7 +45,7 @@ pub(crate) struct WorkerArgs {
     pub(crate) metrics: MetricsArgs,
 }
 
-pub(crate) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<ExitCode> {
     let args = RunArgs {
         names: args.names,
         rerun: args.rerun,
@@ -72,7 +72,7 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-pub(crate) async fn worker(args: WorkerArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn worker(args: WorkerArgs, context: &Context) -> ProjectResult<ExitCode> {
     let args = RunArgs {
         jobs: args.jobs,
         memory: args.memory,

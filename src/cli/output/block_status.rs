@@ -8,6 +8,7 @@ use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use mocban_catalog::{BlockState, Catalog};
 use mocban_core::domain::{JobStatus, one_line};
+use mocban_project::ProjectResult;
 
 /// Number of failed blocks that are named, unless all are requested.
 const NAME_LIMIT: usize = 5;
@@ -21,7 +22,7 @@ pub(crate) struct BlockStatus {
 
 impl BlockStatus {
     /// Reads the blocks, to name all failed ones or the first few.
-    pub(crate) async fn read(catalog: &Catalog, all: bool) -> anyhow::Result<Self> {
+    pub(crate) async fn read(catalog: &Catalog, all: bool) -> ProjectResult<Self> {
         Ok(Self {
             states: catalog.block_states().await?,
             name_limit: if all { usize::MAX } else { NAME_LIMIT },

@@ -13,10 +13,11 @@ use super::streams;
 use super::table::count;
 use crate::cli::input::global::Global;
 use mocban_catalog::{Catalog, SetApart};
-use mocban_config::Loaded;
-use mocban_project::exit::ExitCode;
+use mocban_config::{ConfigError, Loaded};
+use mocban_project::error::TaskStopped;
 use mocban_project::location::Location;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner as runner;
 use mocban_store::{Project, ProjectStorage};
 
@@ -76,17 +77,17 @@ impl Context {
     }
 
     /// Returns the settings in effect for this project.
-    pub(crate) fn settings(&self) -> anyhow::Result<Loaded> {
+    pub(crate) fn settings(&self) -> Result<Loaded, ConfigError> {
         self.location.settings()
     }
 
     /// Opens the project and its catalog for reading; works during a run.
-    pub(crate) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub(crate) async fn open_read_only(&self) -> ProjectResult<(Project, Catalog)> {
         self.location.open_read_only().await
     }
 
     /// Opens the project and its catalog for reading and writing.
-    pub(crate) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub(crate) async fn open(&self) -> ProjectResult<(Project, Catalog)> {
         self.location.open().await
     }
 
@@ -132,7 +133,7 @@ impl Context {
         &self,
         value: &impl Serialize,
         text: impl FnOnce() -> String,
-    ) -> anyhow::Result<()> {
+    ) -> ProjectResult<()> {
         if self.global.json {
             streams::print_json(value)
         } else {
@@ -141,7 +142,7 @@ impl Context {
     }
 
     /// Writes a JSON document to stdout with `--json`.
-    pub(crate) fn print_json(&self, value: &impl Serialize) -> anyhow::Result<()> {
+    pub(crate) fn print_json(&self, value: &impl Serialize) -> ProjectResult<()> {
         if self.global.json {
             streams::print_json(value)?;
         }
@@ -150,14 +151,17 @@ impl Context {
 
     /// Opens the project and its catalog for a run, and asks the object stores of the settings whether they answer. Warns
     /// about roots of inputs that are not there.
-    pub(crate) async fn open_for_run(&self) -> anyhow::Result<(Project, Catalog)> {
+    pub(crate) async fn open_for_run(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, catalog) = self.open().await?;
         if project.storage().is_none() {
             return Ok((project, catalog));
         }
         let checked = project.clone();
         let check = move || checked.storage().map_or(Ok(()), ProjectStorage::check);
-        if let Err(error) = tokio::task::spawn_blocking(check).await? {
+        if let Err(error) = tokio::task::spawn_blocking(check)
+            .await
+            .map_err(TaskStopped)?
+        {
             catalog.close().await;
             return Err(error.into());
         }
@@ -177,7 +181,7 @@ impl Context {
 
     /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
     /// settings are invalid.
-    pub(crate) async fn warn_about_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
+    pub(crate) async fn warn_about_stale(&self, catalog: &Catalog) -> ProjectResult<()> {
         let Ok(settings) = self.settings() else {
             return Ok(());
         };

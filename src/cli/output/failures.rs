@@ -6,6 +6,7 @@ use super::block_status::BlockStatus;
 use super::table::columns;
 use mocban_catalog::{Catalog, FailedPair, StoredFailure};
 use mocban_core::domain::FailureClass;
+use mocban_project::ProjectResult;
 
 /// Maximum number of failed pairs that are read, unless all are requested.
 const READ_LIMIT: usize = 200;
@@ -33,7 +34,7 @@ pub(crate) struct Failures {
 
 impl Failures {
     /// Reads the failures, to name all of them or a few of each class.
-    pub(crate) async fn read(catalog: &Catalog, all: bool) -> anyhow::Result<Self> {
+    pub(crate) async fn read(catalog: &Catalog, all: bool) -> ProjectResult<Self> {
         let (limit, names_per_class) = if all {
             (NO_LIMIT, NO_LIMIT)
         } else {

@@ -13,4 +13,3 @@ pub(crate) mod screen;
 pub(crate) mod show_text;
 pub(crate) mod streams;
 pub(crate) mod table;
-pub(crate) mod worker_totals;

@@ -6,6 +6,7 @@ pub(crate) mod conn;
 pub(crate) mod dialect;
 pub(crate) mod error;
 pub(crate) mod error_kind;
+mod explained;
 pub(crate) mod lock_owner;
 pub(crate) mod log_watch;
 pub(crate) mod network_fs;

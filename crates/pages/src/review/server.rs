@@ -14,6 +14,7 @@ use super::state::ServerState;
 use super::unstored::UnstoredEvents;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkFailed, WorkThread, listen, serve};
 use mocban_catalog::{Catalog, CatalogError};
+use mocban_core::domain::explained_by_cause;
 use mocban_store::Project;
 
 /// Why the server cannot start or run.
@@ -37,6 +38,8 @@ pub enum ReviewError {
     #[error("cannot plant an attention check: {0}")]
     Fault(WorkFailed),
 }
+
+explained_by_cause! { ReviewError: Catalog }
 
 /// A server that is bound and ready to serve.
 #[derive(Debug)]

@@ -23,7 +23,7 @@ use mocban_catalog::{
     AuditedPair, Catalog, CatalogError, CatalogErrorKind, ChecksummedTable, Drift, FaultyRow,
     SetApart,
 };
-use mocban_core::domain::{BlockId, BlockStage, UnixMillis};
+use mocban_core::domain::{BlockId, BlockStage, UnixMillis, explained_by_cause};
 use mocban_store::{ArtifactError, PlaceError, Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::PairCheck;
 
@@ -74,6 +74,8 @@ pub enum CheckError {
     #[error("the check stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
+
+explained_by_cause! { CheckError: Catalog, Claim }
 
 /// Checks a project and, with `repair`, repairs it.
 ///

@@ -11,7 +11,7 @@ use super::cache::{CachedObject, ObjectCache};
 use super::listing::FolderLists;
 use super::pack::{key, read_pack};
 use super::small_cache::SmallCache;
-use mocban_core::domain::is_address;
+use mocban_core::domain::{ErrorCode, Explained, is_address};
 
 /// The settings of a storage.
 #[derive(Debug, Clone, Default)]
@@ -89,6 +89,16 @@ pub enum StorageError {
         /// Why.
         source: BucketError,
     },
+}
+
+impl Explained for StorageError {
+    fn code(&self) -> ErrorCode {
+        if self.is_unavailable() {
+            ErrorCode::Unavailable
+        } else {
+            ErrorCode::Settings
+        }
+    }
 }
 
 impl StorageError {

@@ -9,7 +9,7 @@ use mocban_core::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMet
 
 /// Sums over one or more workers.
 #[derive(Debug, Default)]
-pub(crate) struct WorkerTotals {
+pub struct WorkerTotals {
     jobs: u64,
     leased: u64,
     done: u64,
@@ -23,10 +23,7 @@ pub(crate) struct WorkerTotals {
 
 impl WorkerTotals {
     /// Sums up the workers. Jobs and memory are those of the workers that are present.
-    pub(crate) fn of<'w>(
-        workers: impl IntoIterator<Item = &'w WorkerRecord>,
-        now: UnixMillis,
-    ) -> Self {
+    pub fn of<'w>(workers: impl IntoIterator<Item = &'w WorkerRecord>, now: UnixMillis) -> Self {
         let mut totals = Self::default();
         for worker in workers {
             totals.leased += worker.leased;
@@ -41,7 +38,7 @@ impl WorkerTotals {
     }
 
     /// Returns the numbers of one worker.
-    pub(crate) fn of_one(worker: &WorkerRecord) -> Self {
+    pub fn of_one(worker: &WorkerRecord) -> Self {
         let mut totals = Self {
             leased: worker.leased,
             ..Self::default()
@@ -90,7 +87,7 @@ impl WorkerTotals {
     }
 
     /// Returns the sums as fields of a JSON object.
-    pub(crate) fn json(&self) -> Map<String, Value> {
+    pub fn json(&self) -> Map<String, Value> {
         let stages = Stage::ALL.map(|stage| (stage, rounded(self.stage_ms(stage), 1e1)));
         let waits = WaitReason::ALL.map(|reason| {
             let share = self.wait_share(&[reason]);
@@ -112,7 +109,7 @@ impl WorkerTotals {
     }
 
     /// Returns the cells of a row after the state.
-    pub(crate) fn cells(&self) -> Vec<String> {
+    pub fn cells(&self) -> Vec<String> {
         let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
         let percent = |share: f64| format!("{:.1} %", share * 100.0);
         let mut cells = vec![self.done.to_string(), self.failed.to_string()];
@@ -140,6 +137,6 @@ fn rounded(number: Option<f64>, scale: f64) -> Option<f64> {
 }
 
 /// Returns whether a worker still works, as far as is known.
-pub(crate) const fn is_present(state: WorkerState) -> bool {
+pub const fn is_present(state: WorkerState) -> bool {
     matches!(state, WorkerState::Alive | WorkerState::Stopping)
 }

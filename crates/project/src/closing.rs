@@ -9,10 +9,10 @@ use mocban_runner::{Stop, StopLevel};
 /// Maximum time to close the catalog after a signal.
 const AFTER_STOP: Duration = Duration::from_secs(2);
 /// Maximum time to close the catalog if its server has already failed to reply for the time that a signal allows.
-pub(crate) const AFTER_SILENCE: Duration = Duration::from_millis(500);
+pub const AFTER_SILENCE: Duration = Duration::from_millis(500);
 
 /// Closes the catalog. A first signal gives it [`AFTER_STOP`], a second ends the wait at once.
-pub(crate) async fn close(catalog: Catalog, stop: &Stop) {
+pub async fn close(catalog: Catalog, stop: &Stop) {
     let stopped = async {
         stop.reached(StopLevel::Drain).await;
         tokio::time::sleep(AFTER_STOP).await;
@@ -21,7 +21,7 @@ pub(crate) async fn close(catalog: Catalog, stop: &Stop) {
 }
 
 /// Closes the catalog within a time. A second signal ends the wait at once.
-pub(crate) async fn close_within(catalog: Catalog, stop: &Stop, limit: Duration) {
+pub async fn close_within(catalog: Catalog, stop: &Stop, limit: Duration) {
     give_up_after(catalog, stop, tokio::time::sleep(limit)).await;
 }
 

@@ -1,9 +1,10 @@
-//! Pairs and blocks named on the command line.
+//! Pairs and blocks that a user names by their ids.
 
+use crate::error::ProjectResult;
+use crate::exit::Refusal;
 use mocban_catalog::Catalog;
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName};
-use mocban_project::exit::Refusal;
 use mocban_runner::NamedWork;
 
 /// Largest number of similar ids in a message.
@@ -15,7 +16,7 @@ const MIN_PART_CHARS: usize = 3;
 ///
 /// # Errors
 /// Returns an error if a pair does not exist. The message suggests similar ids.
-pub(crate) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
+pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     let is_known = |text: &&String| {
@@ -35,10 +36,10 @@ pub(crate) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
 ///
 /// # Errors
 /// Returns an error if a pair does not exist.
-pub(crate) async fn some_or_all(
+pub async fn some_or_all(
     catalog: &Catalog,
     typed: &[String],
-) -> anyhow::Result<Option<Vec<PairName>>> {
+) -> ProjectResult<Option<Vec<PairName>>> {
     match typed {
         [] => Ok(None),
         typed => Ok(Some(pairs(catalog, typed).await?)),
@@ -46,7 +47,10 @@ pub(crate) async fn some_or_all(
 }
 
 /// Looks up one pair.
-pub(crate) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairName> {
+///
+/// # Errors
+/// Returns an error if the pair does not exist. The message suggests similar ids.
+pub async fn pair(catalog: &Catalog, typed: &str) -> ProjectResult<PairName> {
     let names = pairs(catalog, &[typed.to_owned()]).await?;
     names
         .into_iter()
@@ -55,7 +59,10 @@ pub(crate) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairN
 }
 
 /// Returns the block with this id, if there is one and no pair has the same id.
-pub(crate) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Option<BlockName>> {
+///
+/// # Errors
+/// Returns an error if the catalog fails.
+pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<BlockName>> {
     let Ok(name) = typed.parse::<BlockName>() else {
         return Ok(None);
     };
@@ -71,10 +78,7 @@ pub(crate) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Opti
 ///
 /// # Errors
 /// Returns an error if there is neither a pair nor a block with an id. The message suggests similar ids.
-pub(crate) async fn pairs_and_blocks(
-    catalog: &Catalog,
-    typed: &[String],
-) -> anyhow::Result<NamedWork> {
+pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectResult<NamedWork> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     let are_all_pairs = unknown.is_empty() && names.len() == typed.len();
@@ -107,7 +111,7 @@ pub(crate) async fn pairs_and_blocks(
 ///
 /// # Errors
 /// Returns an error if the block does not exist. The message suggests similar ids.
-pub(crate) async fn existing_block(catalog: &Catalog, typed: &str) -> anyhow::Result<BlockName> {
+pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
     let all = catalog.block_names().await?;
     let name = typed.parse::<BlockName>().ok();
     name.filter(|name| all.contains(name))
