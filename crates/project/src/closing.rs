@@ -11,7 +11,7 @@ const AFTER_STOP: Duration = Duration::from_secs(2);
 /// Maximum time to close the catalog if its server has already failed to reply for the time that a signal allows.
 pub const AFTER_SILENCE: Duration = Duration::from_millis(500);
 
-/// Closes the catalog. A first signal gives it [`AFTER_STOP`], a second ends the wait at once.
+/// Closes the catalog. A first signal gives it `AFTER_STOP`, a second ends the wait at once.
 pub async fn close(catalog: Catalog, stop: &Stop) {
     let stopped = async {
         stop.reached(StopLevel::Drain).await;

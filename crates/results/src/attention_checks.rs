@@ -37,7 +37,7 @@ impl AttentionCheckRates {
         rates
     }
 
-    /// Returns the reviewers who detected fewer than half of at least [`MIN_CHECKS`] planted faults.
+    /// Returns the reviewers who detected fewer than half of at least `MIN_CHECKS` planted faults.
     pub fn inattentive(&self) -> Vec<(&str, &Rate)> {
         let reviewers = self.by_reviewer.iter();
         let reviewers = reviewers.filter(|(_, rate)| is_inattentive(rate));
