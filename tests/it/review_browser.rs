@@ -315,21 +315,6 @@ fn the_end_says_how_many_answers_are_not_saved() {
 }
 
 #[test]
-fn keys_work_as_soon_as_a_dialog_is_closed() {
-    on_a_page(|_, tab| {
-        tab.key("KeyJ");
-        tab.wait("document.activeElement.id === 'jump-to'");
-        // In the same task of the event loop that closes the dialog, the focus is still inside the dialog.
-        tab.eval(
-        "document.getElementById('jump').close();
-        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
-        null",
-    );
-        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
-    });
-}
-
-#[test]
 fn a_relief_is_aligned_by_keys_and_mouse() {
     on_a_page(|project, tab| {
         let pair = tab.eval("document.getElementById('pair').textContent");

@@ -278,3 +278,18 @@ fn the_summary_is_a_secret_until_every_item_is_answered() {
     assert_eq!(reply.status, 403, "{:?}", reply.json());
     assert_eq!(reply.json()["error"], "answer every image first");
 }
+
+#[test]
+fn keys_work_as_soon_as_a_dialog_is_closed() {
+    on_a_page_of(read_project, &PLAIN, [1440, 900], |_, tab| {
+        tab.key("KeyJ");
+        tab.wait("document.activeElement.id === 'jump-to'");
+        // In the same task of the event loop that closes the dialog, the focus is still inside the dialog.
+        tab.eval(
+        "document.getElementById('jump').close();
+        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
+        null",
+    );
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+    });
+}
