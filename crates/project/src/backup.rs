@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
@@ -30,7 +31,12 @@ pub struct Backup {
 ///
 /// # Errors
 /// Returns an error if there is no project, the file is refused, or the disk fails.
-pub async fn backup(file: &Path, location: &Location) -> ProjectResult<Backup> {
+pub async fn backup(
+    file: &Path,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<Backup> {
+    let _work = LongWork::begin(listener, "copying the catalog");
     let (project, catalog) = location.open_read_only().await?;
     let shown = file.display();
     let failed = || format!("cannot write the backup {shown}");

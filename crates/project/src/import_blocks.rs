@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::import_pairs::PairSource;
@@ -105,7 +106,9 @@ pub async fn import_blocks(
     source: &BlockSource,
     allow_missing: bool,
     location: &Location,
+    listener: &dyn Listener,
 ) -> ProjectResult<BlockImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);

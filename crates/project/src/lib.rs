@@ -10,10 +10,13 @@
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
 pub mod backup;
+pub mod block_status;
 pub mod closing;
 pub mod demo_folder;
 pub mod error;
+pub mod events;
 pub mod exit;
+pub mod failures;
 pub mod files;
 pub mod import_blocks;
 pub mod import_pairs;
@@ -23,10 +26,14 @@ pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
 pub mod restore;
+pub mod retry;
+pub mod run;
 pub mod selection;
 pub mod shell;
+pub mod status;
 pub mod truth_file;
 pub mod verdict_file;
+pub mod verdicts;
 pub mod worker_totals;
 
 pub use error::{ProjectError, ProjectResult};

@@ -12,12 +12,13 @@ use super::demo_data::replace_data;
 use super::import;
 use super::import_blocks;
 use super::report;
-use super::run::{self, drive};
+use super::run::{code, drive};
 use super::run_text;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::screen::Palette;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_config::{Origin, Tree};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
@@ -27,6 +28,7 @@ use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
 use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
+use mocban_project::run::{PreparedRun, options};
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
@@ -88,7 +90,7 @@ pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<Exi
         truth: Some(files.truth),
         allow_missing: false,
     };
-    let outcome = import_pairs(import, &context.location).await?;
+    let outcome = import_pairs(import, &context.location, &()).await?;
     import::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -126,7 +128,7 @@ async fn block_demo(
         return Ok(ExitCode::Stopped);
     };
     let source = demo_block::import_source(&files, !args.no_labels);
-    let outcome = import_blocks(&source, false, &context.location).await?;
+    let outcome = import_blocks(&source, false, &context.location, &()).await?;
     import_blocks::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -142,17 +144,18 @@ async fn align(
     block_truth: Option<&Path>,
     context: &Context,
 ) -> ProjectResult<ExitCode> {
-    let config = context.settings()?.config;
-    let (project, catalog) = context.open().await?;
-    let options = run::from_config(&config);
-    let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
-    run_text::print_outcome(&summary, &failures, context);
-    let done = summary.status.jobs.get(&JobStatus::Done).copied();
-    if summary.stopped || done.unwrap_or(0) == 0 {
-        for command in run_text::next_steps(&summary, &failures, false) {
+    let options = options(&context.settings()?.config);
+    let terminal = Terminal::new(context);
+    let prepared = PreparedRun::new(&[], options, &context.location, &terminal).await?;
+    let outcome = drive(prepared, context).await?;
+    run_text::print_outcome(&outcome, context);
+    let code = code(&outcome.summary);
+    let done = outcome.summary.status.jobs.get(&JobStatus::Done).copied();
+    if outcome.summary.stopped || done.unwrap_or(0) == 0 {
+        for command in run_text::next_steps(&outcome) {
             context.next(&command);
         }
-        return Ok(run::code(&summary));
+        return Ok(code);
     }
     if let Some(file) = block_truth {
         let (_, catalog) = context.open().await?;
@@ -169,7 +172,7 @@ async fn align(
     context.next("review --reviewer me");
     context.next("report");
     context.next("export -o export");
-    Ok(run::code(&summary))
+    Ok(code)
 }
 
 /// Parses the distance of a block's vertices.

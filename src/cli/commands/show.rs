@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use super::show_block::show_block;
 use super::verdict;
 use crate::cli::output::context::Context;
-use crate::cli::output::failures::may_succeed_unchanged;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use crate::cli::output::streams;
@@ -16,6 +15,7 @@ use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, 
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
+use mocban_project::failures::may_succeed_unchanged;
 use mocban_project::selection;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
