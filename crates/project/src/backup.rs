@@ -28,9 +28,6 @@ pub struct Backup {
 }
 
 /// Writes a backup of a project. An existing backup is replaced only when the new one is complete.
-///
-/// # Errors
-/// Returns an error if there is no project, the file is refused, or the disk fails.
 pub async fn backup(
     file: &Path,
     location: &Location,
@@ -62,9 +59,6 @@ pub async fn backup(
 }
 
 /// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read; it names the file.
 pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;

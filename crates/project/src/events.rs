@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use mocban_catalog::SetApart;
 use mocban_runner::RunEvent;
 
 /// Something that happens while a function works.
@@ -48,4 +49,11 @@ impl Drop for LongWork<'_> {
 /// Warns a listener.
 pub(crate) fn warn(listener: &dyn Listener, text: impl fmt::Display) {
     listener.event(ProjectEvent::Warning(text.to_string()));
+}
+
+/// Warns a listener about damaged rows that an output does not include.
+pub(crate) fn warn_about_set_apart(listener: &dyn Listener, found: &SetApart) {
+    if let Some(sentence) = found.sentence() {
+        warn(listener, sentence);
+    }
 }

@@ -74,9 +74,6 @@ pub enum ListedItems {
 
 impl ListedItems {
     /// Reads a list and decides from its header what it names.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read.
     pub fn of(file: &Path) -> ProjectResult<Self> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
@@ -99,9 +96,6 @@ impl ListedItems {
 }
 
 /// Imports blocks. If the import fails, no block is imported.
-///
-/// # Errors
-/// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub async fn import_blocks(
     source: &BlockSource,
     allow_missing: bool,

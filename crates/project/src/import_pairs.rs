@@ -75,9 +75,6 @@ pub struct ImportOutcome {
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
-///
-/// # Errors
-/// Returns an error if a list is refused, or the catalog or the disk fails.
 pub async fn import_pairs(
     import: PairImport,
     location: &Location,

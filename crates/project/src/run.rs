@@ -58,66 +58,43 @@ pub struct RunOutcome {
 }
 
 impl PreparedRun {
-    /// Opens a project for a run of the pairs and blocks with these ids, or of all.
+    /// Opens a project for a run of the pairs and blocks with these ids, or of all. A project that cannot be written to is
+    /// opened only for a plan.
     ///
     /// # Errors
-    /// Returns an error if the project cannot be opened, an object store does not answer, or an id does not exist.
+    /// Returns an error if an object store does not answer or an id does not exist.
     pub async fn new(
         names: &[String],
         options: RunOptions,
+        is_plan: bool,
         location: &Location,
         listener: &dyn Listener,
     ) -> ProjectResult<Self> {
         let config = Box::new(location.settings()?.config);
-        let opened = open(location, listener).await?;
-        Self::of(opened, names, options, config).await
-    }
-
-    /// Opens a project for a plan, also one that cannot be written to.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::new`].
-    pub async fn for_plan(
-        names: &[String],
-        options: RunOptions,
-        location: &Location,
-        listener: &dyn Listener,
-    ) -> ProjectResult<Self> {
-        let config = Box::new(location.settings()?.config);
-        let opened = match open(location, listener).await {
-            Err(error) if matches!(error.code(), ErrorCode::NotWritable | ErrorCode::DiskFull) => {
+        let (project, catalog) = match open(location, listener).await {
+            Err(error)
+                if is_plan
+                    && matches!(error.code(), ErrorCode::NotWritable | ErrorCode::DiskFull) =>
+            {
                 let text = "the project cannot be written to, so input files that changed since the last run are not noticed";
                 warn(listener, text);
                 location.open_read_only().await?
             }
             opened => opened?,
         };
-        Self::of(opened, names, options, config).await
-    }
-
-    async fn of(
-        (project, catalog): (Project, Catalog),
-        names: &[String],
-        options: RunOptions,
-        config: Box<Config>,
-    ) -> ProjectResult<Self> {
         let only = match names {
             [] => None,
             typed => Some(selection::pairs_and_blocks(&catalog, typed).await?),
         };
-        let options = RunOptions { only, ..options };
         Ok(Self {
             project,
             catalog,
             config,
-            options,
+            options: RunOptions { only, ..options },
         })
     }
 
     /// Returns what would run and why, and whether another process works on the project.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog fails or inputs cannot be looked at.
     pub async fn plan(self) -> ProjectResult<(RunPlan, bool)> {
         let (project, catalog) = (&self.project, &self.catalog);
         let plan = runner::plan(project, catalog, &self.config.stages, &self.options).await?;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use crate::error::ProjectResult;
+use crate::events::{Listener, warn};
 use crate::failures::Failures;
 use crate::location::{Location, now};
 use mocban_catalog::{Catalog, StatusCounts};
@@ -27,9 +28,6 @@ pub struct ProjectStatus {
 
 impl ProjectStatus {
     /// Reads the state, with all failed pairs or the first ones.
-    ///
-    /// # Errors
-    /// Returns an error if a setting is invalid or the catalog fails.
     pub async fn read(
         project: &Project,
         catalog: &Catalog,
@@ -75,9 +73,6 @@ impl ProjectStatus {
     }
 
     /// Returns the state as JSON, with the failed pairs on request.
-    ///
-    /// # Errors
-    /// Returns an error if the counts have no form in JSON.
     pub fn json(&self, with_failures: bool) -> ProjectResult<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
@@ -95,4 +90,28 @@ impl ProjectStatus {
 /// partly missing are found by `check`.
 pub(crate) fn are_results_missing(project: &Project, jobs: &BTreeMap<JobStatus, u64>) -> bool {
     jobs.get(&JobStatus::Done).is_some_and(|done| *done > 0) && project.has_no_artifacts()
+}
+
+/// Warns about results that were computed with other settings or files than the current ones. Does nothing if the settings
+/// are invalid.
+pub(crate) async fn warn_about_stale(
+    catalog: &Catalog,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<()> {
+    let Ok(settings) = location.settings() else {
+        return Ok(());
+    };
+    let stale = catalog
+        .count_stale(&fingerprints(&settings.config.stages))
+        .await?;
+    let pairs = match stale {
+        0 => return Ok(()),
+        1 => "1 pair is".to_owned(),
+        pairs => format!("{pairs} pairs are"),
+    };
+    let text =
+        "stale: computed with other settings or files than the current ones; `run` updates them";
+    warn(listener, format!("{pairs} {text}"));
+    Ok(())
 }

@@ -35,9 +35,6 @@ pub async fn record(
 }
 
 /// Records the verdicts of a file in CSV or JSON Lines. If a line is refused, no verdict is recorded.
-///
-/// # Errors
-/// Returns an error if the file is refused, the user of the database may not record its verdicts, or the catalog fails.
 pub async fn import(file: &Path, location: &Location) -> ProjectResult<ImportedVerdicts> {
     let bytes = files::read(file)?;
     let (_project, catalog) = location.open().await?;
@@ -79,9 +76,6 @@ pub struct VerdictLog {
 }
 
 /// Returns the verdicts on a pair, or on all pairs.
-///
-/// # Errors
-/// Returns an error if the pair does not exist or the catalog fails.
 pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<VerdictLog> {
     let (_project, catalog) = location.open_read_only().await?;
     let pair = match pair {
@@ -100,9 +94,6 @@ pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<Verdi
 
 /// Undoes the newest verdict, of a reviewer or of anyone. The log keeps it, marked as undone. Returns the undone verdicts on
 /// all metrics.
-///
-/// # Errors
-/// Returns an error if there is none, the user of the database may not undo it, or the catalog fails.
 pub async fn undo(reviewer: Option<&str>, location: &Location) -> ProjectResult<Vec<VerdictEvent>> {
     let (_project, catalog) = location.open().await?;
     let rights = catalog.review_rights().await?;

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::config::{ConfigShowArgs, as_toml};
-use super::contact_sheet::{self, ContactSheetArgs};
 use super::demo_block;
 use super::demo_data::replace_data;
 use super::import;
@@ -23,12 +22,14 @@ use mocban_config::{Origin, Tree};
 use mocban_core::domain::JobStatus;
 use mocban_demo::block::{BlockKind, BlockOptions};
 use mocban_demo::{DatasetFiles, DemoOptions, Tier, find_dataset, write_dataset};
+use mocban_export::ContactSheetOptions;
 use mocban_project::demo_folder::{DemoContent, STOPPED, check_directory};
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
 use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
 use mocban_project::run::{PreparedRun, options};
+use mocban_project::sheets::contact_sheet;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
 use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
@@ -146,7 +147,7 @@ async fn align(
 ) -> ProjectResult<ExitCode> {
     let options = options(&context.settings()?.config);
     let terminal = Terminal::new(context);
-    let prepared = PreparedRun::new(&[], options, &context.location, &terminal).await?;
+    let prepared = PreparedRun::new(&[], options, false, &context.location, &terminal).await?;
     let outcome = drive(prepared, context).await?;
     run_text::print_outcome(&outcome, context);
     let code = code(&outcome.summary);
@@ -165,7 +166,9 @@ async fn align(
         context.info(&format!("{stored} of the cut pairs stored"));
     }
     report::print_summary(context).await?;
-    let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
+    let (sheet, location) = (ContactSheetOptions::default(), &context.location);
+    let drawn = contact_sheet(&[], sheet, None, false, location, &terminal);
+    let (picture, _) = drawn.await?;
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
     context.info(&format!("results in one image, worst first: {picture}"));

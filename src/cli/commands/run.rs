@@ -72,14 +72,13 @@ pub(crate) async fn execute(
     let server = MetricsServer::bind(&args.metrics).await?;
     let options = options(&args, &context.settings()?.config, part);
     let (names, location) = (&args.names, &context.location);
+    let metrics = options.metrics.clone();
+    let terminal = Terminal::new(context);
+    let prepared = PreparedRun::new(names, options, args.dry_run, location, &terminal).await?;
     if args.dry_run {
-        let terminal = Terminal::new(context);
-        let prepared = PreparedRun::for_plan(names, options, location, &terminal).await?;
         let (plan, running) = prepared.plan().await?;
         return print_plan(&plan, running, context);
     }
-    let metrics = options.metrics.clone();
-    let prepared = PreparedRun::new(names, options, location, &Terminal::new(context)).await?;
     let serving = server.map(|server| server.serve(metrics, context));
     let outcome = drive(prepared, context).await;
     drop(serving);

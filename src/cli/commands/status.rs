@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::review::review_step;
-use super::status_hosts;
+use super::status_hosts::table_text;
 use crate::cli::output::block_status::{blocks_line, failed_blocks_text};
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::failures_text;
@@ -19,6 +19,7 @@ use crate::cli::output::table::{columns, count};
 use mocban_catalog::{Catalog, StageCounts, StatusCounts};
 use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verdict, one_line};
 use mocban_project::closing::{AFTER_SILENCE, close_within};
+use mocban_project::hosts::WorkerTable;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::status::ProjectStatus;
@@ -74,8 +75,8 @@ async fn print_once(
     context: &Context,
 ) -> ProjectResult<()> {
     if args.hosts {
-        let workers = status_hosts::read(catalog, now()).await?;
-        let (json, text) = (workers.json(), workers.text(context.stdout));
+        let workers = WorkerTable::read(catalog, now()).await?;
+        let (json, text) = (workers.json(), table_text(&workers, context.stdout));
         print_refreshed(args, context, &json, text)?;
     } else {
         let status = ProjectStatus::read(project, catalog, args.failed, &context.location);

@@ -6,7 +6,6 @@ use clap::Args;
 use serde_json::json;
 
 use super::block_points::BlockPoints;
-use super::block_sheet;
 use crate::cli::input::browser::open;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
@@ -19,6 +18,7 @@ use mocban_export::scan_view::ScanView;
 use mocban_pages::view::{self, ViewServer};
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
+use mocban_project::sheets::block_view;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
@@ -92,7 +92,8 @@ async fn block_page(
     context: &Context,
 ) -> ProjectResult<ViewServer> {
     let name = selection::existing_block(catalog, &args.pair).await?;
-    let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
+    let view = match block_view(&args.pair, args.metric, project, catalog, &context.location).await
+    {
         Ok(view) => Some(view),
         Err(error) => {
             let Some(why) = refusal(catalog, &name).await? else {

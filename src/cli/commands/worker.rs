@@ -54,7 +54,8 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<Exi
     };
     let options = run::options(&args, &context.settings()?.config, RunPart::Plan);
     let terminal = Terminal::new(context);
-    let prepared = PreparedRun::new(&args.names, options, &context.location, &terminal).await?;
+    let (names, location) = (&args.names, &context.location);
+    let prepared = PreparedRun::new(names, options, false, location, &terminal).await?;
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let planned = prepared.run(&stop, &()).await;

@@ -9,14 +9,12 @@ use serde_json::json;
 
 use super::screen::{Palette, Screen, Tone};
 use super::streams;
-use super::table::count;
 use crate::cli::input::global::Global;
 use mocban_catalog::{Catalog, SetApart};
 use mocban_config::{ConfigError, Loaded};
 use mocban_project::location::Location;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult};
-use mocban_runner as runner;
 use mocban_store::Project;
 
 /// Longer lines of warnings and errors are cut. A line still has room for the longest possible path (4,096 bytes).
@@ -140,24 +138,6 @@ impl Context {
     pub(crate) fn print_json(&self, value: &impl Serialize) -> ProjectResult<()> {
         if self.global.json {
             streams::print_json(value)?;
-        }
-        Ok(())
-    }
-
-    /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
-    /// settings are invalid.
-    pub(crate) async fn warn_about_stale(&self, catalog: &Catalog) -> ProjectResult<()> {
-        let Ok(settings) = self.settings() else {
-            return Ok(());
-        };
-        let fingerprints = runner::fingerprints(&settings.config.stages);
-        let stale = catalog.count_stale(&fingerprints).await?;
-        if stale > 0 {
-            let pairs = count(stale, "pair");
-            let verb = if stale == 1 { "is" } else { "are" };
-            self.warn(&format!(
-                "{pairs} {verb} stale: computed with other settings or files than the current ones; `run` updates them"
-            ));
         }
         Ok(())
     }
