@@ -3,10 +3,11 @@
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
-//! - [`status`], [`hosts`], [`check`]: the state of pairs, blocks and workers, and whether files and rows are sound
+//! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
+//!   files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
-//! - [`backup`], [`restore`]: copy a project to one file, and make a project of it
+//! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`]: what a demo may replace
 //! - [`events`]: what a function tells its caller while it works
@@ -25,7 +26,9 @@ pub mod backup;
 pub mod block_status;
 pub mod check;
 pub mod closing;
+pub mod copy;
 pub mod demo_folder;
+pub mod details;
 pub mod error;
 pub mod events;
 pub mod exit;
