@@ -8,9 +8,7 @@ use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
-use mocban_config::Config;
 use mocban_core::domain::{ErrorCode, sanitize};
-use mocban_export::InputFileLimits;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
@@ -230,14 +228,6 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
         ErrorKind::NotFound => format!("{missing} {shown}"),
         _ => format!("{failed} {shown}: {error}"),
     })
-}
-
-/// Returns the limits of input files in the settings.
-pub const fn input_file_limits(config: &Config) -> InputFileLimits {
-    InputFileLimits {
-        mesh: config.limits.mesh,
-        image: config.limits.image,
-    }
 }
 
 #[cfg(test)]

@@ -31,8 +31,7 @@ pub fn options(config: &Config) -> RunOptions {
             mib => Some(mib << 20),
         },
         stage_timeout: Duration::from_secs(config.run.stage_timeout_s),
-        mesh_limits: config.limits.mesh,
-        image_limits: config.limits.image,
+        limits: config.limits,
         ..plain
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{ProjectResult, TaskStopped};
 use crate::events::{Listener, LongWork, warn, warn_about_set_apart};
 use crate::exit::Refusal;
-use crate::files::{self, input_file_limits};
+use crate::files;
 use crate::location::Location;
 use crate::selection;
 use mocban_catalog::Catalog;
@@ -109,6 +109,6 @@ pub async fn block_view(
     location: &Location,
 ) -> ProjectResult<BlockView> {
     let name = selection::existing_block(catalog, block).await?;
-    let limits = input_file_limits(&location.settings()?.config);
+    let limits = location.settings()?.config.limits;
     Ok(BlockView::read(catalog, project, &name, metric, limits).await?)
 }

@@ -16,7 +16,6 @@ use mocban_export::{
     SplitShares,
 };
 use mocban_project::export::export as export_project;
-use mocban_project::files::input_file_limits;
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `export`.
@@ -123,7 +122,7 @@ impl ExportArgs {
 }
 
 pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let limits = input_file_limits(&context.settings()?.config);
+    let limits = context.settings()?.config.limits;
     let options = ExportOptions {
         only: args.only,
         min_confidence: args.min_confidence,

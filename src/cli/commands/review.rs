@@ -21,7 +21,6 @@ use mocban_pages::review::{
 };
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
-use mocban_project::files::input_file_limits;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
@@ -127,7 +126,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         keys,
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
-        limits: input_file_limits(&settings.config),
+        limits: settings.config.limits,
         explain: explanation,
         now,
         queue: queue_options(&args),

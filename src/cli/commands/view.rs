@@ -13,7 +13,6 @@ use crate::cli::output::streams;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
-use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::view::{self, ViewServer};
 use mocban_project::error::TaskStopped;
@@ -50,10 +49,6 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         return serve(page?, &args, context).await;
     }
     let limits = context.settings()?.config.limits;
-    let limits = InputFileLimits {
-        mesh: limits.mesh,
-        image: limits.image,
-    };
     let name = selection::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;

@@ -52,7 +52,7 @@ impl BlockSlot {
             context,
             may_find_one: among.as_ref().is_none_or(|among| !among.is_empty()),
             among,
-            image_limits: options.image_limits,
+            image_limits: options.limits.image,
             map_bytes: map_bytes(options.memory),
             waits_for_memory: false,
             task: JoinSet::new(),
