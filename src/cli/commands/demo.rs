@@ -145,7 +145,7 @@ async fn align(
     block_truth: Option<&Path>,
     context: &Context,
 ) -> ProjectResult<ExitCode> {
-    let options = options(&context.settings()?.config);
+    let options = options(&context.location.settings()?.config);
     let terminal = Terminal::new(context);
     let prepared = PreparedRun::new(&[], options, false, &context.location, &terminal).await?;
     let outcome = drive(prepared, context).await?;
@@ -159,7 +159,7 @@ async fn align(
         return Ok(code);
     }
     if let Some(file) = block_truth {
-        let (_, catalog) = context.open().await?;
+        let (_, catalog) = context.location.open().await?;
         let stored = demo_block::store_truths(file, &catalog).await;
         catalog.close().await;
         let stored = count(stored?, "true alignment");
@@ -248,7 +248,7 @@ fn save_settings(dir: &Path, context: &Context) -> ProjectResult<Context> {
     if global.config.is_none() && global.set.is_empty() {
         return Ok(context.clone());
     }
-    let text = changed_settings(&context.settings()?.tree);
+    let text = changed_settings(&context.location.settings()?.tree);
     let file = dir.join(SETTINGS_FILE);
     let shown = file.display();
     std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;

@@ -122,7 +122,7 @@ impl ExportArgs {
 }
 
 pub(crate) async fn export(args: ExportArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let limits = context.settings()?.config.limits;
+    let limits = context.location.settings()?.config.limits;
     let options = ExportOptions {
         only: args.only,
         min_confidence: args.min_confidence,

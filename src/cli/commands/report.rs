@@ -97,10 +97,8 @@ pub(crate) async fn report(args: ReportArgs, context: &Context) -> ProjectResult
     })
 }
 
-/// Returns the format that belongs to the extension of a file, or text for an unknown extension.
-///
-/// # Errors
-/// Returns an error if the extension is that of a format which is not written.
+/// Returns the format that belongs to the extension of a file, or text for an unknown extension. Refuses formats that are
+/// not written.
 fn format_of_file(path: &Path) -> Result<ReportFormat, Refusal> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     Ok(match &*extension.to_ascii_lowercase() {
@@ -129,7 +127,7 @@ async fn compared(
 ) -> ProjectResult<String> {
     let there = report::read(&context.location.at(other)).await?;
     let there = there.with_interval(here.interval);
-    let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
+    let names = [&*context.location.dir, other].map(|dir| dir.display().to_string());
     if format == ReportFormat::Json {
         let mut value = serde_json::to_value(here)?;
         value["compared_with"] = json!({"project": names[1], "report": there});

@@ -98,7 +98,7 @@ fn percent(text: &str) -> Result<f64, String> {
 
 pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let settings = context.settings()?;
+    let settings = context.location.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
@@ -106,7 +106,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
-    let (project, catalog) = context.open().await?;
+    let (project, catalog) = context.location.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
     let (catalog, damaged) = catalog.without_faulty_rows().await?;

@@ -1,7 +1,7 @@
 //! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::metrics::{MetricsArgs, MetricsServer};
 use super::run_text::{block_plan_text, next_steps, plan_text, print_outcome};
@@ -70,7 +70,7 @@ pub(crate) async fn execute(
     context: &Context,
 ) -> ProjectResult<ExitCode> {
     let server = MetricsServer::bind(&args.metrics).await?;
-    let options = options(&args, &context.settings()?.config, part);
+    let options = options(&args, &context.location.settings()?.config, part);
     let (names, location) = (&args.names, &context.location);
     let metrics = options.metrics.clone();
     let terminal = Terminal::new(context);
@@ -83,7 +83,9 @@ pub(crate) async fn execute(
     let outcome = drive(prepared, context).await;
     drop(serving);
     let outcome = outcome?;
-    context.print_json(&as_json(&outcome.summary))?;
+    let mut json = serde_json::to_value(&outcome.summary)?;
+    json["schema"] = json!(1);
+    context.print_json(&json)?;
     print_outcome(&outcome, context);
     if outcome.are_results_missing {
         context.warn(missing_results::TEXT);
@@ -154,22 +156,6 @@ pub(crate) const fn code(summary: &RunSummary) -> ExitCode {
     } else {
         ExitCode::Done
     }
-}
-
-fn as_json(summary: &RunSummary) -> Value {
-    json!({
-        "schema": 1,
-        "done": summary.done,
-        "failed": summary.failed,
-        "failed_in_all": summary.failed_in_all,
-        "left": summary.left,
-        "blocks": summary.blocks,
-        "stages": summary.stages,
-        "stopped": summary.stopped,
-        "too_many_failures": summary.too_many_failures,
-        "elapsed_ms": summary.elapsed_ms,
-        "status": summary.status,
-    })
 }
 
 fn print_plan(plan: &RunPlan, running: bool, context: &Context) -> ProjectResult<ExitCode> {

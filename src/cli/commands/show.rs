@@ -26,7 +26,7 @@ pub(crate) struct ShowArgs {
 }
 
 pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
+    let (project, catalog) = context.location.open_read_only().await?;
     let Some(id) = args.name else {
         return list_names(&catalog, context).await;
     };

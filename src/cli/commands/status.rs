@@ -44,7 +44,7 @@ pub(crate) struct StatusArgs {
 const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
 pub(crate) async fn status(args: StatusArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let (project, catalog) = context.open_read_only().await?;
+    let (project, catalog) = context.location.open_read_only().await?;
     if !args.watch {
         print_once(&project, &catalog, &args, context).await?;
         catalog.close().await;
@@ -86,7 +86,7 @@ async fn print_once(
 }
 
 fn print_status(status: &ProjectStatus, args: &StatusArgs, context: &Context) -> ProjectResult<()> {
-    let dir = context.dir().display().to_string();
+    let dir = context.location.dir.display().to_string();
     let text = screen(status, &dir, args.failed, context.stdout);
     print_refreshed(args, context, &status.json(args.failed)?, text)?;
     if !context.global.json {

@@ -41,14 +41,14 @@ pub(crate) struct ViewArgs {
 
 pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let (project, catalog) = context.open_read_only().await?;
+    let (project, catalog) = context.location.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     if selection::block(&catalog, &args.pair).await?.is_some() {
         let page = block_page(address, &args, &project, &catalog, context).await;
         catalog.close().await;
         return serve(page?, &args, context).await;
     }
-    let limits = context.settings()?.config.limits;
+    let limits = context.location.settings()?.config.limits;
     let name = selection::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;

@@ -52,7 +52,7 @@ pub(crate) async fn plan(args: PlanArgs, context: &Context) -> ProjectResult<Exi
         rerun: args.rerun,
         ..RunArgs::default()
     };
-    let options = run::options(&args, &context.settings()?.config, RunPart::Plan);
+    let options = run::options(&args, &context.location.settings()?.config, RunPart::Plan);
     let terminal = Terminal::new(context);
     let (names, location) = (&args.names, &context.location);
     let prepared = PreparedRun::new(names, options, false, location, &terminal).await?;

@@ -64,26 +64,6 @@ impl Context {
         context
     }
 
-    /// Returns the project's directory, which need not exist.
-    pub(crate) fn dir(&self) -> PathBuf {
-        self.location.dir.clone()
-    }
-
-    /// Returns the settings in effect for this project.
-    pub(crate) fn settings(&self) -> Result<Loaded, ConfigError> {
-        self.location.settings()
-    }
-
-    /// Opens the project and its catalog for reading; works during a run.
-    pub(crate) async fn open_read_only(&self) -> ProjectResult<(Project, Catalog)> {
-        self.location.open_read_only().await
-    }
-
-    /// Opens the project and its catalog for reading and writing.
-    pub(crate) async fn open(&self) -> ProjectResult<(Project, Catalog)> {
-        self.location.open().await
-    }
-
     /// Writes a line to stderr, unless `-q` is given.
     pub(crate) fn info(&self, text: &str) {
         if !self.global.quiet {
