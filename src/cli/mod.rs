@@ -109,9 +109,9 @@ fn report_error(error: &ProjectError, context: &Context) -> ExitCode {
     if code == ErrorCode::ClosedPipe {
         return ExitCode::Done;
     }
-    context.error(&error.text(&context.dir()), code.into());
+    context.error(&error.text(&context.location.dir), code.into());
     if code == ErrorCode::NoProject {
-        for project in nearby_projects::nearby_projects(&context.dir()) {
+        for project in nearby_projects::nearby_projects(&context.location.dir) {
             context.at(&project).next("status");
         }
         context.next("import pairs.csv");

@@ -68,6 +68,19 @@ pub struct ContactSheetOptions {
     pub limits: ImageLimits,
 }
 
+impl Default for ContactSheetOptions {
+    fn default() -> Self {
+        Self {
+            metric: ThresholdMetric::DEFAULT,
+            pairs: None,
+            order: ContactSheetOrder::Worst,
+            limit: 60,
+            columns: 5,
+            limits: ImageLimits::SUGGESTED,
+        }
+    }
+}
+
 /// A contact sheet, and how much of the project it shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSheet {

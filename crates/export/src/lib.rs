@@ -59,7 +59,7 @@ pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
 pub use manifest::PairCounts;
 pub use options::{ExportOptions, ResultFilter, UnusedOption};
-pub use pair_pictures::{InputFileLimits, PictureError};
+pub use pair_pictures::PictureError;
 pub use record::{
     ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
     SplitName,

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
@@ -27,10 +28,12 @@ pub struct Backup {
 }
 
 /// Writes a backup of a project. An existing backup is replaced only when the new one is complete.
-///
-/// # Errors
-/// Returns an error if there is no project, the file is refused, or the disk fails.
-pub async fn backup(file: &Path, location: &Location) -> ProjectResult<Backup> {
+pub async fn backup(
+    file: &Path,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<Backup> {
+    let _work = LongWork::begin(listener, "copying the catalog");
     let (project, catalog) = location.open_read_only().await?;
     let shown = file.display();
     let failed = || format!("cannot write the backup {shown}");
@@ -56,9 +59,6 @@ pub async fn backup(file: &Path, location: &Location) -> ProjectResult<Backup> {
 }
 
 /// Returns the numbers of pairs and verdicts in the catalog of a directory. Errors name that catalog.
-///
-/// # Errors
-/// Returns an error if the catalog cannot be read; it names the file.
 pub async fn count_rows(dir: &Path) -> ProjectResult<(u64, u64)> {
     let count = async {
         let catalog = Catalog::open_read_only(&dir.join(CATALOG_FILE)).await?;

@@ -55,9 +55,6 @@ impl DemoContent {
 }
 
 /// Refuses a directory that holds another demo, another project or foreign data, so that nothing is overwritten.
-///
-/// # Errors
-/// Returns an error if the directory is refused or cannot be read.
 pub fn check_directory(dir: &Path, data: &Path, wanted: &DemoContent) -> ProjectResult<()> {
     let refuse = |reason: &str| {
         let shown = dir.display();
@@ -112,9 +109,6 @@ fn has_note(data: &Path) -> ProjectResult<bool> {
 /// Writes the data of a demo next to `data` and then replaces `data`, so that a project never sees half of them. Calls
 /// `write` on another thread. The paths that it returns lie in a folder that was moved since. Returns `None` if `write`
 /// was stopped, and otherwise a warning if the earlier data could not be removed.
-///
-/// # Errors
-/// Returns an error if the files cannot be written.
 pub async fn replace_data<T: Send + 'static>(
     data: &Path,
     stop: &Stop,

@@ -136,9 +136,6 @@ impl Error for ProjectError {}
 /// Adds what failed to the error of a result.
 pub trait WithContext<T> {
     /// Adds what failed, in front of the text of the error.
-    ///
-    /// # Errors
-    /// Returns the error of the result.
     fn with_context(self, what: impl FnOnce() -> String) -> ProjectResult<T>;
 }
 

@@ -72,15 +72,7 @@ impl From<ErrorCode> for ExitCode {
             ErrorCode::ProjectInUse | ErrorCode::OutputInUse => Self::InUse,
             ErrorCode::Damaged | ErrorCode::LogLost => Self::Damaged,
             ErrorCode::ClosedPipe => Self::Done,
-            ErrorCode::Unexpected
-            | ErrorCode::Locked
-            | ErrorCode::NotWritable
-            | ErrorCode::DamagedFile
-            | ErrorCode::NotACatalog
-            | ErrorCode::OtherVersion
-            | ErrorCode::Unavailable
-            | ErrorCode::DiskFull
-            | ErrorCode::TooManyFiles => Self::Error,
+            _ => Self::Error,
         }
     }
 }

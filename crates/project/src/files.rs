@@ -8,9 +8,7 @@ use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
-use mocban_config::Config;
 use mocban_core::domain::{ErrorCode, sanitize};
-use mocban_export::InputFileLimits;
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
@@ -19,18 +17,12 @@ use mocban_store::{
 const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
-///
-/// # Errors
-/// Returns an error if there is no such file, it cannot be read, or it is too long.
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
-///
-/// # Errors
-/// Returns the error of the system, unless the file does not exist.
 pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -42,9 +34,6 @@ pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
 const MAX_SMALL: u64 = 1 << 20;
 
 /// Reads a small file, such as settings. Returns `None` if it does not exist.
-///
-/// # Errors
-/// Returns an error if the file cannot be read or is longer than 1 MiB.
 pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
@@ -68,9 +57,6 @@ pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
 }
 
 /// Refuses to write into a folder that does not exist.
-///
-/// # Errors
-/// Returns an error if the folder does not exist.
 pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
     let folder = path
         .parent()
@@ -86,9 +72,6 @@ pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
-///
-/// # Errors
-/// Returns an error if the path is one of these files.
 pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     refuse_missing_folder(path)?;
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -111,9 +94,6 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
-///
-/// # Errors
-/// Returns an error if the path is one of these files, or the catalog cannot be read.
 pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
@@ -146,9 +126,6 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
-///
-/// # Errors
-/// Returns an error if the file cannot be read.
 pub fn is_backup(file: &Path) -> std::io::Result<bool> {
     if !std::fs::metadata(file)?.is_file() {
         return Ok(false);
@@ -164,9 +141,6 @@ pub fn is_backup(file: &Path) -> std::io::Result<bool> {
 
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
 /// complete.
-///
-/// # Errors
-/// Returns an error if an incomplete output would replace a file, or the file cannot be written.
 pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResult<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
@@ -180,9 +154,6 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResu
 }
 
 /// Adds what to do if an output could not be written to its place in the project because no other was named.
-///
-/// # Errors
-/// Returns the error of the write.
 pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> ProjectResult<()> {
     match written {
         Err(error) if named.is_none() && error.code() != ErrorCode::Incomplete => {
@@ -193,9 +164,6 @@ pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> Project
 }
 
 /// Lists the files of a directory, without its subdirectories and links to directories.
-///
-/// # Errors
-/// Returns an error if there is no such directory, or it cannot be listed.
 pub fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| match error.kind() {
         ErrorKind::NotADirectory => Refusal::Usage(format!("{} is not a directory", dir.display())),
@@ -260,14 +228,6 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
         ErrorKind::NotFound => format!("{missing} {shown}"),
         _ => format!("{failed} {shown}: {error}"),
     })
-}
-
-/// Returns the limits of input files in the settings.
-pub const fn input_file_limits(config: &Config) -> InputFileLimits {
-    InputFileLimits {
-        mesh: config.limits.mesh,
-        image: config.limits.image,
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::ProjectResult;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::import_pairs::PairSource;
@@ -73,9 +74,6 @@ pub enum ListedItems {
 
 impl ListedItems {
     /// Reads a list and decides from its header what it names.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read.
     pub fn of(file: &Path) -> ProjectResult<Self> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
@@ -98,14 +96,13 @@ impl ListedItems {
 }
 
 /// Imports blocks. If the import fails, no block is imported.
-///
-/// # Errors
-/// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub async fn import_blocks(
     source: &BlockSource,
     allow_missing: bool,
     location: &Location,
+    listener: &dyn Listener,
 ) -> ProjectResult<BlockImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);

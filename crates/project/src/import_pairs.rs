@@ -7,6 +7,7 @@ use crate::error::{ProjectError, ProjectResult, TaskStopped};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
@@ -74,10 +75,12 @@ pub struct ImportOutcome {
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
-///
-/// # Errors
-/// Returns an error if a list is refused, or the catalog or the disk fails.
-pub async fn import_pairs(import: PairImport, location: &Location) -> ProjectResult<ImportOutcome> {
+pub async fn import_pairs(
+    import: PairImport,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<ImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(import.source)?;
     let warnings = std::mem::take(&mut listing.warnings);
     let truths = match &import.truth {

@@ -58,9 +58,6 @@ impl Location {
     }
 
     /// Opens the project and its catalog for reading; works during a run.
-    ///
-    /// # Errors
-    /// Returns an error if there is no project, a setting of the storage is invalid, or the catalog cannot be read.
     pub async fn open_read_only(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
@@ -71,9 +68,6 @@ impl Location {
     }
 
     /// Opens the project and its catalog for reading and writing.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::open_read_only`], or if the catalog cannot be written.
     pub async fn open(&self) -> ProjectResult<(Project, Catalog)> {
         let (project, url) = self.project()?;
         let catalog = match url {
@@ -94,9 +88,6 @@ impl Location {
     }
 
     /// Returns the named roots with the object store, and the URL of the catalog if that is in PostgreSQL.
-    ///
-    /// # Errors
-    /// Returns an error under the conditions of [`Self::catalog_url`], or if a setting of the storage is invalid.
     pub fn data_locations(&self) -> ProjectResult<(Option<ProjectStorage>, Option<String>)> {
         let settings = match self.settings() {
             Err(error) if self.may_name_places(&error) => return Err(error.into()),
@@ -150,9 +141,6 @@ impl Location {
 
     /// Returns the settings in effect for this project. The file is read once, so that all parts of a command have the
     /// same settings.
-    ///
-    /// # Errors
-    /// Returns an error if a layer cannot be read or has an invalid setting.
     pub fn settings(&self) -> Result<Loaded, ConfigError> {
         if let Some(settings) = self.settings.get() {
             return Ok(settings.clone());
@@ -177,9 +165,6 @@ impl Location {
 
     /// Refuses settings of the environment, of flags or of a file in the directory that lead commands on a new project to a
     /// catalog on a server or to an object store, instead of its folder.
-    ///
-    /// # Errors
-    /// Returns an error with the setting, where it comes from, and how to do without it.
     pub fn require_local(&self, project: &str) -> ProjectResult<()> {
         let settings = self.settings()?;
         let storage = &settings.config.storage;
@@ -216,9 +201,6 @@ impl Location {
 }
 
 /// Returns the settings of the file in a project folder, without those of the environment and of flags.
-///
-/// # Errors
-/// Returns an error if the file cannot be read, or has an invalid setting.
 pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
     load(&Sources {
         base: BaseLayer::Project(dir.join(SETTINGS_FILE)),
@@ -227,9 +209,6 @@ pub fn settings_of(dir: &Path) -> Result<Loaded, ConfigError> {
 }
 
 /// Refuses an address of PostgreSQL with a password, which other users of the machine could read.
-///
-/// # Errors
-/// Returns an error if the address has a password.
 pub fn refuse_password(url: &str) -> Result<(), Refusal> {
     if has_password(url) {
         let text = "other users of this machine can read a password on the command line; put it into ~/.pgpass or PGPASSWORD";

@@ -52,9 +52,6 @@ pub fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
 
 impl Listing {
     /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read or is refused.
     pub fn from_file(file: &Path) -> ProjectResult<Self> {
         let shown = file.display();
         if file.is_dir() {
@@ -66,9 +63,6 @@ impl Listing {
     }
 
     /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
-    ///
-    /// # Errors
-    /// Returns an error if the list is refused.
     pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {

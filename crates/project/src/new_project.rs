@@ -17,9 +17,6 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 
 /// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded. A new catalog on a
 /// server is created when `check` has succeeded, which refuses what `import` would refuse.
-///
-/// # Errors
-/// Returns the error of `check` or `import`, or an error if the catalog or the disk fails.
 pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,

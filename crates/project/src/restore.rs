@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use crate::backup::count_rows;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files::{self, is_backup, metadata};
 use crate::location::Location;
@@ -44,7 +45,12 @@ pub struct Restored {
 ///
 /// # Errors
 /// Returns an error if the backup, the folders or the settings are refused, or the disk fails. Then there is no project.
-pub async fn restore(request: &RestoreRequest, location: &Location) -> ProjectResult<Restored> {
+pub async fn restore(
+    request: &RestoreRequest,
+    location: &Location,
+    listener: &dyn Listener,
+) -> ProjectResult<Restored> {
+    let _work = LongWork::begin(listener, "restoring the project");
     let RestoreRequest {
         backup,
         dir,

@@ -1,4 +1,4 @@
-//! Pairs and blocks that a user names by their ids.
+//! Pairs and blocks that a user names by their ids. An id that does not exist is refused, with similar ids.
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
@@ -13,9 +13,6 @@ const MAX_SIMILAR: usize = 3;
 const MIN_PART_CHARS: usize = 3;
 
 /// Looks up pairs by their ids.
-///
-/// # Errors
-/// Returns an error if a pair does not exist. The message suggests similar ids.
 pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -33,9 +30,6 @@ pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<Pai
 }
 
 /// Looks up pairs by their ids. Returns `None`, which means all pairs, if no id is given.
-///
-/// # Errors
-/// Returns an error if a pair does not exist.
 pub async fn some_or_all(
     catalog: &Catalog,
     typed: &[String],
@@ -47,9 +41,6 @@ pub async fn some_or_all(
 }
 
 /// Looks up one pair.
-///
-/// # Errors
-/// Returns an error if the pair does not exist. The message suggests similar ids.
 pub async fn pair(catalog: &Catalog, typed: &str) -> ProjectResult<PairName> {
     let names = pairs(catalog, &[typed.to_owned()]).await?;
     names
@@ -59,9 +50,6 @@ pub async fn pair(catalog: &Catalog, typed: &str) -> ProjectResult<PairName> {
 }
 
 /// Returns the block with this id, if there is one and no pair has the same id.
-///
-/// # Errors
-/// Returns an error if the catalog fails.
 pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<BlockName>> {
     let Ok(name) = typed.parse::<BlockName>() else {
         return Ok(None);
@@ -75,9 +63,6 @@ pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<Block
 }
 
 /// Looks up pairs and blocks by their ids. An id of both is that of the pair.
-///
-/// # Errors
-/// Returns an error if there is neither a pair nor a block with an id. The message suggests similar ids.
 pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectResult<NamedWork> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -108,9 +93,6 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
 }
 
 /// Looks up one block.
-///
-/// # Errors
-/// Returns an error if the block does not exist. The message suggests similar ids.
 pub async fn existing_block(catalog: &Catalog, typed: &str) -> ProjectResult<BlockName> {
     let all = catalog.block_names().await?;
     let name = typed.parse::<BlockName>().ok();

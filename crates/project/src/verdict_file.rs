@@ -85,9 +85,6 @@ impl VerdictList {
 }
 
 /// Parses a CSV file.
-///
-/// # Errors
-/// Returns an error if the header is invalid.
 fn csv_rows(
     text: ListText,
 ) -> Result<impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send, RefusedLine> {
@@ -106,18 +103,12 @@ fn csv_rows(
 }
 
 /// Refuses a row with values that no verdict has.
-///
-/// # Errors
-/// Returns an error with the line and the reason.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
     let checked = row.listed.verdict.check(now);
     checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
 }
 
 /// Refuses a list with unknown pairs. `first_lines` has the first line of each pair.
-///
-/// # Errors
-/// Returns an error for the first line with such a pair.
 pub fn refuse_unknown(
     first_lines: &BTreeMap<PairName, usize>,
     unknown: &[PairName],

@@ -12,13 +12,16 @@ use mocban_core::domain::{ComputeTimes, Stage, UnixMillis, WaitReason, WorkerMet
 pub struct WorkerTotals {
     jobs: u64,
     leased: u64,
-    done: u64,
-    failed: u64,
+    /// Pairs done.
+    pub done: u64,
+    /// Pairs failed.
+    pub failed: u64,
     stages: BTreeMap<Stage, ComputeTimes>,
     wait_ms: BTreeMap<WaitReason, u64>,
     /// Time that all jobs had in milliseconds.
     job_ms: u64,
-    peak_memory_bytes: Option<u64>,
+    /// Sum of the largest memory of each process in bytes, if it is known.
+    pub peak_memory_bytes: Option<u64>,
 }
 
 impl WorkerTotals {
@@ -74,20 +77,20 @@ impl WorkerTotals {
     }
 
     /// Returns the mean computing time of a stage in milliseconds. `None` if the stage was not computed.
-    fn stage_ms(&self, stage: Stage) -> Option<f64> {
+    pub fn stage_ms(&self, stage: Stage) -> Option<f64> {
         let times = self.stages.get(&stage).filter(|times| times.count > 0)?;
         Some(times.ms as f64 / times.count as f64)
     }
 
     /// Returns the share of their time that the jobs waited.
-    fn wait_share(&self, reasons: &[WaitReason]) -> Option<f64> {
+    pub fn wait_share(&self, reasons: &[WaitReason]) -> Option<f64> {
         let waits = reasons.iter().filter_map(|reason| self.wait_ms.get(reason));
         let waited: u64 = waits.sum();
         (self.job_ms > 0).then(|| waited as f64 / self.job_ms as f64)
     }
 
     /// Returns the sums as fields of a JSON object.
-    pub fn json(&self) -> Map<String, Value> {
+    pub(crate) fn json(&self) -> Map<String, Value> {
         let stages = Stage::ALL.map(|stage| (stage, rounded(self.stage_ms(stage), 1e1)));
         let waits = WaitReason::ALL.map(|reason| {
             let share = self.wait_share(&[reason]);
@@ -106,28 +109,6 @@ impl WorkerTotals {
             Value::Object(fields) => fields,
             _ => Map::new(),
         }
-    }
-
-    /// Returns the cells of a row after the state.
-    pub fn cells(&self) -> Vec<String> {
-        let dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
-        let percent = |share: f64| format!("{:.1} %", share * 100.0);
-        let mut cells = vec![self.done.to_string(), self.failed.to_string()];
-        for stage in Stage::ALL {
-            let ms = self.stage_ms(stage);
-            cells.push(dash(ms.map(|ms| format!("{ms:.1}"))));
-        }
-        for reasons in [
-            &[WaitReason::Database] as &[_],
-            &[WaitReason::Inputs, WaitReason::Artifacts],
-        ] {
-            cells.push(dash(self.wait_share(reasons).map(percent)));
-        }
-        let mib = self
-            .peak_memory_bytes
-            .map(|bytes| format!("{} MiB", bytes >> 20));
-        cells.push(dash(mib));
-        cells
     }
 }
 

@@ -83,7 +83,7 @@ impl Prefetch {
         Self {
             context,
             selection,
-            image_limits: options.image_limits,
+            image_limits: options.limits.image,
             slots: options.workers.max(1),
             queue: VecDeque::new(),
             arriving: VecDeque::new(),

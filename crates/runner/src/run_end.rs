@@ -19,8 +19,8 @@ use mocban_core::domain::Stage;
 /// Returns the largest mesh and the largest other file of a block, with the names of the settings.
 pub(super) const fn block_limits(options: &RunOptions) -> [(u64, &'static str); 2] {
     [
-        (options.mesh_limits.max_bytes, "limits.mesh.max_bytes"),
-        (options.image_limits.max_bytes, "limits.image.max_bytes"),
+        (options.limits.mesh.max_bytes, "limits.mesh.max_bytes"),
+        (options.limits.image.max_bytes, "limits.image.max_bytes"),
     ]
 }
 

@@ -6,7 +6,7 @@ use mocban_report::agreement_text;
 use mocban_results as results;
 
 pub(crate) async fn agreement(context: &Context) -> ProjectResult<ExitCode> {
-    let (_project, catalog) = context.open_read_only().await?;
+    let (_project, catalog) = context.location.open_read_only().await?;
     let found = results::agreement(&catalog).await?;
     catalog.close().await;
     context.warn_about_set_apart(&found.set_apart);

@@ -36,12 +36,12 @@ impl BlockPoints {
     ) -> Result<T, String> {
         let done = tokio::task::spawn_blocking(work).await;
         let done = done.map_err(|error| TaskStopped(error).into()).flatten();
-        done.map_err(|error| error.text(&self.context.dir()))
+        done.map_err(|error| error.text(&self.context.location.dir))
     }
 
     async fn read_block(&self) -> ProjectResult<BlockCorrection> {
-        let (project, catalog) = self.context.open_read_only().await?;
-        let limits = self.context.settings()?.config.limits.image;
+        let (project, catalog) = self.context.location.open_read_only().await?;
+        let limits = self.context.location.settings()?.config.limits.image;
         let read = BlockCorrection::read(&catalog, &project, &self.block, limits).await;
         catalog.close().await;
         Ok(read?)
@@ -52,7 +52,7 @@ impl BlockPoints {
         read: Option<ContentHash>,
         points: Option<&ControlPoints>,
     ) -> ProjectResult<PointsSaved> {
-        let (project, catalog) = self.context.open().await?;
+        let (project, catalog) = self.context.location.open().await?;
         let stored = self.store_in(&catalog, &project, read, points).await;
         catalog.close().await;
         stored

@@ -28,7 +28,7 @@ pub(crate) struct ConfigShowArgs {
 
 pub(crate) fn config(command: &ConfigCommand, context: &Context) -> ProjectResult<ExitCode> {
     let ConfigCommand::Show(args) = command;
-    let settings = context.settings()?.tree.settings();
+    let settings = context.location.settings()?.tree.settings();
     context.print(&as_json(&settings), || {
         as_toml(&settings, args, context.stdout)
     })?;

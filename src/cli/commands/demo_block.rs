@@ -37,9 +37,6 @@ pub(crate) fn import_source(files: &BlockFiles, has_labels: bool) -> BlockSource
 
 /// Stores the true boxes of the block, and the true alignments of the pairs that were cut from it. Returns how many of these
 /// there are.
-///
-/// # Errors
-/// Returns an error if the truth cannot be read or the catalog fails.
 pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> ProjectResult<u64> {
     let bytes = files::read(file)?;
     let truth: BlockTruth = serde_json::from_slice(&bytes)

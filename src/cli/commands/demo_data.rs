@@ -10,9 +10,6 @@ use mocban_project::demo_folder;
 use mocban_runner::Stop;
 
 /// Replaces the data of a demo. Returns `None` if a signal stopped the writing.
-///
-/// # Errors
-/// Returns an error if the files cannot be written.
 pub(crate) async fn replace_data<T: Send + 'static>(
     data: &Path,
     context: &Context,

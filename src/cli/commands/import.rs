@@ -7,9 +7,9 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::LengthUnit;
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
@@ -53,12 +53,10 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_truths(&args)?;
     }
-    let busy = Busy::start(context, "importing");
+    let (location, terminal) = (&context.location, Terminal::new(context));
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_blocks(&source, args.allow_missing, location, &terminal).await?;
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }
@@ -68,9 +66,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult
                 truth: args.truth,
                 allow_missing: args.allow_missing,
             };
-            let outcome = import_pairs(import, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_pairs(import, location, &terminal).await?;
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
         }

@@ -21,7 +21,6 @@ use mocban_pages::review::{
 };
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::error::explanation;
-use mocban_project::files::input_file_limits;
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
@@ -99,7 +98,7 @@ fn percent(text: &str) -> Result<f64, String> {
 
 pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let settings = context.settings()?;
+    let settings = context.location.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
@@ -107,7 +106,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
-    let (project, catalog) = context.open().await?;
+    let (project, catalog) = context.location.open().await?;
     let rights = catalog.review_rights().await?;
     rights.require_review(Some(&args.reviewer))?;
     let (catalog, damaged) = catalog.without_faulty_rows().await?;
@@ -127,7 +126,7 @@ pub(crate) async fn review(args: ReviewArgs, context: &Context) -> ProjectResult
         keys,
         min_view_ms: args.min_view_ms,
         opens_guide: !args.no_guide,
-        limits: input_file_limits(&settings.config),
+        limits: settings.config.limits,
         explain: explanation,
         now,
         queue: queue_options(&args),

@@ -9,9 +9,9 @@ use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
 use mocban_catalog::{BlockDetail, Catalog, StoredCharacter};
-use mocban_core::domain::{BlockCharacterState, BlockName, BlockStage, JobStatus, one_line};
+use mocban_core::domain::{BlockCharacterState, BlockStage, JobStatus, one_line};
+use mocban_project::ProjectResult;
 use mocban_project::shell::shell_quoted;
-use mocban_project::{ExitCode, ProjectError, ProjectResult};
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
 
@@ -19,24 +19,15 @@ use mocban_system::time_text::{duration, local};
 const MAX_CHARACTERS: usize = 20;
 
 /// Shows a block.
-///
-/// # Errors
-/// Returns an error if a database operation fails or the block is gone.
-pub(crate) async fn show_block(
-    name: &BlockName,
+pub(crate) fn show_block(
+    detail: &BlockDetail,
+    characters: &[StoredCharacter],
     project: &Project,
-    catalog: Catalog,
     context: &Context,
-) -> ProjectResult<ExitCode> {
-    let Some(detail) = catalog.block(name).await? else {
-        let text = format!("block {name} was removed while it was read");
-        return Err(ProjectError::unexpected(text));
-    };
-    let characters = catalog.block_characters(name).await?;
-    catalog.close().await;
-    let json = as_json(&detail, &characters, project)?;
-    context.print(&json, || text(&detail, &characters, context.stdout))?;
-    let quoted = shell_quoted(name.as_str());
+) -> ProjectResult<()> {
+    let json = as_json(detail, characters, project)?;
+    context.print(&json, || text(detail, characters, context.stdout))?;
+    let quoted = shell_quoted(detail.state.attributes.name.as_str());
     let failure = detail.state.failure.as_ref();
     match detail.state.status {
         // Control points may help.
@@ -48,7 +39,7 @@ pub(crate) async fn show_block(
         JobStatus::Ready | JobStatus::Backoff => context.next("run"),
         JobStatus::Done => {}
     }
-    Ok(ExitCode::Done)
+    Ok(())
 }
 
 fn as_json(

@@ -6,7 +6,6 @@ use clap::Args;
 use serde_json::json;
 
 use super::block_points::BlockPoints;
-use super::block_sheet;
 use crate::cli::input::browser::open;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
@@ -14,11 +13,11 @@ use crate::cli::output::streams;
 use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
-use mocban_export::InputFileLimits;
 use mocban_export::scan_view::ScanView;
 use mocban_pages::view::{self, ViewServer};
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
+use mocban_project::sheets::block_view;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectError, ProjectResult, Refusal};
 use mocban_runner::{Stop, StopLevel};
@@ -42,18 +41,14 @@ pub(crate) struct ViewArgs {
 
 pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
     page_vec::keep_few_pages();
-    let (project, catalog) = context.open_read_only().await?;
+    let (project, catalog) = context.location.open_read_only().await?;
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, args.port));
     if selection::block(&catalog, &args.pair).await?.is_some() {
         let page = block_page(address, &args, &project, &catalog, context).await;
         catalog.close().await;
         return serve(page?, &args, context).await;
     }
-    let limits = context.settings()?.config.limits;
-    let limits = InputFileLimits {
-        mesh: limits.mesh,
-        image: limits.image,
-    };
+    let limits = context.location.settings()?.config.limits;
     let name = selection::pair(&catalog, &args.pair).await?;
     let detail = catalog.pair(&name).await?;
     catalog.close().await;
@@ -92,7 +87,8 @@ async fn block_page(
     context: &Context,
 ) -> ProjectResult<ViewServer> {
     let name = selection::existing_block(catalog, &args.pair).await?;
-    let view = match block_sheet::read(&args.pair, args.metric, project, catalog, context).await {
+    let view = match block_view(&args.pair, args.metric, project, catalog, &context.location).await
+    {
         Ok(view) => Some(view),
         Err(error) => {
             let Some(why) = refusal(catalog, &name).await? else {

@@ -1,14 +1,13 @@
 //! The text that `show` prints about one pair.
 
-use serde::Serialize;
-
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
+use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
-    ThresholdMetric, Verdict, one_line,
+    Verdict, one_line,
 };
+use mocban_project::details::{Adjustment, ManualResult};
 use mocban_results::ManualCorrection;
 use mocban_store::Project;
 use mocban_system::time_text::{duration, local};
@@ -274,25 +273,6 @@ fn verdicts(record: &MetricRecord) -> String {
         parts.push(format!("{} for an older result", record.older_verdicts));
     }
     parts.join(", ")
-}
-
-/// A manual alignment beside the automatic result.
-#[derive(Debug, Serialize)]
-pub(crate) struct ManualResult {
-    #[serde(flatten)]
-    pub(crate) stored: StoredAlignment,
-    /// Difference from the automatic result. `None` if there is no automatic result, or if the depth map has changed.
-    pub(crate) adjustment: Option<Adjustment>,
-}
-
-/// How a manual alignment differs from the result of a metric.
-#[derive(Debug, Serialize)]
-pub(crate) struct Adjustment {
-    pub(crate) from: ThresholdMetric,
-    #[serde(flatten)]
-    pub(crate) by: ManualCorrection,
-    /// Intersection over union of the automatic result.
-    pub(crate) from_iou: f64,
 }
 
 /// Formats manual alignments, one line each. Returns an empty text if there are none.

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::check_items::CheckRates;
 use super::i18n::Language;
 use mocban_catalog::CatalogError;
+use mocban_core::InputLimits;
 use mocban_core::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
-use mocban_export::InputFileLimits;
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +78,7 @@ pub struct ReviewOptions {
     /// free port is used.
     pub listen: SocketAddr,
     /// Limits on the input files.
-    pub limits: InputFileLimits,
+    pub limits: InputLimits,
     /// Returns the sentence that explains an error of the catalog of the project in a folder.
     pub explain: fn(&CatalogError, &Path) -> String,
     /// Clock.

@@ -54,7 +54,7 @@ impl BlockSlot {
                 .as_ref()
                 .is_none_or(|selection| !selection.is_empty()),
             selection,
-            image_limits: options.image_limits,
+            image_limits: options.limits.image,
             map_bytes: map_bytes(options.memory),
             waits_for_memory: false,
             task: JoinSet::new(),

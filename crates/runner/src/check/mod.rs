@@ -31,7 +31,7 @@ use pairs::PairCheck;
 const PAGE: usize = 500;
 
 /// Options of a check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "each is a choice of its own, with a name"
