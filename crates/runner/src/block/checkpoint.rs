@@ -62,7 +62,7 @@ pub(crate) async fn store_stage(
     let settings = context.blocks.settings(stage);
     let checkpoint = StageCheckpoint {
         stage,
-        made_with: block.made_with(stage, &settings),
+        provenance: block.provenance(stage, &settings),
         result_hash: result_hash(&outcome, &files),
         outcome,
         files,
@@ -190,7 +190,7 @@ pub(crate) async fn store_failure(
         stage,
         failure: failure.clone(),
         action,
-        made_with: block.made_with(stage, &settings),
+        provenance: block.provenance(stage, &settings),
         inputs: block.inputs,
         ms,
         at: now,
