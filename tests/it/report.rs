@@ -10,7 +10,7 @@ use mocban::domain::{PairName, ThresholdMetric, Verdict};
 use mocban::export::pictures::SHEET_WIDTH;
 use mocban::export::{
     ContactSheetOptions, ContactSheetOrder, ExportFormat, ExportOptions, InputFileLimits,
-    draw_contact_sheet,
+    ResultFilter, draw_contact_sheet,
 };
 use mocban::manifest::parse_csv;
 use mocban::mesh::MeshLimits;
@@ -118,7 +118,20 @@ impl FinishedRun {
             mesh: MeshLimits::SUGGESTED,
             image: raster::ImageLimits::SUGGESTED,
         };
-        let options = ExportOptions::all_of(&ThresholdMetric::ALL, limits);
+        let options = ExportOptions {
+            metrics: ThresholdMetric::ALL.to_vec(),
+            only: ResultFilter::All,
+            min_confidence: None,
+            canvas_px: None,
+            split: None,
+            with_times: false,
+            csv_bom: false,
+            images: false,
+            shard_mib: None,
+            license: None,
+            settings: Value::Null,
+            limits,
+        };
         let formats = [ExportFormat::Jsonl];
         let summary =
             mocban::export::export(&self.catalog, &self.project, &target, &formats, options)

@@ -72,24 +72,6 @@ pub struct UnusedOption {
 }
 
 impl ExportOptions {
-    /// Returns options that export everything about `metrics`.
-    pub fn all_of(metrics: &[ThresholdMetric], limits: InputFileLimits) -> Self {
-        Self {
-            metrics: metrics.to_vec(),
-            only: ResultFilter::All,
-            min_confidence: None,
-            canvas_px: None,
-            split: None,
-            with_times: false,
-            csv_bom: false,
-            images: false,
-            shard_mib: None,
-            license: None,
-            settings: Value::Null,
-            limits,
-        }
-    }
-
     /// Checks that at least one of the formats can use each option.
     ///
     /// # Errors
