@@ -54,8 +54,8 @@ pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
-    BlockAttributes, BlockInputVersions, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
-    NewCharacter, StoredCharacter,
+    BlockAttributes, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps, CutOrigin,
+    CutPair, NewCharacter, StoredCharacter,
 };
 pub use blocks::queue::OutstandingBlocks;
 pub use blocks::records::{AuditedBlock, BlockDetail, BlockStageDetail, BlockState, KnownBlock};

@@ -67,6 +67,7 @@ mod pair_failure;
 mod pair_task;
 mod policy;
 mod prefetch;
+mod retry;
 mod run;
 mod run_context;
 mod run_end;

@@ -42,7 +42,7 @@ impl PairFailure {
             stage,
             failure: failure.clone(),
             action,
-            made_with: PairProvenance::new(
+            provenance: PairProvenance::new(
                 context.fingerprints.of(stage),
                 &self.inputs,
                 self.attributes,

@@ -13,6 +13,7 @@ use super::events::RunEvent;
 use super::input_reads::{ReadLimits, read_each};
 use super::memory_budget::{EstimatedPair, MemoryBudget};
 use super::options::RunOptions;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::{ClaimRequest, Lease, PairSelection, PairWork};
@@ -289,8 +290,7 @@ impl Prefetch {
             return Ok(());
         }
         let catalog = &context.catalog;
-        let works = catalog.retry_while_unavailable(async || catalog.work(&leases).await);
-        let works = works.await?;
+        let works = retried!(catalog.work(&leases))?;
         let waited = begun.elapsed() * waiting;
         context.metrics.add_wait(WaitReason::Database, waited);
         let leased: Vec<_> = leases.into_iter().zip(works).collect();

@@ -2,6 +2,7 @@
 
 use super::error::RunError;
 use super::options::NamedWork;
+use super::retry::retried;
 use mocban_catalog::{BlockSelection, Catalog, PairSelection};
 
 /// Some pairs and blocks.
@@ -49,9 +50,7 @@ impl RunSelection {
     pub(super) async fn refresh(&mut self, catalog: &Catalog) -> Result<(), RunError> {
         if !self.blocks.is_empty() {
             let (named, blocks) = (&self.named, &self.blocks);
-            let all = catalog
-                .retry_while_unavailable(async || catalog.with_cut_pairs(named, blocks).await);
-            self.pairs = all.await?;
+            self.pairs = retried!(catalog.with_cut_pairs(named, blocks))?;
         }
         Ok(())
     }

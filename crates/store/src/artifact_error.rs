@@ -56,12 +56,6 @@ impl ArtifactError {
         matches!(self, Self::Bucket(BucketError::Unavailable { .. }))
     }
 
-    /// Returns whether the error shows that the content is gone, so that only computing it again helps. After any
-    /// other error, the file may be sound.
-    pub const fn is_loss(&self) -> bool {
-        matches!(self, Self::Missing(_) | Self::Changed(_))
-    }
-
     /// Returns whether other artifacts may be sound and readable. After any other error, none can be read.
     pub const fn concerns_one_file(&self) -> bool {
         match self {

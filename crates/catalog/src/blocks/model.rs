@@ -71,7 +71,7 @@ impl BlockInputVersions {
 
 /// What a result or a failure of a stage was made with. Stored as JSON.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MadeWith {
+pub struct BlockProvenance {
     /// Revision and settings of the stage.
     pub settings: Value,
     /// The attributes that results depend on.
@@ -88,7 +88,7 @@ pub struct MadeWith {
     pub control_points: Option<ContentHash>,
 }
 
-impl MadeWith {
+impl BlockProvenance {
     /// Describes a stage that was computed from these inputs.
     pub fn new(
         stage: BlockStage,

@@ -96,14 +96,15 @@ pub struct BlockStageDetail {
     /// Hash over outcome and artifacts.
     pub result_hash: ContentHash,
     /// Settings, inputs and attributes that it was computed from.
-    pub made_with: Value,
+    #[serde(rename = "made_with")]
+    pub provenance: Value,
     /// Computing time in milliseconds.
     pub ms: u64,
     /// When it was stored.
     pub at: UnixMillis,
 }
 
-from_row! { BlockStageDetail { stage, outcome as Json, files as Json, result_hash, made_with as Json, ms, at } }
+from_row! { BlockStageDetail { stage, outcome as Json, files as Json, result_hash, provenance: "made_with" as Json, ms, at } }
 
 /// Everything about one block.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::blocks::block_job::BlockJob;
-use crate::blocks::model::{BlockAttributes, BlockInputVersions, MadeWith};
+use crate::blocks::model::{BlockAttributes, BlockInputVersions, BlockProvenance};
 use crate::blocks::queue::uncounted;
 use crate::blocks::records::control_points;
 use crate::blocks::selection::BlockSelection;
@@ -93,12 +93,12 @@ struct PlannedBlock {
     control_points: Option<ControlPoints>,
     cursor: i64,
     status: JobStatus,
-    failure: Option<(BlockStage, MadeWith)>,
+    failure: Option<(BlockStage, BlockProvenance)>,
 }
 
 impl FromRow for PlannedBlock {
     fn from_row(row: &Row) -> Result<Self> {
-        let failed_with: Option<Json<MadeWith>> = row.get("failed_with")?;
+        let failed_with: Option<Json<BlockProvenance>> = row.get("failed_with")?;
         let failed_stage: Option<BlockStage> = row.get("failed_stage")?;
         Ok(Self {
             block: row.get("id")?,
@@ -131,12 +131,12 @@ impl PlannedBlock {
     fn change(
         &self,
         stage: BlockStage,
-        made: &MadeWith,
+        made: &BlockProvenance,
         settings: &BlockSettings,
     ) -> Option<BlockReason> {
         let points = self.control_points.as_ref();
         let (attributes, inputs) = (&self.attributes, &self.inputs);
-        let now = MadeWith::new(stage, settings.of(stage), attributes, inputs, points);
+        let now = BlockProvenance::new(stage, settings.of(stage), attributes, inputs, points);
         [
             (made.mesh != now.mesh, BlockReason::Mesh),
             (made.page != now.page, BlockReason::Page),
@@ -159,7 +159,7 @@ impl PlannedBlock {
     /// Returns the first stage to run and why, or `None` if the block need not run or is leased.
     fn decide(
         &self,
-        results: &BTreeMap<BlockStage, MadeWith>,
+        results: &BTreeMap<BlockStage, BlockProvenance>,
         settings: &BlockSettings,
         policy: RerunPolicy,
     ) -> Option<(BlockStage, BlockReason)> {
@@ -256,7 +256,7 @@ async fn decisions(
     selection: Option<&BlockSelection>,
 ) -> Result<Vec<(PlannedBlock, BlockStage, BlockReason)>> {
     let jobs: Vec<PlannedBlock> = query_as(JOBS).fetch_all(&mut *conn).await?;
-    let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, MadeWith>> = BTreeMap::new();
+    let mut results: BTreeMap<BlockId, BTreeMap<BlockStage, BlockProvenance>> = BTreeMap::new();
     for row in &query(RESULTS).fetch_all(conn).await? {
         let Json(made) = row.get("made_with")?;
         let of_block = results.entry(row.get("block")?).or_default();

@@ -89,8 +89,8 @@ impl JobKind for PairJob {
         stage.index()
     }
 
-    fn fingerprint(made_with: &PairProvenance) -> Option<FingerprintId> {
-        Some(made_with.fingerprint)
+    fn fingerprint(provenance: &PairProvenance) -> Option<FingerprintId> {
+        Some(provenance.fingerprint)
     }
 }
 
@@ -151,8 +151,8 @@ impl StoredKind for PairJob {
         ("attributes", "item.value ->> 'attributes'"),
     ];
 
-    fn provenance(made_with: &PairProvenance) -> Result<impl Serialize + use<'_>> {
-        Ok(made_with)
+    fn provenance(provenance: &PairProvenance) -> Result<impl Serialize + use<'_>> {
+        Ok(provenance)
     }
 
     /// Returns the settings of the worker and the inputs as last read.

@@ -314,8 +314,8 @@ async fn store_recovered<K: StoredKind>(
                     "message": format!("{crashes} workers died or hung over it at {stage}"), "at": now,
                     "status": key.status.code(),
                 });
-                let made_with = K::crashed(conn, unit, stage, worker).await?;
-                crashed.push(merged(fields, made_with));
+                let provenance = K::crashed(conn, unit, stage, worker).await?;
+                crashed.push(merged(fields, provenance));
             }
             _ => recovered.ready += 1,
         }

@@ -232,7 +232,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     });
     StageCheckpoint {
         stage,
-        made_with: PairProvenance::new(
+        provenance: PairProvenance::new(
             fingerprints.of(stage),
             &inputs(stage),
             json!({ "scanned_face_down": null, "unit": null }).to_string(),

@@ -17,7 +17,7 @@ fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
         stage,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
         action,
-        made_with: done(world.fingerprints, stage).made_with,
+        provenance: done(world.fingerprints, stage).provenance,
         inputs: super::inputs(stage),
         ms: Some(3),
         at: 50,

@@ -31,7 +31,7 @@ fn compare(
     let mut faces = detail.stages.iter();
     let faces = faces.find(|one| one.stage == BlockStage::Face);
     let scanned: Option<ContentHash> = faces
-        .map(|stored| serde_json::from_value(stored.made_with["mesh"].clone()))
+        .map(|stored| serde_json::from_value(stored.provenance["mesh"].clone()))
         .transpose()
         .map_err(|why| unusable(BlockStage::Face, &why.to_string()))?;
     // A run may have found the faces of another scan meanwhile.

@@ -56,13 +56,13 @@ impl RegisteredFace {
             }
             None => (aligned.page_from_face, BlockStage::Align),
         };
-        let made_with = align.made_with["page"].clone();
+        let provenance = align.provenance["page"].clone();
         Ok(Some(Self {
             side: aligned.side,
             unit: scan.unit,
             agreement: aligned.agreement.agreeing,
             support: aligned.support,
-            page_hash: serde_json::from_value(made_with).unwrap_or_default(),
+            page_hash: serde_json::from_value(provenance).unwrap_or_default(),
             face: shown
                 .ok_or_else(|| unusable(BlockStage::Face, "it has no face on the aligned side"))?,
             files: serde_json::from_value(face.files.clone())

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::block_stages::{BlockFile, BlockInputs, BlockStageError};
 use crate::error::RunError;
 use crate::input_reads::{ReadItem, ReadLimits, read_each};
+use crate::retry::retried;
 use mocban_catalog::{
     BlockAttributes, BlockInputVersions, BlockSelection, Catalog, InputVersion, KnownBlock,
 };
@@ -20,8 +21,7 @@ pub(crate) async fn store_changes(
     selection: Option<&BlockSelection>,
     limits: &ReadLimits,
 ) -> Result<(), RunError> {
-    let known = catalog.retry_while_unavailable(async || catalog.known_blocks().await);
-    let known = known.await?.into_iter();
+    let known = retried!(catalog.known_blocks())?.into_iter();
     let known =
         known.filter(|known| selection.is_none_or(|selection| selection.contains(known.block)));
     let compared = known.map(|known| ComparedBlock {
@@ -31,9 +31,7 @@ pub(crate) async fn store_changes(
     let changed = read_each(compared.collect(), limits).await;
     let changed: Vec<_> = changed.into_iter().flatten().flatten().collect();
     if !changed.is_empty() {
-        let stored = catalog
-            .retry_while_unavailable(async || catalog.store_block_inputs(changed.clone()).await);
-        stored.await?;
+        retried!(catalog.store_block_inputs(changed.clone()))?;
     }
     Ok(())
 }

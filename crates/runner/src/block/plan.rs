@@ -5,6 +5,7 @@ use crate::block_stages::{BlockStages, block_settings};
 use crate::error::RunError;
 use crate::input_reads::ReadLimits;
 use crate::policy;
+use crate::retry::retried;
 use mocban_catalog::{BlockSelection, Catalog, RerunPolicy};
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
@@ -21,15 +22,8 @@ pub(crate) async fn requeue(
 ) -> Result<(), RunError> {
     inputs::store_changes(project, catalog, selection, limits).await?;
     let settings = block_settings(stages);
-    let requeued = catalog.retry_while_unavailable(async || {
-        catalog
-            .requeue_stale_blocks(&settings, policy, selection)
-            .await
-    });
-    requeued.await?;
+    retried!(catalog.requeue_stale_blocks(&settings, policy, selection))?;
     let longest = policy::longest_backoff_ms();
-    let ended =
-        catalog.retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await);
-    ended.await?;
+    retried!(catalog.release_due_blocks(now, longest))?;
     Ok(())
 }

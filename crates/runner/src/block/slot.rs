@@ -13,6 +13,7 @@ use crate::input_reads::{ReadLimits, read_each};
 use crate::options::RunOptions;
 use crate::policy;
 use crate::prefetch::Prefetch;
+use crate::retry::retried;
 use crate::run_context::RunContext;
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockAttributes, BlockSelection, OutstandingBlocks};
@@ -88,11 +89,8 @@ impl BlockSlot {
         let context = &self.context;
         let (deadline, alive_since) = (context.block_deadline(), context.alive_since());
         let (catalog, selection) = (&context.catalog, self.selection.as_ref());
-        let claimed = catalog.retry_while_unavailable(async || {
-            let claim = catalog.claim_block(worker, deadline, alive_since, selection);
-            claim.await
-        });
-        let Some((lease, work)) = claimed.await? else {
+        let claimed = retried!(catalog.claim_block(worker, deadline, alive_since, selection))?;
+        let Some((lease, work)) = claimed else {
             self.may_find_one = false;
             return Ok(false);
         };
@@ -153,9 +151,7 @@ impl BlockSlot {
     /// Returns how many blocks any process has yet to finish.
     pub(crate) async fn outstanding(&self) -> Result<OutstandingBlocks, RunError> {
         let (catalog, selection) = (&self.context.catalog, self.selection.as_ref());
-        let left =
-            catalog.retry_while_unavailable(async || catalog.outstanding_blocks(selection).await);
-        Ok(left.await?)
+        Ok(retried!(catalog.outstanding_blocks(selection))?)
     }
 
     /// Ends back-offs that are due, and finds out whether a claim may find a block.
@@ -165,9 +161,7 @@ impl BlockSlot {
         let is_due = left.next_due.is_some_and(|due| due <= now);
         if is_due {
             let catalog = &self.context.catalog;
-            catalog
-                .retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await)
-                .await?;
+            retried!(catalog.release_due_blocks(now, longest))?;
         }
         self.may_find_one = is_due || left.ready > 0;
         Ok(())

@@ -15,7 +15,7 @@ const MIN_COLUMNS: usize = 3;
 
 /// Centre and size of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spot {
+pub(super) struct BoxExtent {
     /// Centre, to the right.
     pub(super) u: f64,
     /// Centre, downwards.
@@ -25,7 +25,7 @@ pub(super) struct Spot {
     pub(super) height: f64,
 }
 
-impl Spot {
+impl BoxExtent {
     /// Returns centre and size of a box from left, top, right and bottom.
     pub(super) fn of(bounds: [f64; 4]) -> Self {
         // Larger values would overflow when they are squared.
@@ -53,8 +53,8 @@ impl Spot {
 }
 
 /// Returns the usual size of boxes that are not notes.
-pub(super) fn full_size(spots: &[Spot]) -> f64 {
-    let mut sizes: Vec<f64> = spots.iter().map(|spot| spot.size).collect();
+pub(super) fn full_size(extents: &[BoxExtent]) -> f64 {
+    let mut sizes: Vec<f64> = extents.iter().map(|extent| extent.size).collect();
     sizes.sort_by(f64::total_cmp);
     if sizes.is_empty() {
         return 0.0;
@@ -64,14 +64,14 @@ pub(super) fn full_size(spots: &[Spot]) -> f64 {
     let first = sizes.partition_point(|size| *size < SMALLEST_FULL * large);
     let full = &sizes[first..];
     let usual = full[full.len() / 2];
-    among_notes(spots, usual).unwrap_or(usual)
+    among_notes(extents, usual).unwrap_or(usual)
 }
 
 /// Returns the median size of the large boxes if a page consists nearly only of notes of a usual size. Characters among
 /// notes stand in several columns, titles in one or two.
-fn among_notes(spots: &[Spot], usual: f64) -> Option<f64> {
-    let is_large = |spot: &&Spot| LARGE.contains(&(spot.size / usual));
-    let mut large: Vec<&Spot> = spots.iter().filter(is_large).collect();
+fn among_notes(extents: &[BoxExtent], usual: f64) -> Option<f64> {
+    let is_large = |extent: &&BoxExtent| LARGE.contains(&(extent.size / usual));
+    let mut large: Vec<&BoxExtent> = extents.iter().filter(is_large).collect();
     large.sort_by(|a, b| a.u.total_cmp(&b.u));
     let columns = large.chunk_by(|a, b| b.u - a.u <= usual).count();
     if columns < MIN_COLUMNS {
