@@ -19,6 +19,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("quick-xml", &["lists"]),
     ("sqlx", &["catalog"]),
     ("tiff", &["core", "export"]),
+    ("zune-jpeg", &["core"]),
 ];
 
 /// Crates without files, processes, clocks and async code.

@@ -1,6 +1,5 @@
 //! The EXIF orientation of an image: how the stored pixels are turned to show the image upright.
 
-use image::ImageDecoder;
 use image::metadata::Orientation;
 
 use crate::raster::Grid;
@@ -14,19 +13,18 @@ pub(super) fn of_png(bytes: &[u8]) -> Orientation {
             .iter()
             .fold(0, |sum, byte| sum << 8 | usize::from(*byte));
         if kind == b"eXIf" {
-            let chunk = bytes.get(at + 8..at + 8 + len);
-            return chunk
-                .and_then(Orientation::from_exif_chunk)
-                .unwrap_or(Orientation::NoTransforms);
+            return of_exif(bytes.get(at + 8..at + 8 + len));
         }
         at += 12 + len;
     }
     Orientation::NoTransforms
 }
 
-/// Returns the orientation that a decoder finds. An unreadable orientation counts as upright.
-pub(super) fn of_decoder(decoder: &mut impl ImageDecoder) -> Orientation {
-    decoder.orientation().unwrap_or(Orientation::NoTransforms)
+/// Returns the orientation in an EXIF block. An unreadable one counts as upright.
+pub(super) fn of_exif(block: Option<&[u8]>) -> Orientation {
+    block
+        .and_then(Orientation::from_exif_chunk)
+        .unwrap_or(Orientation::NoTransforms)
 }
 
 /// Returns the orientation with a number from a tag. A number that is not in 1..=8 counts as upright.
