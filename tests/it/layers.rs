@@ -10,6 +10,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("anyhow", &["mocban", "project"]),
     ("anyhow", &[]),
     ("clap", &["mocban"]),
+    ("fax", &["core"]),
+    ("flate2", &["core"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),
@@ -18,7 +20,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("pulp", &["core"]),
     ("quick-xml", &["lists"]),
     ("sqlx", &["catalog"]),
-    ("tiff", &["core", "export"]),
+    ("tiff", &["export"]),
+    ("weezl", &["core"]),
     ("zune-jpeg", &["core"]),
 ];
 

@@ -5,18 +5,19 @@ mod jpeg;
 mod limits;
 mod orientation;
 mod print_image;
+mod tags;
 mod tiff;
-mod tiff_pages;
 
 use std::io::{BufRead, Cursor, Seek};
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
 
 use error::broken;
 use print_image::colours_on_white;
+use tags::TagFileWindow;
 
 pub use error::DecodeError;
 pub use limits::ImageLimits;
@@ -40,20 +41,13 @@ pub use print_image::PrintImage;
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes)?;
-    let kind = FileKind::of(bytes);
-    let (rgb, orientation) = match kind {
+    let (rgb, orientation) = match FileKind::of(bytes) {
         FileKind::Tiff => {
-            let page = tiff_pages::find_print_page(bytes)?;
-            let bytes = page.reordered.as_deref().unwrap_or(bytes);
-            let rgb = match tiff::decode_uncommon(bytes, limits)? {
-                Some(rgb) => rgb,
-                None => colours_on_white(&decode_pixels(bytes, ImageFormat::Tiff, kind, limits)?),
-            };
-            (rgb, orientation::of_tag(page.orientation))
+            let image = tiff::decode(bytes, limits)?;
+            (image.rgb, orientation::of_tag(image.orientation))
         }
         FileKind::Png => {
-            check_png_header(bytes, limits)?;
-            let pixels = decode_pixels(bytes, ImageFormat::Png, kind, limits)?;
+            let pixels = decode_png(bytes, limits)?;
             (colours_on_white(&pixels), orientation::of_png(bytes))
         }
         FileKind::Jpeg => {
@@ -69,7 +63,10 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
 }
 
 /// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
-pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
+pub fn header_pixel_count(mut file: impl BufRead + Seek) -> Option<u64> {
+    if FileKind::of(file.fill_buf().ok()?) == FileKind::Tiff {
+        return tiff::pixel_count(&TagFileWindow::new(file));
+    }
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
@@ -85,34 +82,28 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
     limits.check_size(side(16)?, side(20)?)
 }
 
-/// Decodes the pixels of a PNG or TIFF in stored order.
-fn decode_pixels(
-    bytes: &[u8],
-    format: ImageFormat,
-    kind: FileKind,
-    limits: &ImageLimits,
-) -> Result<DynamicImage, DecodeError> {
-    let mut reader = ImageReader::with_format(PolledReader(Cursor::new(bytes)), format);
+/// Decodes the pixels of a PNG in stored order.
+fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<DynamicImage, DecodeError> {
+    check_png_header(bytes, limits)?;
+    let source = PolledReader(Cursor::new(bytes));
+    let mut reader = ImageReader::with_format(source, ImageFormat::Png);
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
-    let refused = |error: ImageError| decoder_error(kind, &error);
-    let decoder = reader.into_decoder().map_err(refused)?;
-    let (width, height) = decoder.dimensions();
-    limits.check_size(width, height)?;
-    DynamicImage::from_decoder(decoder).map_err(refused)
+    let decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
+    DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))
 }
 
-fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
+fn png_error(error: &ImageError) -> DecodeError {
     let reason = error.to_string();
     let early_end = match error {
         ImageError::IoError(io) => io.kind() == std::io::ErrorKind::UnexpectedEof,
         _ => reason.contains("unexpected end of file") || reason.contains("UnexpectedEof"),
     };
     if early_end {
-        return DecodeError::Truncated(kind);
+        return DecodeError::Truncated(FileKind::Png);
     }
-    broken(kind, &reason)
+    broken(FileKind::Png, &reason)
 }
 
 #[cfg(test)]

@@ -12,11 +12,11 @@ use crate::raster::decode::error::{DecodeError, broken};
 
 /// Samples of 8 bits, pixel by pixel.
 #[derive(Debug, PartialEq)]
-pub(super) struct JpegSamples {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) channels: usize,
-    pub(super) samples: Vec<u8>,
+pub(in crate::raster::decode) struct JpegSamples {
+    pub(in crate::raster::decode) width: usize,
+    pub(in crate::raster::decode) height: usize,
+    pub(in crate::raster::decode) channels: usize,
+    pub(in crate::raster::decode) samples: Vec<u8>,
 }
 
 /// What samples stand for.

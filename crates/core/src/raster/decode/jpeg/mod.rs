@@ -40,6 +40,24 @@ pub(super) fn decode<'b>(
     })
 }
 
+/// Decodes a part of a TIFF image. Luma and chroma samples are not converted.
+///
+/// # Errors
+/// Returns an error if the image is larger than `largest`, truncated, damaged, or coded in a way that is not read.
+pub(super) fn decode_samples(
+    bytes: &[u8],
+    largest: [usize; 2],
+) -> Result<JpegSamples, DecodeError> {
+    let segments = JpegSegments::read(bytes)?;
+    let frame = frame_of(&segments)?;
+    if frame.width > largest[0] || frame.height > largest[1] {
+        let (width, height) = (frame.width, frame.height);
+        let reason = format!("it is {width} x {height} pixels, more than its place");
+        return Err(broken(FileKind::Jpeg, &reason));
+    }
+    samples(bytes, &segments, JpegColours::Stored)
+}
+
 fn frame_of<'s>(segments: &'s JpegSegments<'_>) -> Result<&'s JpegFrame, DecodeError> {
     segments.frame.as_ref().ok_or_else(|| {
         if segments.is_ended {

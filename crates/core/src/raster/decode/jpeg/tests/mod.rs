@@ -52,7 +52,7 @@ fn components_in_scans_of_their_own_give_the_picture_however_chroma_is_shared() 
             TestScans::Separate([1, 2, 0]),
             TestScans::Progressive,
         ] {
-            let image = read(&TestJpeg { shared, scans }.encode(&picture())).expect("reads");
+            let image = read(&TestJpeg { shared, scans }.encode(&picture(), &[])).expect("reads");
             let most = most_different(&image, &picture());
             assert!(most <= 16, "{shared:?}, {scans:?}: {most}");
         }
@@ -65,7 +65,7 @@ fn a_missing_component_and_scans_of_two_components_are_refused() {
         shared: [2, 2],
         scans: SEPARATE,
     }
-    .encode(&picture());
+    .encode(&picture(), &[]);
     let scans: Vec<usize> = (0..file.len() - 1)
         .filter(|at| file[*at..at + 2] == [0xff, 0xda])
         .collect();
@@ -92,7 +92,7 @@ fn a_whole_image_without_an_end_marker_is_read_also_with_a_trailer() {
             shared: [2, 2],
             scans,
         }
-        .encode(&picture());
+        .encode(&picture(), &[]);
         let whole = read(&file).expect("reads");
         let (data, end) = file.split_at(file.len() - 2);
         let trailer = b"SEFHe\0\0\0\x01\0\0\0vendor {\"model\": 7}SEFT";
@@ -116,7 +116,7 @@ fn an_image_that_ends_early_is_truncated() {
             shared: [2, 2],
             scans,
         }
-        .encode(&picture());
+        .encode(&picture(), &[]);
         for len in (20..file.len() - 12).step_by(7) {
             assert_eq!(
                 read(&file[..len]),
@@ -132,13 +132,34 @@ fn an_image_that_ends_early_is_truncated() {
     }
 }
 
+fn segment(marker: u8, body: &[&[u8]]) -> Vec<u8> {
+    let body = body.concat();
+    let len = (body.len() as u16 + 2).to_be_bytes();
+    [&[0xff, marker], &len[..], &body].concat()
+}
+
+#[test]
+fn an_orientation_of_four_bytes_turns_the_image() {
+    let exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x04\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+    let test = TestJpeg {
+        shared: [2, 2],
+        scans: TestScans::Interleaved,
+    };
+    let plain = read(&test.encode(&picture(), &[])).expect("reads");
+    let turned = read(&test.encode(&picture(), &[segment(0xe1, &[exif])])).expect("reads");
+    assert_eq!((plain.turned, turned.turned), (None, Some(6)));
+    assert_eq!((turned.rgb.width(), turned.rgb.height()), (37, 45));
+    assert_eq!(turned.rgb.at(36, 0), plain.rgb.at(0, 0));
+    assert_eq!(turned.rgb.at(0, 44), plain.rgb.at(44, 36));
+}
+
 #[test]
 fn codings_that_are_not_read_are_named() {
     let file = TestJpeg {
         shared: [1, 1],
         scans: TestScans::Interleaved,
     }
-    .encode(&picture());
+    .encode(&picture(), &[]);
     let frame = (0..file.len())
         .find(|at| file[*at..].starts_with(&[0xff, 0xc0]))
         .expect("a frame");
@@ -168,7 +189,7 @@ fn a_cancellation_ends_the_decoding_of_every_kind() {
             shared: [2, 2],
             scans,
         }
-        .encode(&large);
+        .encode(&large, &[]);
         let token = CancelToken::default();
         let whole = token
             .run(|| read(&file))
@@ -201,7 +222,7 @@ proptest::proptest! {
         flips in proptest::collection::vec((proptest::prelude::any::<proptest::sample::Index>(), proptest::prelude::any::<u8>()), 1..6),
     ) {
         let limits = ImageLimits { max_bytes: 1 << 20, max_pixels: 10_000 };
-        let mut file = TestJpeg { shared, scans }.encode(&picture());
+        let mut file = TestJpeg { shared, scans }.encode(&picture(), &[]);
         for (at, value) in flips {
             let at = at.index(file.len());
             file[at] = value;

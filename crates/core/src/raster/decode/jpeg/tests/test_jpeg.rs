@@ -165,8 +165,8 @@ impl TestJpeg {
         }
     }
 
-    /// Encodes a picture.
-    pub(super) fn encode(&self, picture: &Grid<[u8; 3]>) -> Vec<u8> {
+    /// Encodes a picture. `before_scans` are segments in front of the first scan.
+    pub(super) fn encode(&self, picture: &Grid<[u8; 3]>, before_scans: &[Vec<u8>]) -> Vec<u8> {
         let components = [0, 1, 2].map(|channel| self.component(picture, channel));
         let mut file = vec![0xff, 0xd8];
         file.extend(segment(
@@ -185,6 +185,7 @@ impl TestJpeg {
         }
         let is_progressive = self.scans == TestScans::Progressive;
         file.extend(segment(if is_progressive { 0xc2 } else { 0xc0 }, &frame));
+        file.extend(before_scans.concat());
         let mut counts = [0; 16];
         counts[3] = 12;
         file.extend(segment(
