@@ -16,6 +16,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),
     ("tracing-subscriber", &["mocban"]),
+    ("moxcms", &["core"]),
     ("object_store", &["store"]),
     ("pulp", &["core"]),
     ("quick-xml", &["lists"]),

@@ -1,5 +1,6 @@
 //! Decoder of print images: PNG, JPEG and TIFF, recognised by their content.
 
+mod colour_profile;
 mod error;
 mod jpeg;
 mod limits;
@@ -10,7 +11,7 @@ mod tiff;
 
 use std::io::{BufRead, Cursor, Seek};
 
-use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use crate::domain::FileKind;
 use crate::domain::cancel::PolledReader;
@@ -41,25 +42,33 @@ pub use print_image::PrintImage;
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes)?;
-    let (rgb, orientation) = match FileKind::of(bytes) {
+    let (rgb, orientation, profile) = match FileKind::of(bytes) {
         FileKind::Tiff => {
             let image = tiff::decode(bytes, limits)?;
-            (image.rgb, orientation::of_tag(image.orientation))
+            let orientation = orientation::of_tag(image.orientation);
+            (image.rgb, orientation, image.profile)
         }
         FileKind::Png => {
-            let pixels = decode_png(bytes, limits)?;
-            (colours_on_white(&pixels), orientation::of_png(bytes))
+            let (pixels, profile) = decode_png(bytes, limits)?;
+            let rgb = colours_on_white(&pixels);
+            (rgb, orientation::of_png(bytes), profile)
         }
         FileKind::Jpeg => {
             let image = jpeg::decode(bytes, limits)?;
-            (image.rgb, orientation::of_exif(image.exif))
+            let orientation = orientation::of_exif(image.exif);
+            (image.rgb, orientation, image.profile)
         }
         other => return Err(DecodeError::NotAnImage(other)),
     };
-    Ok(PrintImage {
+    let mut image = PrintImage {
         rgb: orientation::upright(rgb, orientation),
         turned: Some(orientation.to_exif()).filter(|number| *number != 1),
-    })
+        ignored_profile: None,
+    };
+    if let Some(profile) = profile {
+        image.ignored_profile = colour_profile::apply(&profile, &mut image.rgb).err();
+    }
+    Ok(image)
 }
 
 /// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
@@ -82,16 +91,21 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
     limits.check_size(side(16)?, side(20)?)
 }
 
-/// Decodes the pixels of a PNG in stored order.
-fn decode_png(bytes: &[u8], limits: &ImageLimits) -> Result<DynamicImage, DecodeError> {
+/// Decodes the pixels of a PNG in stored order, and returns them with its ICC profile.
+fn decode_png(
+    bytes: &[u8],
+    limits: &ImageLimits,
+) -> Result<(DynamicImage, Option<Vec<u8>>), DecodeError> {
     check_png_header(bytes, limits)?;
     let source = PolledReader(Cursor::new(bytes));
     let mut reader = ImageReader::with_format(source, ImageFormat::Png);
     let mut memory = image::Limits::no_limits();
     memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
-    let decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
-    DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))
+    let mut decoder = reader.into_decoder().map_err(|error| png_error(&error))?;
+    let profile = decoder.icc_profile().ok().flatten();
+    let pixels = DynamicImage::from_decoder(decoder).map_err(|error| png_error(&error))?;
+    Ok((pixels, profile))
 }
 
 fn png_error(error: &ImageError) -> DecodeError {

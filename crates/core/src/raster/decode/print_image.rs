@@ -12,11 +12,28 @@ pub struct PrintImage {
     pub rgb: Grid<[u16; 3]>,
     /// EXIF orientation of the file (2 to 8), if its pixels were turned to make the image upright.
     pub turned: Option<u8>,
+    /// Name of the colour profile of the file, if it could not be applied.
+    pub ignored_profile: Option<String>,
+}
+
+impl PrintImage {
+    /// Returns a warning if the colours may differ from what the file means.
+    pub fn profile_warning(&self) -> Option<String> {
+        let profile = self.ignored_profile.as_ref()?;
+        Some(format!(
+            "its colour profile ({profile}) cannot be applied, so its colours are read as sRGB; if they look wrong, \
+             convert the image to sRGB"
+        ))
+    }
 }
 
 impl From<Grid<[u16; 3]>> for PrintImage {
     fn from(rgb: Grid<[u16; 3]>) -> Self {
-        Self { rgb, turned: None }
+        Self {
+            rgb,
+            turned: None,
+            ignored_profile: None,
+        }
     }
 }
 

@@ -20,7 +20,11 @@ use segments::{JpegFrame, JpegSegments};
 pub(super) struct JpegImage<'b> {
     pub(super) rgb: Grid<[u16; 3]>,
     pub(super) exif: Option<&'b [u8]>,
+    /// ICC profile, if the colours are grey or RGB.
+    pub(super) profile: Option<Vec<u8>>,
 }
+
+const CMYK_COMPONENTS: usize = 4;
 
 /// Decodes a print.
 ///
@@ -37,6 +41,9 @@ pub(super) fn decode<'b>(
     Ok(JpegImage {
         rgb: widened(image.width, image.height, image.channels, &image.samples),
         exif: segments.exif,
+        profile: segments
+            .profile()
+            .filter(|_| frame.components.len() < CMYK_COMPONENTS),
     })
 }
 

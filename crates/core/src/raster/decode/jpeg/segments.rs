@@ -43,6 +43,8 @@ pub(super) struct JpegSegments<'b> {
     /// Segments of tables, with their markers, in their order.
     pub(super) tables: Vec<Range<usize>>,
     pub(super) exif: Option<&'b [u8]>,
+    /// Numbers and bytes of the parts of the ICC profile.
+    profile: Vec<(u8, &'b [u8])>,
     /// The colour transform that Adobe programs store.
     pub(super) adobe_transform: Option<u8>,
     /// Whether the segments lead to the end marker.
@@ -50,7 +52,7 @@ pub(super) struct JpegSegments<'b> {
 }
 
 const START_OF_SCAN: u8 = 0xda;
-/// Most segments of tables and scans.
+/// Most segments of tables, scans and parts of a profile.
 const MAX_SEGMENTS: usize = 10_000;
 
 fn number(bytes: &[u8], at: usize) -> Option<usize> {
@@ -101,7 +103,7 @@ impl<'b> JpegSegments<'b> {
     }
 
     fn add(&mut self, marker: u8, range: Range<usize>, bytes: &'b [u8]) -> Result<(), DecodeError> {
-        if self.tables.len() + self.scans.len() >= MAX_SEGMENTS {
+        if self.tables.len() + self.scans.len() + self.profile.len() >= MAX_SEGMENTS {
             let reason = format!("it has more than {MAX_SEGMENTS} segments");
             return Err(broken(FileKind::Jpeg, &reason));
         }
@@ -119,10 +121,26 @@ impl<'b> JpegSegments<'b> {
                 self.scans.extend(scan);
             }
             0xe1 if self.exif.is_none() => self.exif = body.strip_prefix(b"Exif\0\0"),
+            0xe2 => {
+                let part = body.strip_prefix(b"ICC_PROFILE\0");
+                if let Some(&[number, _, ref part @ ..]) = part {
+                    self.profile.push((number, part));
+                }
+            }
             0xee if body.starts_with(b"Adobe") => self.adobe_transform = body.get(11).copied(),
             _ => {}
         }
         Ok(())
+    }
+
+    /// Returns the ICC profile, whose parts are numbered from 1.
+    pub(super) fn profile(&self) -> Option<Vec<u8>> {
+        let mut parts = self.profile.clone();
+        parts.sort_by_key(|(number, _)| *number);
+        let mut numbers = (1..).zip(&parts);
+        let is_whole = numbers.all(|(wanted, (number, _))| wanted == usize::from(*number));
+        (is_whole && !parts.is_empty())
+            .then(|| parts.iter().flat_map(|(_, part)| *part).copied().collect())
     }
 
     /// Returns whether the scans have all bits of all coefficients.

@@ -24,12 +24,15 @@ use layout::TiffLayout;
 use photometric::{Photometric, YCbCrCode};
 
 const ORIENTATION: u64 = 274;
+const ICC_PROFILE: u64 = 34675;
 
 /// The print of a TIFF file, as stored.
 pub(super) struct TiffImage {
     pub(super) rgb: Grid<[u16; 3]>,
     /// EXIF orientation, if the page has one.
     pub(super) orientation: Option<u64>,
+    /// ICC profile, if the colours are grey or RGB.
+    pub(super) profile: Option<Vec<u8>>,
 }
 
 /// Decodes the print of a TIFF file.
@@ -42,9 +45,14 @@ pub(super) struct TiffImage {
 pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, DecodeError> {
     let print = pages::find_print_page(&bytes)?;
     let layout = TiffLayout::read(&print.page, limits)?;
+    let has_profile = !matches!(layout.photometric, Photometric::Cmyk);
     Ok(TiffImage {
         rgb: pixels(&layout, bytes)?,
         orientation: print.inherited(ORIENTATION),
+        profile: print
+            .inherited_bytes(ICC_PROFILE)
+            .filter(|_| has_profile)
+            .map(<[u8]>::to_vec),
     })
 }
 

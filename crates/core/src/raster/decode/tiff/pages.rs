@@ -32,6 +32,13 @@ impl PrintPage<'_> {
         let own = self.page.number(tag);
         own.or_else(|| self.parent?.number(tag))
     }
+
+    /// Returns the bytes of a tag of the page, or of its parent.
+    pub(super) fn inherited_bytes(&self, tag: u64) -> Option<&[u8]> {
+        let own = self.page.values(tag);
+        let values = own.or_else(|| self.parent?.values(tag))?;
+        values.bytes()
+    }
 }
 
 /// Returns whether a page is a reduced copy or a mask of another page.

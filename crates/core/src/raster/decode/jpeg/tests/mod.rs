@@ -6,6 +6,7 @@ use super::super::{DecodeError, ImageLimits, PrintImage, decode};
 use crate::domain::FileKind;
 use crate::domain::cancel::{CancelToken, Cancelled};
 use crate::raster::Grid;
+use crate::raster::test_profiles::TestProfile;
 use test_jpeg::{TestJpeg, TestScans};
 
 const SHARED: [[usize; 2]; 4] = [[1, 1], [2, 1], [1, 2], [2, 2]];
@@ -151,6 +152,32 @@ fn an_orientation_of_four_bytes_turns_the_image() {
     assert_eq!((turned.rgb.width(), turned.rgb.height()), (37, 45));
     assert_eq!(turned.rgb.at(36, 0), plain.rgb.at(0, 0));
     assert_eq!(turned.rgb.at(0, 44), plain.rgb.at(44, 36));
+}
+
+#[test]
+fn a_colour_profile_in_several_segments_is_applied() {
+    let profile = TestProfile::WIDE.icc();
+    let (first, second) = profile.split_at(200);
+    let part = |number, part| segment(0xe2, &[b"ICC_PROFILE\0", &[number, 2], part]);
+    let test = TestJpeg {
+        shared: [1, 1],
+        scans: TestScans::Interleaved,
+    };
+    let wide = picture().map(|colour| colour.map(|c| u16::from(c) * 257));
+    let twin = TestProfile::WIDE
+        .twin(&wide)
+        .map(|colour| colour.map(|c| (c / 257) as u8));
+    // The segments are in the wrong order.
+    let segments = [part(2, second), part(1, first)];
+    let image = read(&test.encode(&twin, &segments)).expect("reads");
+    assert_eq!(image.profile_warning(), None);
+    let most = most_different(&image, &picture());
+    assert!(most < 20, "{most}");
+    let plain = read(&test.encode(&twin, &[])).expect("reads");
+    assert!(most_different(&plain, &picture()) > 40);
+    // Without its second part, the profile does not count.
+    let half = read(&test.encode(&twin, &segments[1..])).expect("reads");
+    assert!(half.profile_warning().is_some());
 }
 
 #[test]
