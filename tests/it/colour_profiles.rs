@@ -1,4 +1,4 @@
-//! Prints in other colour spaces have the mask and the scores of their twins in sRGB.
+//! Prints in other colour spaces, and of cameras, have the mask and the scores of their twins in sRGB.
 
 use std::io::Cursor;
 
@@ -82,4 +82,8 @@ fn a_print_has_the_results_of_its_srgb_twin() {
         let both = [png(srgb, is_grey, None), twin];
         assert_same_results(&scan, &settings, both, name);
     }
+    // A camera of 10 bits stores its numbers without scaling.
+    let narrow = grey.map(|colour| colour.map(|level| level >> 6));
+    let both = [png(&grey, true, None), png(&narrow, true, None)];
+    assert_same_results(&scan, &settings, both, "10 bits in 16");
 }

@@ -42,21 +42,25 @@ pub use print_image::PrintImage;
 /// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     limits.check_bytes(bytes)?;
-    let (rgb, orientation, profile) = match FileKind::of(bytes) {
+    let (rgb, orientation, profile, has_16_bits) = match FileKind::of(bytes) {
         FileKind::Tiff => {
             let image = tiff::decode(bytes, limits)?;
             let orientation = orientation::of_tag(image.orientation);
-            (image.rgb, orientation, image.profile)
+            (image.rgb, orientation, image.profile, image.has_16_bits)
         }
         FileKind::Png => {
             let (pixels, profile) = decode_png(bytes, limits)?;
+            let has_16_bits = matches!(
+                pixels,
+                DynamicImage::ImageLuma16(_) | DynamicImage::ImageRgb16(_)
+            );
             let rgb = colours_on_white(&pixels);
-            (rgb, orientation::of_png(bytes), profile)
+            (rgb, orientation::of_png(bytes), profile, has_16_bits)
         }
         FileKind::Jpeg => {
             let image = jpeg::decode(bytes, limits)?;
             let orientation = orientation::of_exif(image.exif);
-            (image.rgb, orientation, image.profile)
+            (image.rgb, orientation, image.profile, false)
         }
         other => return Err(DecodeError::NotAnImage(other)),
     };
@@ -65,6 +69,9 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
         turned: Some(orientation.to_exif()).filter(|number| *number != 1),
         ignored_profile: None,
     };
+    if has_16_bits {
+        print_image::widen_narrow(&mut image.rgb);
+    }
     if let Some(profile) = profile {
         image.ignored_profile = colour_profile::apply(&profile, &mut image.rgb).err();
     }

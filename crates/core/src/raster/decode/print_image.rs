@@ -92,3 +92,28 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
         }
     }
 }
+
+/// Scales the colours of an image of 16 bits if none needs more than 12 of them: cameras of 10 and 12 bits store their
+/// numbers without scaling, and the paper of a print is never as dark as a sixteenth of white.
+pub(super) fn widen_narrow(rgb: &mut Grid<[u16; 3]>) {
+    const TEN_BITS: u16 = (1 << 10) - 1;
+    const TWELVE_BITS: u16 = (1 << 12) - 1;
+    let mut most = 0;
+    for row in 0..rgb.height() {
+        most = rgb
+            .row(row)
+            .as_flattened()
+            .iter()
+            .fold(most, |most, c| most.max(*c));
+        if most > TWELVE_BITS {
+            return;
+        }
+    }
+    let white = if most > TEN_BITS {
+        TWELVE_BITS
+    } else {
+        TEN_BITS
+    };
+    let scale = |level: u16| (u32::from(level) * u32::from(u16::MAX) / u32::from(white)) as u16;
+    *rgb = rgb.map(|colour| colour.map(scale));
+}

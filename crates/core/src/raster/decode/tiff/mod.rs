@@ -33,6 +33,7 @@ pub(super) struct TiffImage {
     pub(super) orientation: Option<u64>,
     /// ICC profile, if the colours are grey or RGB.
     pub(super) profile: Option<Vec<u8>>,
+    pub(super) has_16_bits: bool,
 }
 
 /// Decodes the print of a TIFF file.
@@ -53,6 +54,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<TiffImage, De
             .inherited_bytes(ICC_PROFILE)
             .filter(|_| has_profile)
             .map(<[u8]>::to_vec),
+        has_16_bits: layout.used_bits == 16 && !layout.is_float,
     })
 }
 

@@ -40,6 +40,8 @@ fn ten_bits_in_sixteen_span_black_to_white_whatever_the_tags_say() {
     for (bits_per_sample, numbers) in [
         (10, low.clone()),
         (10, low.iter().map(|number| number << 6).collect()),
+        (16, low),
+        (16, levels(12)),
     ] {
         let words = numbers
             .iter()
