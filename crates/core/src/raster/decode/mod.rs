@@ -286,11 +286,28 @@ mod tests {
             decode(b"id,mesh,print\n", &LIMITS),
             Err(DecodeError::NotAnImage(FileKind::Text))
         );
-        let error = decode(b"GIF89a......", &LIMITS).expect_err("not read");
-        assert_eq!(
-            error.to_string(),
-            "the file is a GIF image; PNG, JPEG and TIFF images are read"
-        );
+        for (bytes, says) in [
+            (
+                &b"GIF89a......"[..],
+                "the file is a GIF image; PNG, JPEG and TIFF images are read: convert them, such as \
+                with ImageMagick: `magick mogrify -format png *.gif`",
+            ),
+            (
+                b"%PDF-1.7\n",
+                "the file is a PDF document; PNG, JPEG and TIFF images are read: save their pages as images, \
+                such as with `pdftoppm -r 600 -png FILE.pdf page`",
+            ),
+            (
+                b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n",
+                "the file is a pointer of Git LFS \
+                and does not hold the image; fetch the image with `git lfs pull`",
+            ),
+        ] {
+            assert_eq!(
+                decode(bytes, &LIMITS).expect_err("not read").to_string(),
+                says
+            );
+        }
     }
 
     #[test]
