@@ -114,6 +114,22 @@ fn cases() -> Vec<Case> {
             "bad_input",
             "the file is text",
         ),
+        case(
+            "bmp_as_png",
+            print(b"BM\x36\0\0\0\0\0\0\0\x36\0\0\0".to_vec()),
+            "bad_input",
+            "the file is a BMP image; PNG, JPEG and TIFF images are read: convert them, such as with \
+                ImageMagick: `magick mogrify -format png *.bmp`",
+        ),
+        case(
+            "lfs_pointer",
+            print(
+                b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
+                    .to_vec(),
+            ),
+            "bad_input",
+            "the file is a pointer of Git LFS and does not hold the image; fetch the image with `git lfs pull`",
+        ),
         case("missing_mesh", BadInput::Mesh(None), "io", "is not there"),
         case("missing_print", BadInput::Print(None), "io", "is not there"),
         case(

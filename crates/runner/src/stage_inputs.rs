@@ -175,6 +175,9 @@ impl StageInputs {
             let message = format!("{stored}: {error}");
             ExecutionError::failed(error.class(), message)
         })?;
+        if let Some(warning) = image.profile_warning() {
+            tracing::warn!("{stored}: {warning}");
+        }
         Ok(Print::from(image))
     }
 }

@@ -173,6 +173,7 @@ mod tests {
         PrintImage {
             rgb: Grid::new(30, 30, [60_000; 3]),
             turned: None,
+            ignored_profile: None,
         }
     }
 

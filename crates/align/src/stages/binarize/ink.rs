@@ -288,6 +288,7 @@ mod tests {
         PrintImage {
             rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
             turned: None,
+            ignored_profile: None,
         }
     }
 
@@ -342,6 +343,7 @@ mod tests {
                 [grey as u16 * 257; 3]
             }),
             turned: None,
+            ignored_profile: None,
         };
         let wrong = |ink: &InkMask| {
             let pixels = ink.mask.data().iter().enumerate();
@@ -386,6 +388,7 @@ mod tests {
         let one = PrintImage {
             rgb: Grid::new(1, 1, [0; 3]),
             turned: None,
+            ignored_profile: None,
         };
         assert!(matches!(
             read(&one),

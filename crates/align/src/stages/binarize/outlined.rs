@@ -20,6 +20,7 @@ pub(crate) fn hypotheses_within(
     let part = PrintImage {
         rgb: picture.rgb.part(bounds),
         turned: picture.turned,
+        ignored_profile: None,
     };
     let whole = |ink: InkMask| {
         let from_part =
@@ -82,6 +83,7 @@ mod tests {
         let picture = PrintImage {
             rgb: Grid::from_fn(120, 90, |x, y| [grey(x, y) as u16 * 257; 3]),
             turned: None,
+            ignored_profile: None,
         };
         let inks = hypotheses_within(&picture, &outline()).expect("ink");
         let inside = inside(&outline(), [120, 90]);

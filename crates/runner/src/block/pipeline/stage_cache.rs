@@ -87,6 +87,9 @@ impl HeldInputs {
         *held = None;
         let image = raster::decode(&bytes, &context.limits.image)
             .map_err(|error| file.failed(error.class(), error))?;
+        if let Some(warning) = image.profile_warning() {
+            tracing::warn!("{}: {warning}", file.name());
+        }
         drop(bytes);
         let ink = PageInk::of(&image).map_err(|error| failed(file, error))?;
         let page = Arc::new(HeldPage { hash, image, ink });
