@@ -98,9 +98,9 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> ProjectResult<Self> {
-        let print_files = files::list(prints)?;
+        let [mesh_files, print_files] = [files::list(meshes)?, files::list(prints)?];
         let unread = unread_images(&print_files);
-        let found = pair_folders(&files::list(meshes)?, &print_files).map_err(|problems| {
+        let found = pair_folders(&mesh_files, &print_files).map_err(|problems| {
             let lines = [&[problems.to_string()][..], &unread].concat();
             refuse(meshes, &lines.join("\n"))
         })?;
