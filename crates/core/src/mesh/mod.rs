@@ -1,5 +1,6 @@
 //! Triangle meshes and point sets in their own frame and unit, and their readers and writers.
 
+mod arrays;
 mod clustering;
 mod error;
 mod format;
@@ -15,6 +16,7 @@ mod weld;
 pub mod write;
 mod xyz;
 
+pub use arrays::{MeshArrayError, PositionSlice};
 pub use error::{MeshError, MeshLimits, MeshReadError};
 pub use triangle_mesh::{Mesh, Vertices};
 pub use triangle_stream::{
