@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import logging
 import os
 from collections.abc import Iterable, Mapping
-from html import escape
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -316,6 +314,9 @@ class Alignment(Frozen):
         )
 
     def _repr_html_(self) -> str:
+        import base64
+        from html import escape
+
         if self._native is None:
             return f"<p>{escape(repr(self))}</p>"
         assert self._first is not None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import queue
 import threading
 from collections.abc import Hashable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -108,6 +107,8 @@ def _size(value: Any) -> int:
 def _results(
     pairs: Iterator[Any], threads: int, max_bytes: int | None, options: dict[str, Any]
 ) -> Iterator[tuple[Any, Alignment | Error]]:
+    import queue
+
     todo: queue.SimpleQueue[_Work | None] = queue.SimpleQueue()
 
     def worker() -> None:

@@ -4,7 +4,21 @@ from typing import Any, final
 from numpy import bool_, float32, float64, uint8, uint16, uint32
 from numpy.typing import NDArray
 
-__all__: list[str]
+__all__ = [
+    "NativeAlignment",
+    "NativeMesh",
+    "NativePrint",
+    "NativeProject",
+    "NativeSettings",
+    "__version__",
+    "align_pair",
+    "depth_map",
+    "fit_surface",
+    "forked",
+    "read_mesh",
+    "read_print",
+]
+
 __version__: str
 
 def forked() -> None: ...

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -189,6 +188,8 @@ class Project:
         metrics: list[str] = list(METRICS) if metric is None else [metric]
         if self.settings["pipeline"]["method"] == "paper":
             metrics = [name for name in metrics if name != "relief"] or ["ensemble"]
+        import tempfile
+
         with tempfile.TemporaryDirectory(prefix="mocban-") as folder:
             table = Path(folder) / "table"
             self._native.export(os.fspath(table), ["parquet"], metrics, "all", False)

@@ -17,7 +17,7 @@ use mocban_store::{Input, InputError, Leftover, open_input, read_input};
 
 /// One scan and one print.
 #[derive(Debug, Clone)]
-pub struct PairFiles {
+pub struct MeshAndPrint {
     /// The mesh.
     pub mesh: PathBuf,
     /// The image of the print.
@@ -45,7 +45,7 @@ pub enum FileAlignment {
 ///
 /// # Errors
 /// Returns an error if a file cannot be read.
-pub async fn align(files: PairFiles, location: &Location) -> ProjectResult<FileAlignment> {
+pub async fn align(files: MeshAndPrint, location: &Location) -> ProjectResult<FileAlignment> {
     let config = location.settings()?.config;
     let work = move || align_files(&files, &config.stages, &config.limits);
     Ok(tokio::task::spawn_blocking(work)
@@ -54,7 +54,7 @@ pub async fn align(files: PairFiles, location: &Location) -> ProjectResult<FileA
 }
 
 fn align_files(
-    files: &PairFiles,
+    files: &MeshAndPrint,
     settings: &Settings,
     limits: &InputLimits,
 ) -> Result<FileAlignment, Refusal> {
@@ -65,7 +65,7 @@ fn align_files(
         (Ok(scan), Ok(print)) => (scan, print),
         (Err(failure), _) | (_, Err(failure)) => return Ok(FileAlignment::Refused(failure)),
     };
-    let named = |failure: PairFailure| {
+    let named = |failure: AlignFailure| {
         let path = if failure.is_of_print {
             &files.print
         } else {
@@ -88,7 +88,7 @@ fn align_files(
 
 /// Why a pair in memory is not aligned. The message does not name the scan or the print.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PairFailure {
+pub struct AlignFailure {
     /// What the failure means for the pair.
     pub class: FailureClass,
     /// Lower-case fragment with the values.
@@ -98,10 +98,10 @@ pub struct PairFailure {
 }
 
 /// Returns why the unit of a scan must be wrong, or `None` if it may be right.
-pub fn wrong_unit(scan: &Scan, unit: Option<LengthUnit>) -> Option<PairFailure> {
+pub fn wrong_unit(scan: &Scan, unit: Option<LengthUnit>) -> Option<AlignFailure> {
     unit?;
     let length = scan_size::length_of(&scan.mesh().vertices);
-    scan_size::wrong_unit(length, unit).map(|message| PairFailure {
+    scan_size::wrong_unit(length, unit).map(|message| AlignFailure {
         class: FailureClass::BadInput,
         message,
         is_of_print: false,
@@ -117,11 +117,11 @@ pub fn align_pair(
     print: &Print,
     hints: ScanHints,
     settings: &Settings,
-) -> Result<AlignedPair, PairFailure> {
+) -> Result<AlignedPair, AlignFailure> {
     AlignedPair::with_hints(scan, print, hints, settings).map_err(|error| {
         let length = scan_size::length_of(&scan.mesh().vertices);
         let advice = scan_size::advice_for(&error, length, hints.unit);
-        PairFailure {
+        AlignFailure {
             class: error.class(),
             message: format!("{error}{advice}"),
             is_of_print: error.is_of_print(),

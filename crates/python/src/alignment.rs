@@ -18,7 +18,7 @@ use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_core::domain::MetricOutcome;
 use mocban_core::raster::{Mask, compact_rgb8, warp_mask};
 use mocban_export::pictures::{PrintView, Rgb};
-use mocban_project::align::{self, PairFailure};
+use mocban_project::align::{self, AlignFailure};
 
 /// An aligned pair.
 #[pyclass(frozen, module = "mocban._native")]
@@ -214,7 +214,7 @@ pub(crate) fn align_pair(
             };
             (Some(alignment), None)
         }
-        Err(PairFailure {
+        Err(AlignFailure {
             class,
             message,
             is_of_print,

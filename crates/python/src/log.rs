@@ -26,7 +26,7 @@ fn waiting() -> MutexGuard<'static, VecDeque<(u32, String)>> {
 pub(crate) fn install() {
     INSTALL.call_once(|| {
         // Only this library is in the extension module.
-        let _ = tracing::subscriber::set_global_default(Queue(AtomicU64::new(1)));
+        let _ = tracing::subscriber::set_global_default(MessageQueue(AtomicU64::new(1)));
     });
 }
 
@@ -46,9 +46,9 @@ pub(crate) fn forward(py: Python<'_>) -> PyResult<()> {
 }
 
 /// Stores messages. Spans are ignored.
-struct Queue(AtomicU64);
+struct MessageQueue(AtomicU64);
 
-impl Subscriber for Queue {
+impl Subscriber for MessageQueue {
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
         *metadata.level() <= Level::INFO && metadata.target().starts_with("mocban")
     }
