@@ -151,7 +151,7 @@ class Mesh(Frozen):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong with the mesh."""
-        return tuple(self._native.warnings)
+        return tuple(self._native.warnings())
 
     @property
     def path(self) -> str | None:

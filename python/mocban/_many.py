@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ._alignment import Alignment, align
 from ._errors import Error
+from ._inputs import Mesh, Print
 from ._settings import Settings
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from ._inputs import Mesh, Print
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -101,6 +100,12 @@ def _size(value: Any) -> int:
             return os.stat(value).st_size
         except OSError:
             return 0
+    if isinstance(value, Mesh):
+        vertices, faces = value._native.counts()
+        return 24 * vertices + 12 * faces
+    if isinstance(value, Print):
+        width, height = value.size
+        return 6 * width * height
     return int(getattr(value, "nbytes", 0))
 
 

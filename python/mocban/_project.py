@@ -119,6 +119,25 @@ class Project:
         self._folder, self._catalog, self._readonly = Path(folder), catalog, readonly
         self._native = _rust.NativeProject(os.fspath(folder), catalog)
 
+    @classmethod
+    def create(cls, folder: str | os.PathLike[str], catalog: str | None = None) -> Project:
+        """Return a project that need not exist: the first `import_pairs` makes it, as ``mocban import`` does.
+
+        Parameters
+        ----------
+        folder : path-like
+        catalog : str, optional
+            Address of a catalog in PostgreSQL; a file in the folder by default.
+
+        Examples
+        --------
+        >>> import mocban
+        >>> project = mocban.Project.create("new")
+        >>> project.import_pairs([{"id": "one", "mesh": "pair.stl", "print": "pair.png"}])["added"]
+        1
+        """
+        return cls(folder, catalog, False)
+
     @property
     def folder(self) -> Path:
         """The project's folder."""

@@ -107,7 +107,7 @@ def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path
     rows = [{"id": p.id, "mesh": p.mesh, "print": p.print, "note": float("nan"), "unit": p.unit} for p in pairs[:3]]
     with pytest.raises(mocban.NotAProject):
         mocban.open(folder)
-    project = mocban.Project(folder, None, readonly=False)
+    project = mocban.Project.create(folder)
     assert project.import_pairs(rows)["added"] == 3
     assert project.import_pairs(iter(rows))["unchanged"] == 3
     pandas = pytest.importorskip("pyarrow").Table.from_pylist([{"id": 7, "mesh": "no.stl", "print": "no.png"}])

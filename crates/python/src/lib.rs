@@ -10,7 +10,8 @@
 //! Classes here hold data and convert arrays of exactly one kind. The Python part checks and converts everything else, and
 //! has the documentation.
 //!
-//! **Invariant:** nothing is computed and no file is read while the GIL is held, and no work begins after a fork.
+//! **Invariant:** while the GIL is held, arrays are copied, but nothing is computed and no file is read; no work begins after a
+//! fork.
 
 mod alignment;
 mod compute;

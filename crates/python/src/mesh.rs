@@ -1,7 +1,7 @@
 //! A scan, from arrays or a file.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -21,8 +21,8 @@ pub(crate) struct NativeMesh {
     pub(crate) unit: Option<LengthUnit>,
     #[pyo3(get)]
     pub(crate) path: Option<PathBuf>,
-    #[pyo3(get)]
-    warnings: Vec<String>,
+    /// Why the unit must be wrong, once that was asked for.
+    wrong_unit: OnceLock<Option<String>>,
 }
 
 /// Parses the name of a unit.
@@ -32,14 +32,12 @@ pub(crate) fn unit(py: Python<'_>, name: Option<&str>) -> PyResult<Option<Length
 }
 
 impl NativeMesh {
-    fn new(mesh: Mesh, unit: Option<LengthUnit>, path: Option<PathBuf>) -> Self {
-        let scan = Scan::from(mesh);
-        let wrong = align::wrong_unit(&scan, unit);
+    fn new(scan: Scan, unit: Option<LengthUnit>, path: Option<PathBuf>) -> Self {
         Self {
             scan: Arc::new(scan),
             unit,
             path,
-            warnings: wrong.into_iter().map(|failure| failure.message).collect(),
+            wrong_unit: OnceLock::new(),
         }
     }
 }
@@ -71,7 +69,7 @@ impl NativeMesh {
         };
         let mesh =
             mesh.map_err(|error| raise(py, "MeshError", "bad_input", &error.to_string(), None))?;
-        compute(py, move || Self::new(mesh, unit, None))
+        Ok(Self::new(mesh.into(), unit, None))
     }
 
     /// Returns the coordinates, three for each vertex.
@@ -90,6 +88,22 @@ impl NativeMesh {
         (mesh.vertices.len(), mesh.triangles.len())
     }
 
+    /// Returns what may be wrong with the mesh.
+    fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        if self.wrong_unit.get().is_none() {
+            let (scan, unit) = (Arc::clone(&self.scan), self.unit);
+            let found = compute(py, move || align::wrong_unit(&scan, unit))?;
+            let _ = self.wrong_unit.set(found.map(|failure| failure.message));
+        }
+        Ok(self
+            .wrong_unit
+            .get()
+            .cloned()
+            .flatten()
+            .into_iter()
+            .collect())
+    }
+
     /// Returns the name of the unit.
     fn unit(&self) -> Option<&'static str> {
         self.unit.map(LengthUnit::name)
@@ -106,24 +120,11 @@ pub(crate) fn read_mesh(
 ) -> PyResult<NativeMesh> {
     let unit = unit(py, unit_name)?;
     let (file, limits) = (path.clone(), settings.limits);
-    let read = compute(py, move || {
-        let read = align::read_scan(&file, &limits);
-        read.map(|content| content.map(|scan| (align::wrong_unit(&scan, unit), scan)))
-    })?;
+    let read = compute(py, move || align::read_scan(&file, &limits))?;
     let content = read.map_err(|error| unreadable(py, "MeshError", &error, &path))?;
-    let (wrong, scan) = content.map_err(|failure| {
-        raise(
-            py,
-            "MeshError",
-            failure.class.name(),
-            &failure.message,
-            Some(&path),
-        )
+    let scan = content.map_err(|failure| {
+        let class = failure.class.name();
+        raise(py, "MeshError", class, &failure.message, Some(&path))
     })?;
-    Ok(NativeMesh {
-        scan: Arc::new(scan),
-        unit,
-        path: Some(path),
-        warnings: wrong.into_iter().map(|failure| failure.message).collect(),
-    })
+    Ok(NativeMesh::new(scan, unit, Some(path)))
 }

@@ -71,16 +71,20 @@ fn colours<T: Copy>(
     let mut colours = Vec::with_capacity(samples.len() / channels);
     for row in samples.chunks_exact(width * channels) {
         poll();
-        let pixels = row.chunks_exact(channels);
-        colours.extend(pixels.map(|pixel| match *pixel {
-            [grey, alpha] => {
-                let [grey, alpha] = [grey, alpha].map(wide);
+        match channels {
+            1 => colours.extend(row.iter().map(|grey| [wide(*grey); 3])),
+            2 => colours.extend(row.as_chunks::<2>().0.iter().map(|pixel| {
+                let [grey, alpha] = pixel.map(wide);
                 on_white([grey, grey, grey, alpha])
-            }
-            [r, g, b] => [r, g, b].map(wide),
-            [r, g, b, alpha] => on_white([r, g, b, alpha].map(wide)),
-            _ => [wide(pixel[0]); 3],
-        }));
+            })),
+            3 => colours.extend(row.as_chunks::<3>().0.iter().map(|pixel| pixel.map(wide))),
+            _ => colours.extend(
+                row.as_chunks::<4>()
+                    .0
+                    .iter()
+                    .map(|pixel| on_white(pixel.map(wide))),
+            ),
+        }
     }
     colours
 }
