@@ -15,7 +15,7 @@ use mocban_store::{Input, InputError, open_input, read_input};
 
 /// One scan and one print.
 #[derive(Debug, Clone)]
-pub struct PairFiles {
+pub struct AlignInput {
     /// The mesh.
     pub mesh: PathBuf,
     /// The image of the print.
@@ -43,16 +43,16 @@ pub enum FileAlignment {
 ///
 /// # Errors
 /// Returns an error if a file cannot be read.
-pub async fn align(files: PairFiles, location: &Location) -> ProjectResult<FileAlignment> {
+pub async fn align(input: AlignInput, location: &Location) -> ProjectResult<FileAlignment> {
     let config = location.settings()?.config;
-    let work = move || align_files(&files, &config.stages, &config.limits);
+    let work = move || align_files(&input, &config.stages, &config.limits);
     Ok(tokio::task::spawn_blocking(work)
         .await
         .map_err(TaskStopped)??)
 }
 
 fn align_files(
-    files: &PairFiles,
+    files: &AlignInput,
     settings: &Settings,
     limits: &InputLimits,
 ) -> Result<FileAlignment, Refusal> {
@@ -82,7 +82,7 @@ fn align_files(
     )
 }
 
-fn refusal(error: &StageError, files: &PairFiles, length: f64) -> Failure {
+fn refusal(error: &StageError, files: &AlignInput, length: f64) -> Failure {
     let path = if error.is_of_print() {
         &files.print
     } else {

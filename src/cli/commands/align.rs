@@ -10,7 +10,7 @@ use crate::cli::output::table::columns;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_core::domain::LengthUnit;
 use mocban_export::{ALIGNMENT_FILES, alignment_files};
-use mocban_project::align::{self, FileAlignment, PairFiles, side};
+use mocban_project::align::{self, AlignInput, FileAlignment, side};
 use mocban_project::generated_folder::GeneratedFolder;
 use mocban_project::{ExitCode, ProjectResult};
 
@@ -45,7 +45,7 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
         let names = ALIGNMENT_FILES.iter().chain([&NUMBERS]);
         folder.refuse_foreign(&names.map(Path::new).collect::<Vec<_>>())?;
     }
-    let files = PairFiles {
+    let files = AlignInput {
         mesh: args.mesh,
         print: args.print,
         hints: ScanHints {
