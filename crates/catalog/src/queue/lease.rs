@@ -63,6 +63,11 @@ impl<K: JobKind> Lease<K> {
         K::id(self.unit)
     }
 
+    /// Returns the worker that holds the lease.
+    pub const fn worker(&self) -> WorkerId {
+        self.worker
+    }
+
     /// Returns the next stage to run.
     pub const fn cursor(&self) -> K::Stage {
         self.cursor
