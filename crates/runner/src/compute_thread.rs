@@ -50,6 +50,8 @@ pub(super) enum ComputeEvent {
     TimedOut,
     /// The run is to stop at once.
     Stopped,
+    /// Later stages cannot be stored: the lease is lost, or an earlier stage was not stored.
+    Cancelled,
 }
 
 /// Longest time to wait for the end of a cancelled thread. Only a thread that waits for a file takes longer.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::artifacts_owner::claim_artifacts;
@@ -131,8 +131,8 @@ pub(super) async fn run_with(
         (RunCounts::default(), Duration::ZERO)
     } else {
         let (events, received) = mpsc::unbounded_channel();
-        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, events));
-        let scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, worker, events));
+        let scheduler = Scheduler::new(Arc::clone(&context), selection.clone(), options);
         compute(&context, scheduler, received, &mut on_event).await?
     };
     if let Some(selection) = &mut selection {
@@ -203,6 +203,7 @@ impl RunStart<'_> {
         &self,
         pairs: Arc<dyn StageExecutor>,
         fingerprints: FingerprintIds,
+        worker: WorkerId,
         events: mpsc::UnboundedSender<RunEvent>,
     ) -> RunContext {
         let options = self.options;
@@ -215,6 +216,7 @@ impl RunStart<'_> {
             fingerprints,
             clock: self.clock,
             timing: Timing::of_this_build(),
+            worker: watch::Sender::new(worker),
             stop: self.stop.clone(),
             drain: Stop::new(),
             until: options.until,

@@ -97,6 +97,13 @@ impl FakeExecutor {
                 Err(ExecutionError::RerunFrom(Stage::Depth))
             }
             "loops" if stage == Stage::Fit => compute_without_end(&self.endless),
+            "outlives" if self.count(name, Stage::Fit) == 1 && stage <= Stage::Depth => {
+                if stage == Stage::Depth {
+                    compute_without_end(&self.endless);
+                }
+                self.gate.wait();
+                Ok(())
+            }
             "lasts" if stage == Stage::Register => {
                 self.gate.wait();
                 Ok(())
