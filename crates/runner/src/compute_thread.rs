@@ -14,7 +14,7 @@ use tokio::task::JoinError;
 
 use super::pair_context::{PairContext, StoredStage};
 use super::run_context::RunContext;
-use super::stage_output::{self, ExecutionError, StageOutput};
+use super::stage_output::{self, PairStageError, PairStageOutput};
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{InputVersions, PairProvenance, StageCheckpoint};
 use mocban_core::domain::cancel::{CancelGuard, CancelToken, Cancelled};
@@ -141,9 +141,9 @@ fn run_stages(
                 }
                 None => break ComputeEvent::Finished(Box::new(computed), None),
             },
-            Ok(Err(ExecutionError::RerunFrom(earlier))) => stage = earlier,
-            Ok(Err(ExecutionError::Store(error))) => break ComputeEvent::StoreFailed(error),
-            Ok(Err(ExecutionError::Failed {
+            Ok(Err(PairStageError::RerunFrom(earlier))) => stage = earlier,
+            Ok(Err(PairStageError::Store(error))) => break ComputeEvent::StoreFailed(error),
+            Ok(Err(PairStageError::Failed {
                 failure,
                 is_transient,
             })) => {
@@ -167,12 +167,12 @@ fn run_stage(
     context: &RunContext,
     stage: Stage,
     pair: &mut PairContext,
-) -> Result<ComputedStage, ExecutionError> {
+) -> Result<ComputedStage, PairStageError> {
     let begun = Instant::now();
-    let output = context.executor.run(stage, pair);
+    let output = context.pairs.run(stage, pair);
     let elapsed = begun.elapsed();
     context.add_compute_time(stage, elapsed);
-    let StageOutput {
+    let PairStageOutput {
         outcome,
         files,
         metrics,
@@ -180,7 +180,7 @@ fn run_stage(
     failpoint::hit(stage, Point::Computed, Some(&pair.attributes.name));
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage finished before the mesh was read";
-        return Err(ExecutionError::failed(FailureClass::Bug, text));
+        return Err(PairStageError::failed(FailureClass::Bug, text));
     };
     let print_hash = pair.print_hash();
     let artifacts = files.iter();

@@ -1,7 +1,7 @@
 //! Runs the stages of pairs and blocks, several pairs at a time, and checks a project.
 //!
 //! [`run()`] prepares a run and starts the `scheduler`. For each pair that `prefetch` leases, the scheduler starts a
-//! `pair_task`, and the task a `compute_thread`, which calls the stages through `stage_executor`. The task hands computed
+//! `pair_task`, and the task a `compute_thread`, which calls the stages through `pair_pipeline`. The task hands computed
 //! stages to a `checkpointer`, which stores them while the next stage is computed. `policy` decides what follows a failure.
 //! Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages, and
 //! `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it.
@@ -64,6 +64,7 @@ mod memory_budget;
 mod options;
 mod pair_context;
 mod pair_failure;
+mod pair_pipeline;
 mod pair_task;
 mod policy;
 mod prefetch;
@@ -77,7 +78,6 @@ mod run_plan;
 mod run_selection;
 mod scan_size;
 mod scheduler;
-mod stage_executor;
 mod stage_files;
 mod stage_inputs;
 mod stage_output;

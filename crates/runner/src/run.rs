@@ -18,6 +18,7 @@ use super::events::{RunEvent, RunSummary};
 use super::input_changes;
 use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
+use super::pair_pipeline::{PairPipeline, PairStages};
 use super::policy::{self, Clock, Timing};
 use super::retry::retried;
 use super::run_context::RunContext;
@@ -25,7 +26,6 @@ use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
-use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
 use super::worker_session::this_process;
 use mocban_align::stages::Settings;
@@ -42,8 +42,8 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
 }
 
 /// What computes the stages of a run.
-pub(super) struct Executors {
-    pub(super) pairs: Arc<dyn StageExecutor>,
+pub(super) struct RunStages {
+    pub(super) pairs: Arc<dyn PairStages>,
     pub(super) blocks: Arc<dyn BlockStages>,
 }
 
@@ -61,8 +61,8 @@ pub async fn run(
     mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
-    let executors = Executors {
-        pairs: Arc::new(PipelineExecutor::new(project, settings, options)),
+    let stages = RunStages {
+        pairs: Arc::new(PairPipeline::new(project, settings, options)),
         blocks: Arc::new(BlockPipeline::new(options)),
     };
     let fingerprints = fingerprints(settings);
@@ -70,7 +70,7 @@ pub async fn run(
         project,
         catalog,
         &fingerprints,
-        executors,
+        stages,
         options,
         stop,
         |event| {
@@ -83,12 +83,12 @@ pub async fn run(
     ended
 }
 
-/// Like [`run`], with any executors.
+/// Like [`run`], with any stages.
 pub(super) async fn run_with(
     project: &Project,
     catalog: &Catalog,
     fingerprints: &Fingerprints,
-    executors: Executors,
+    stages: RunStages,
     options: &RunOptions,
     stop: &Stop,
     mut on_event: impl FnMut(RunEvent) + Send,
@@ -100,7 +100,7 @@ pub(super) async fn run_with(
     claim_artifacts(project, catalog, false).await?;
     let settings = WorkerSettings {
         fingerprints: fingerprint_ids,
-        blocks: block_settings(&*executors.blocks),
+        blocks: block_settings(&*stages.blocks),
     };
     guard
         .require_same_settings(catalog, fingerprints, &settings, options.part)
@@ -112,7 +112,7 @@ pub(super) async fn run_with(
         project,
         catalog,
         fingerprints,
-        blocks: &executors.blocks,
+        blocks: &stages.blocks,
         options,
         selection: selection.as_ref(),
         clock,
@@ -131,7 +131,7 @@ pub(super) async fn run_with(
         (RunCounts::default(), Duration::ZERO)
     } else {
         let (events, received) = mpsc::unbounded_channel();
-        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, worker, events));
+        let context = Arc::new(start.context(stages.pairs, fingerprint_ids, worker, events));
         let scheduler = Scheduler::new(Arc::clone(&context), selection.clone(), options);
         compute(&context, scheduler, received, &mut on_event).await?
     };
@@ -201,7 +201,7 @@ impl RunStart<'_> {
     /// Returns what the tasks of the run share.
     fn context(
         &self,
-        pairs: Arc<dyn StageExecutor>,
+        pairs: Arc<dyn PairStages>,
         fingerprints: FingerprintIds,
         worker: WorkerId,
         events: mpsc::UnboundedSender<RunEvent>,
@@ -210,7 +210,7 @@ impl RunStart<'_> {
         RunContext {
             catalog: self.catalog.clone(),
             project: self.project.clone(),
-            executor: pairs,
+            pairs,
             blocks: Arc::clone(self.blocks),
             block_limits: block_limits(options),
             fingerprints,

@@ -9,9 +9,9 @@ use tokio::sync::{mpsc, watch};
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::events::RunEvent;
+use super::pair_pipeline::PairStages;
 use super::policy::{Clock, Timing};
 use super::run_metrics::RunMetrics;
-use super::stage_executor::StageExecutor;
 use super::stop::{Stop, StopLevel};
 use mocban_catalog::{Catalog, FingerprintIds, WorkerSettings};
 use mocban_core::domain::{Stage, UnixMillis, WorkerId, WorkerMetrics};
@@ -21,7 +21,7 @@ use mocban_store::Project;
 pub(super) struct RunContext {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
-    pub(super) executor: Arc<dyn StageExecutor>,
+    pub(super) pairs: Arc<dyn PairStages>,
     /// Computes the stages of blocks.
     pub(super) blocks: Arc<dyn BlockStages>,
     /// Largest mesh and largest other file of a block in bytes, with the names of the settings.

@@ -17,8 +17,8 @@ async fn a_stage_that_times_out_has_ended_before_its_memory_is_given_to_others()
     };
     let summary = fixture.run(&limited).await;
     assert_eq!((summary.done, summary.failed), (0, 1));
-    assert_eq!(fixture.executor.count("loops_1", Stage::Fit), 2);
-    assert_eq!(fixture.executor.endless.load(Ordering::SeqCst), 0);
+    assert_eq!(fixture.pairs.count("loops_1", Stage::Fit), 2);
+    assert_eq!(fixture.pairs.endless.load(Ordering::SeqCst), 0);
 }
 
 #[tokio::test]
@@ -63,30 +63,30 @@ impl RunFixture {
 async fn a_stage_is_cancelled_when_the_stage_before_it_is_refused() {
     let fixture = RunFixture::new(&["outlives_1"]).await;
     let recovered = async {
-        let fit = |fixture: &RunFixture| fixture.executor.count("outlives_1", Stage::Fit) == 1;
+        let fit = |fixture: &RunFixture| fixture.pairs.count("outlives_1", Stage::Fit) == 1;
         let worker = fixture.worker_when(fit).await;
         let dead = DeadWorker::Known(worker);
         let recovered = fixture.catalog.recover(dead, 1).await;
         assert_eq!(recovered.expect("a recovery").ready, 1);
-        fixture.executor.open();
+        fixture.pairs.open();
     };
     let summary = fixture.run_during(recovered).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
-    assert_eq!(fixture.executor.count("outlives_1", Stage::Fit), 2);
-    assert_eq!(fixture.executor.endless.load(Ordering::SeqCst), 0);
+    assert_eq!(fixture.pairs.count("outlives_1", Stage::Fit), 2);
+    assert_eq!(fixture.pairs.endless.load(Ordering::SeqCst), 0);
 }
 
 #[tokio::test]
 async fn a_stage_of_a_pair_is_cancelled_when_the_heartbeat_is_refused() {
     let fixture = RunFixture::new(&["loops_1"]).await;
     let expired = async {
-        let computes = |fixture: &RunFixture| fixture.executor.endless.load(Ordering::SeqCst) == 1;
+        let computes = |fixture: &RunFixture| fixture.pairs.endless.load(Ordering::SeqCst) == 1;
         let worker = fixture.worker_when(computes).await;
         fixture.end_leases_of(worker).await;
     };
     let summary = fixture.run_during(expired).await;
     assert_eq!((summary.left, summary.failed), (1, 0));
-    assert_eq!(fixture.executor.endless.load(Ordering::SeqCst), 0);
+    assert_eq!(fixture.pairs.endless.load(Ordering::SeqCst), 0);
     assert_eq!(fixture.status("loops_1").await, JobStatus::Ready);
 }
 
