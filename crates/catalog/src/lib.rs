@@ -22,6 +22,7 @@ mod audit;
 mod blocks;
 mod db;
 mod handle;
+mod lease_recovery;
 mod new_catalog;
 #[cfg(test)]
 #[path = "../../../tests/support/postgres_server.rs"]
@@ -30,7 +31,6 @@ mod postgres_server;
 mod query_plans;
 mod queue;
 mod records;
-mod recovery;
 mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
 mod test_helpers;
