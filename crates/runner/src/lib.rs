@@ -35,7 +35,7 @@
 //!
 //! The pair ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. A pair that another
 //! worker recovered runs alone until its next stage is stored, because it may have killed the worker. `liveness.rs` decides
-//! when a worker counts as dead, `Timing` in `policy.rs` has the times, and the statements are in
+//! when a worker counts as dead, `timing.rs` has the times, and the statements are in
 //! `crates/catalog/src/queue`. If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in
 //! progress and ends with that error.
 //!
@@ -84,6 +84,7 @@ mod stage_output;
 mod stop;
 #[cfg(test)]
 mod tests;
+mod timing;
 mod worker_session;
 
 pub use artifacts_owner::claim_artifacts;

@@ -19,7 +19,7 @@ use super::input_changes;
 use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
 use super::pair_pipeline::{PairPipeline, PairStages};
-use super::policy::{self, Clock, Timing};
+use super::policy;
 use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
@@ -27,6 +27,7 @@ use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::Stop;
+use super::timing::{Clock, Timing};
 use super::worker_session::this_process;
 use mocban_align::stages::Settings;
 use mocban_catalog::{

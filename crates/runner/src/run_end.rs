@@ -8,12 +8,12 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::options::RunOptions;
-use super::policy::Clock;
 use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
+use super::timing::Clock;
 use mocban_catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
 use mocban_core::domain::Stage;
 

@@ -78,8 +78,8 @@ impl<K: JobKind> Lease<K> {
         self.attempt
     }
 
-    /// Returns whether the pair must run exclusively, because it exceeded a resource limit or its worker died or hung.
-    /// Never true for a block.
+    /// Returns whether no other pair may run at the same time, because the pair exceeded a resource limit or its worker died
+    /// or hung. Blocks have no such mark, because a process starts nothing beside a block.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }

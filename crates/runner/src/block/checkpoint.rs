@@ -166,7 +166,7 @@ pub(crate) async fn store_failure(
         class: failure.class,
         is_transient,
         attempt: block.lease.attempt(),
-        exclusive: true,
+        ran_alone: true,
     };
     let action = policy::failure_action(attempt, now);
     let settings = context.blocks.settings(stage);
