@@ -7,7 +7,8 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::compute_thread::{ComputedStage, task_result};
+use super::blocking::task_result;
+use super::compute_thread::ComputedStage;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::pair_failure::PairFailure;

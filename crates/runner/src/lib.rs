@@ -48,6 +48,7 @@
 mod artifacts_owner;
 mod block;
 mod block_stages;
+mod blocking;
 pub mod check;
 mod checkpointer;
 mod claim_size;

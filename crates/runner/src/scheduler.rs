@@ -9,7 +9,7 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use super::block::slot::{BlockRunCounts, BlockSlot};
 use super::block::task::BlockReport;
-use super::compute_thread::task_result;
+use super::blocking::task_result;
 use super::error::RunError;
 use super::events::RunEvent;
 use super::options::RunOptions;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::inputs::as_failure;
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
-use crate::compute_thread::run_blocking;
+use crate::blocking::run_blocking;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::folder_check::check_folders;

@@ -13,7 +13,7 @@ use super::checkpoint::{store_failure, store_stage};
 use super::inputs::{BlockSources, outdated};
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
-use crate::compute_thread::panic_text;
+use crate::blocking::panic_text;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::retry::stored;
