@@ -9,14 +9,14 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::artifacts_owner::claim_artifacts;
+use super::block::inputs;
 use super::block::pipeline::BlockPipeline;
-use super::block::plan;
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::event_log::{log_end, log_event};
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::input_reads::read_limits;
+use super::input_reads::{ReadLimits, read_limits};
 use super::options::{RunOptions, RunPart};
 use super::pair_pipeline::{PairPipeline, PairStages};
 use super::policy;
@@ -194,9 +194,19 @@ impl RunStart<'_> {
         retried!(catalog.requeue_stale(fingerprints, selection, options.rerun))?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
         retried!(catalog.release_due_backoffs(now, longest))?;
-        let blocks = self.selection.map(|selection| &selection.blocks);
-        let what = (options.rerun, blocks);
-        plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+        self.plan_blocks(&limits).await
+    }
+
+    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
+    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
+        let (catalog, rerun) = (self.catalog, self.options.rerun);
+        let selection = self.selection.map(|selection| &selection.blocks);
+        inputs::store_changes(self.project, catalog, selection, limits).await?;
+        let settings = block_settings(&**self.blocks);
+        retried!(catalog.requeue_stale_blocks(&settings, rerun, selection))?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        retried!(catalog.release_due_blocks(now, longest))?;
+        Ok(())
     }
 
     /// Returns what the tasks of the run share.
