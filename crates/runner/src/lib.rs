@@ -21,27 +21,29 @@
 //!     +------------------+  +-+
 //!     |                  |
 //!     |                  | the worker sends no heartbeat for a lease (PostgreSQL: 7 s without its lock), or its stage is
-//!     |                  | overdue, or a repair resets the job
-//!     |   recovery: a new fencing token
+//!     |                  | overdue: recovery; or a repair or a new cut of its block resets the job
+//!     |   a new fencing token
 //!     +------------------+------------> quarantined, if the job has crashed too many workers
 //! ```
 //!
 //! | who finds out | by | what happens |
 //! |---|---|---|
-//! | `checkpointer.rs` | a checkpoint is refused | this and later results are dropped; the stage that runs is cancelled |
-//! | `pair_task.rs`, `block/task.rs` | a failure is refused | the failure is not stored |
-//! | `worker_session.rs` | a heartbeat is refused | the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
-//! | nobody | a release is refused | nothing: the job was recovered meanwhile |
+//! | `checkpointer.rs` | a checkpoint of a pair is refused | this and later results are dropped; the stage that runs is cancelled |
+//! | `block/checkpoint.rs`, `block/task.rs` | a checkpoint of a block, or the versions of its files, are refused | the task ends; no stage runs meanwhile |
+//! | `pair_failure.rs`, `block/checkpoint.rs` | a failure is refused | the failure is not stored |
+//! | `worker_session.rs` | a heartbeat is refused | all stages that run are cancelled; the process releases what it has not started, registers as a new worker, and recovers the jobs of its old id |
+//! | nobody | a release is refused | nothing: the job has another owner |
 //!
-//! The pair ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. A pair that another
-//! worker recovered runs alone until its next stage is stored, because it may have killed the worker. `liveness.rs` decides
+//! The pair or block ends as `LeaseLost`, which counts neither as done nor as failed. Stages stored before stay. The job of a
+//! retired pair is removed, which ends its lease too. A pair that another worker recovered runs alone until its next stage
+//! is stored, because it may have killed the worker. `liveness.rs` decides
 //! when a worker counts as dead, `timing.rs` has the times, and the statements are in
 //! `crates/catalog/src/queue`. If heartbeats fail with an error for as long as a lease lasts, the run finishes the stages in
 //! progress and ends with that error.
 //!
 //! # Cancellation
 //!
-//! A stage that takes too long, is stopped or has lost its lease is cancelled: inner loops poll the token of their thread
+//! A stage that takes too long, is stopped, or whose result could not be stored any more is cancelled: inner loops poll the token of their thread
 //! ([`mocban_core::domain::cancel`]) and unwind to `compute_thread.rs`, which waits for the end of the thread before its
 //! memory is given to others. Work on other threads, such as those of `rayon`, takes the token along as a `ThreadToken`.
 
