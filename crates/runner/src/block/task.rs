@@ -158,8 +158,11 @@ async fn run_stage(
     if seen != block.work.inputs {
         // Before the computation, so that a later run knows which files it failed on if the process dies.
         let (catalog, lease) = (&context.catalog, &block.lease);
-        let alive_since = context.alive_since();
-        let stored = stored!(catalog.store_leased_inputs(lease.clone(), seen.clone(), alive_since));
+        let stored = stored!(catalog.store_leased_inputs(
+            lease.clone(),
+            seen.clone(),
+            context.alive_since()
+        ));
         if !stored.map_err(|error| Interruption::Run(error.into()))? {
             return Err(Interruption::LeaseLost);
         }
