@@ -7,7 +7,6 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
-    ("anyhow", &["mocban", "project"]),
     ("anyhow", &[]),
     ("clap", &["mocban"]),
     ("fax", &["core"]),

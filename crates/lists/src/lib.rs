@@ -2,7 +2,7 @@
 //!
 //! - [`manifest`]: rows of CSV, JSON Lines and folders become drafts of pairs and blocks
 //! - [`quotes`]: refuses CSV text with a quotation mark that takes in further rows
-//! - [`labels`]: readers of eight formats of boxes, writers of VIA and COCO, names in reading order
+//! - [`labels`]: readers of formats of boxes, writers of VIA and COCO, names in reading order
 //!
 //! **Invariant:** a row or label is either understood or refused with its line and the reason. Nothing is guessed in
 //! silence, and no file is opened here.

@@ -19,7 +19,7 @@ pub(crate) struct RunProgress {
     /// Pairs failed.
     pub(crate) failed: u64,
     /// Done and total per stage.
-    pub(crate) by_stage: [(u64, u64); 4],
+    pub(crate) by_stage: [(u64, u64); Stage::COUNT],
 }
 
 impl RunProgress {

@@ -36,6 +36,8 @@ impl JobKind for BlockJob {
     type Provenance = BlockProvenance;
     type Inputs = BlockInputVersions;
 
+    const STAGES: usize = BlockStage::COUNT;
+
     fn unit(id: i64) -> BlockId {
         BlockId(id)
     }

@@ -65,6 +65,8 @@ impl JobKind for PairJob {
     type Provenance = PairProvenance;
     type Inputs = InputVersions;
 
+    const STAGES: usize = Stage::COUNT;
+
     fn unit(id: i64) -> PairId {
         PairId(id)
     }

@@ -10,7 +10,7 @@ use crate::db::row::from_row;
 use crate::db::rows::json_array;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::{Catalog, Result};
-use mocban_core::domain::{JobStatus, PairId, PairName, UnixMillis};
+use mocban_core::domain::{JobStatus, PairId, PairName, Stage, UnixMillis};
 
 /// Removes jobs. Their leases end, because no fenced statement finds them any more.
 const REMOVE: &str = "
@@ -22,6 +22,9 @@ INSERT INTO retired_pair (pair, stage, is_quarantined, token, fingerprint, low_c
 SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 2 AS bigint), CAST(value ->> 3 AS bigint),
     CAST(value ->> 4 AS bigint), CAST(value ->> 5 AS bigint), ?2 FROM json_each(?1) WHERE true
 ON CONFLICT (pair) DO NOTHING";
+
+// The statement names the position of a pair that is done.
+const _: () = assert!(Stage::COUNT == 4);
 
 /// Builds the statement that gives retired pairs of some names their jobs back, from the condition on the name. A job
 /// whose pair changed meanwhile is stale, so it is dirty. A pair stays quarantined if its failure is stored. The first

@@ -409,9 +409,22 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
         .await;
     assert_eq!(recovered.expect("a recovery").blocks, 1);
     let stage = done(&work, BlockStage::Face);
+    let lost = lease.clone();
     let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
     assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
+    let [kept, late_ones] = ["mesh", "other"].map(|mesh| inputs([mesh, "page", "labels"]));
+    let store = async |lease: &Lease<BlockJob>, seen: &BlockInputVersions| {
+        let stored = world
+            .catalog
+            .store_leased_inputs(lease.clone(), seen.clone(), 0);
+        stored.await.expect("a reply")
+    };
+    assert!(!store(&lost, &late_ones).await);
     let (lease, _) = world.claim_block(other).await.expect("a ready block");
+    assert!(store(&lease, &kept).await);
+    assert!(!store(&lost, &late_ones).await);
+    let known = world.catalog.known_blocks().await.expect("a read");
+    assert_eq!(known[0].inputs, kept);
     let advanced = world
         .catalog
         .checkpoint_block(lease.clone(), stage.clone())
