@@ -208,6 +208,30 @@ fn import_of_directories() {
     assert_call("error_swapped_directories", dir.path(), &args_swapped);
     write(dir.path(), "bản khắc/1.ply", "x");
     assert_call("error_same_stem", dir.path(), &args);
+    std::fs::remove_file(dir.path().join("bản khắc/1.ply")).expect("removed");
+    for (folder, extension) in [("bản khắc", "stl"), ("bản in", "png")] {
+        for block in ["ván 1", "ván 2"] {
+            std::fs::create_dir(dir.path().join(folder).join(block)).expect("a directory");
+            for k in 1..4 {
+                write(
+                    dir.path(),
+                    &format!("{folder}/{block}/{k}.{extension}"),
+                    "x",
+                );
+            }
+        }
+    }
+    assert_call("import_directories_in_directories", dir.path(), &args);
+    let block = |name: &str| ["bản khắc", "bản in"].map(|folder| format!("{folder}/{name}"));
+    for (name, block) in ["ván 1", "ván 2"].map(|name| (name, block(name))) {
+        let folders = ["--meshes", &block[0], "--prints", &block[1]];
+        let args = [&["-C", "q", "import"][..], &folders].concat();
+        if name == "ván 1" {
+            mocban(dir.path(), &args).expect(0);
+        } else {
+            assert_call("error_changed_files", dir.path(), &args);
+        }
+    }
 }
 
 #[test]

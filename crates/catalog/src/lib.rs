@@ -92,7 +92,7 @@ pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
 pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::checksums::ChecksummedTable;
 pub use records::faulty_rows::{FaultyRow, RowFault};
-pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
+pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,

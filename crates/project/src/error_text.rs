@@ -63,6 +63,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         | CatalogError::NotEmpty(_)
         | CatalogError::SimilarName { .. }
         | CatalogError::SameFiles { .. }
+        | CatalogError::ChangedFiles { .. }
         | CatalogError::SameCatalog(_)
         | CatalogError::FinishedCopy { .. } => Some(ExitCode::Usage),
         error if error.is_of_pooler() => Some(ExitCode::Usage),

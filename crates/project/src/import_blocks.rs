@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::exit::Refusal;
 use crate::files;
-use crate::import_pairs::PairSource;
+use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::location::{Location, now};
 use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
@@ -102,7 +102,7 @@ impl ListedItems {
 /// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub async fn import_blocks(
     source: &BlockSource,
-    allow_missing: bool,
+    allowed: AllowedChanges,
     location: &Location,
 ) -> anyhow::Result<BlockImportOutcome> {
     let mut listing = listing(source)?;
@@ -112,14 +112,16 @@ pub async fn import_blocks(
     for row in &mut listing.rows {
         locate(row, &listing.label, &project, &mut missing);
     }
-    if missing.count > 0 && !allow_missing {
+    if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
     }
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
     let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
     let checked = async || Ok(());
     let summary = import_with(&project, url.as_deref(), checked, async |catalog| {
-        Ok(catalog.import_blocks(rows.clone(), now()).await?)
+        Ok(catalog
+            .import_blocks(rows.clone(), allowed.files, now())
+            .await?)
     });
     Ok(BlockImportOutcome {
         summary: summary.await?,

@@ -8,7 +8,7 @@ use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
 use mocban_core::domain::{LengthUnit, sanitize};
 use mocban_lists::manifest::{
-    ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv,
+    ListedFolder, ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv,
     read_jsonl,
 };
 use mocban_store::Project;
@@ -93,7 +93,7 @@ impl Listing {
         })
     }
 
-    /// Pairs each mesh of one directory with the print of the same file stem in the other directory.
+    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory.
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
@@ -102,7 +102,11 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> anyhow::Result<Self> {
-        let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
+        let listed = |root: &Path| {
+            let root = root.to_owned();
+            files::list_below(&root).map(|files| ListedFolder { root, files })
+        };
+        let found = pair_folders(&listed(meshes)?, &listed(prints)?)
             .map_err(|problems| refuse(meshes, &problems))?;
         let mut rows = found.rows;
         for row in &mut rows {
@@ -116,7 +120,11 @@ impl Listing {
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.into_iter().flatten().collect(),
+            warnings: warnings
+                .into_iter()
+                .flatten()
+                .chain(found.similar)
+                .collect(),
             row_label: "pair".to_owned(),
         })
     }

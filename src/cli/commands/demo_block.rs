@@ -10,7 +10,7 @@ use super::demo_data::replace_data;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
+use mocban_catalog::{Catalog, ImportChunk, ImportTerms, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 use mocban_demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
 use mocban_project::demo_folder::{DemoContent, check_directory};
@@ -55,7 +55,11 @@ pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> anyhow::Resu
         .collect();
     let (sender, chunks) = mpsc::channel(1);
     sender.send(ImportChunk::End).await?;
-    let (_, stored) = catalog.import_all(chunks, truths, now()).await?;
+    let terms = ImportTerms {
+        truths,
+        ..ImportTerms::default()
+    };
+    let (_, stored) = catalog.import_all(chunks, terms, now()).await?;
     Ok(stored)
 }
 

@@ -13,7 +13,9 @@ use crate::cli::output::table::count;
 use mocban_core::domain::LengthUnit;
 use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
-use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::{
+    AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,
+};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -29,10 +31,10 @@ pub(crate) struct ImportArgs {
     /// unit, side; paths are relative to the file
     #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(crate) file: Option<PathBuf>,
-    /// A directory of meshes, paired with --prints by file stem
+    /// A directory of meshes, paired with --prints by file stem; in folders, also by their names, and ids are `FOLDER_STEM`
     #[arg(long, value_name = "DIR", requires = "prints")]
     pub(crate) meshes: Option<PathBuf>,
-    /// A directory of prints
+    /// A directory of prints; it may be that of --meshes
     #[arg(long, value_name = "DIR", requires = "meshes")]
     pub(crate) prints: Option<PathBuf>,
     #[command(flatten)]
@@ -46,6 +48,10 @@ pub(crate) struct ImportArgs {
     /// Import pairs whose files do not exist yet; they fail if they are run before
     #[arg(long)]
     pub(crate) allow_missing: bool,
+    /// Let most of the pairs that the project has get another mesh and another print, because the files have moved; or
+    /// blocks another scan and another page
+    #[arg(long)]
+    pub(crate) allow_changed_files: bool,
 }
 
 pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -53,10 +59,14 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_truths(&args)?;
     }
+    let allowed = AllowedChanges {
+        missing: args.allow_missing,
+        files: args.allow_changed_files,
+    };
     let busy = Busy::start(context, "importing");
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
+            let outcome = import_blocks(&source, allowed, &context.location).await;
             drop(busy);
             let outcome = outcome?;
             context.print_json(&import_blocks::as_json(&outcome))?;
@@ -66,7 +76,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
             let import = PairImport {
                 source,
                 truth: args.truth,
-                allow_missing: args.allow_missing,
+                allowed,
             };
             let outcome = import_pairs(import, &context.location).await;
             drop(busy);

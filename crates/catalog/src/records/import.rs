@@ -35,6 +35,15 @@ pub enum ImportChunk {
     End,
 }
 
+/// What an import may do besides adding pairs and changing their columns.
+#[derive(Debug, Clone, Default)]
+pub struct ImportTerms {
+    /// True alignments to store.
+    pub truths: Vec<(PairName, Value)>,
+    /// Whether most of the known pairs may get another mesh and another print.
+    pub changed_files: bool,
+}
+
 /// Counts of an import.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ImportSummary {
@@ -115,12 +124,13 @@ impl Catalog {
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// Returns an error if the channel closes before `ImportChunk::End`, if a new pair is similar to a known one, if a true
-    /// alignment names an unknown pair, or if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a new pair is similar to a known one, if most
+    /// known pairs would get other files, if a true alignment names an unknown pair, or if a database operation fails. In
+    /// that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
-        truths: Vec<(PairName, Value)>,
+        terms: ImportTerms,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
         self.in_transaction(move |conn| {
@@ -140,9 +150,12 @@ impl Catalog {
                     }
                 }
                 similar_names::refuse_pairs(conn, last).await?;
+                if !terms.changed_files {
+                    refuse_changed_files(&summary)?;
+                }
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                let stored = ground_truth::set(conn, &truths).await?;
+                let stored = ground_truth::set(conn, &terms.truths).await?;
                 if let Conn::Postgres(_) = conn {
                     query(ANALYZE).execute(conn).await?;
                 }
@@ -178,6 +191,32 @@ impl Catalog {
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await
+    }
+}
+
+/// Refuses an import that gives most of the known pairs another mesh and another print. Their ids are then likely those of
+/// other characters, such as the numbers of another block.
+fn refuse_changed_files(summary: &ImportSummary) -> Result<()> {
+    const FEWEST: u64 = 2;
+    let has_other_files = |change: &&PairChange| {
+        ["mesh", "print"]
+            .iter()
+            .all(|file| change.fields.contains(file))
+    };
+    let mut others = summary.changed.iter().filter(has_other_files);
+    let changed = others.clone().count() as u64;
+    let known = summary.unchanged + summary.changed.len() as u64;
+    match others.next() {
+        Some(example) if changed >= FEWEST && 2 * changed > known => {
+            Err(CatalogError::ChangedFiles {
+                changed,
+                known,
+                files: "mesh and another print",
+                kind: "pairs",
+                example: example.name.to_string(),
+            })
+        }
+        _ => Ok(()),
     }
 }
 

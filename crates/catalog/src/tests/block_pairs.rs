@@ -247,7 +247,7 @@ async fn a_copy_holds_blocks_and_retired_pairs() {
     let counters = copy.counters().await.expect("counters");
     assert_eq!(counters, copy.recount().await.expect("a recount"));
     // New rows of the copy get new numbers.
-    let imported = copy.import_blocks(vec![attributes("c")], 3).await;
+    let imported = copy.import_blocks(vec![attributes("c")], false, 3).await;
     assert_eq!(imported.expect("imported").added, 1);
     assert_eq!(copy.faulty_rows().await.expect("a read"), []);
 }

@@ -15,7 +15,7 @@ mod text;
 pub use self::csv::{parse_csv, read_csv};
 pub use block_list::{BlockRow, is_block_list, parse_blocks};
 pub use error::ManifestError;
-pub use folders::{FolderPairs, is_named_like_input, pair_folders};
+pub use folders::{FolderPairs, ListedFolder, is_named_like_input, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use misspelt_columns::MisspeltColumns;
 pub use row::{ManifestRow, RowIds};

@@ -27,7 +27,7 @@ impl RunFixture {
             unit: None,
             side: None,
         });
-        let imported = fixture.catalog.import_blocks(rows.collect(), 1).await;
+        let imported = fixture.catalog.import_blocks(rows.collect(), true, 1).await;
         imported.expect("imported");
         let _ = fixture.executor.project.set(fixture.project.clone());
         fixture
@@ -122,7 +122,10 @@ async fn labels_that_are_added_to_a_finished_block_are_used() {
         ..with_labels.clone()
     };
     let import = async |attributes: BlockAttributes| {
-        let imported = fixture.catalog.import_blocks(vec![attributes], 1).await;
+        let imported = fixture
+            .catalog
+            .import_blocks(vec![attributes], true, 1)
+            .await;
         imported.expect("imported");
     };
     import(without.clone()).await;
