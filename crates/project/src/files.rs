@@ -238,7 +238,7 @@ pub fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
         Some("csv" | "tsv") => false,
         Some(_) | None => {
             let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-            text.trim_ascii_start().starts_with(b"{")
+            matches!(text.trim_ascii_start(), [b'{' | b'[', ..])
         }
     }
 }
@@ -342,6 +342,7 @@ mod tests {
         assert!(is_jsonl(Path::new("a.jsonl"), b""));
         assert!(!is_jsonl(Path::new("a.csv"), b"{"));
         assert!(is_jsonl(Path::new("a"), b"\xef\xbb\xbf {\"id\":1}"));
+        assert!(is_jsonl(Path::new("a.txt"), b" [{\"id\":1}]"));
         assert!(!is_jsonl(Path::new("a.txt"), b"id,mesh,print"));
     }
 }

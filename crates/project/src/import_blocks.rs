@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::exit::Refusal;
 use crate::files;
 use crate::import_pairs::{AllowedChanges, PairSource};
+use crate::input_paths::SimilarFiles;
 use crate::location::{Location, now};
 use crate::manifest_file::{locate_file, refuse};
 use crate::missing_files::MissingFiles;
@@ -108,9 +109,9 @@ pub async fn import_blocks(
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
-    let mut missing = MissingFiles::default();
+    let (mut missing, mut searches) = (MissingFiles::default(), SimilarFiles::default());
     for row in &mut listing.rows {
-        locate(row, &listing.label, &project, &mut missing);
+        locate(row, &listing.label, &project, &mut missing, &mut searches);
     }
     if missing.count > 0 && !allowed.missing {
         return Err(missing.refusal().into());
@@ -171,11 +172,17 @@ fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
 }
 
 /// Replaces the paths of a row by those on disk, and records missing files.
-fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut MissingFiles) {
+fn locate(
+    row: &mut BlockRow,
+    label: &str,
+    project: &Project,
+    missing: &mut MissingFiles,
+    searches: &mut SimilarFiles,
+) {
     let (line, name) = (row.line, row.name.clone());
     let required = [("mesh", &mut row.mesh), ("page", &mut row.page)].into_iter();
     for (kind, path) in required.chain(row.labels.as_mut().map(|path| ("labels", path))) {
-        if let Some(line) = locate_file((label, line), kind, path, &name, project) {
+        if let Some(line) = locate_file((label, line), kind, path, &name, project, searches) {
             missing.add(line);
         }
     }

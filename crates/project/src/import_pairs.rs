@@ -226,16 +226,20 @@ async fn read_truths(
     if others.is_empty() {
         return Ok(truths);
     }
-    let unknown = match location.open_read_only().await {
+    let (unknown, known) = match location.open_read_only().await {
         Ok((_, catalog)) => {
             let unknown = catalog.unknown_names(&others).await?;
+            let known = match unknown.as_slice() {
+                [] => Vec::new(),
+                _ => catalog.pair_names().await?,
+            };
             catalog.close().await;
-            unknown
+            (unknown, known)
         }
-        Err(_) => others,
+        Err(_) => (others, Vec::new()),
     };
     match truths.iter().find(|truth| unknown.contains(&truth.name)) {
-        Some(truth) => Err(truth_file::unknown_pair(truth)
+        Some(truth) => Err(truth_file::unknown_pair(truth, &known)
             .in_file(file, NOT_IMPORTED)
             .into()),
         None => Ok(truths),

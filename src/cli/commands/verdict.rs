@@ -177,7 +177,10 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     }
     let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
-    verdict_file::refuse_unknown(&first_lines, &unknown).map_err(refused)?;
+    if !unknown.is_empty() {
+        let known = catalog.pair_names().await?;
+        verdict_file::refuse_unknown(&first_lines, &unknown, &known).map_err(refused)?;
+    }
     // All rows were valid in the first pass.
     let rows = list.rows().map(|row| match row {
         Ok(row) => Ok(row.listed),

@@ -62,7 +62,7 @@ pub use outcome::{
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };
-pub use pair_name::{PairName, PairNameError};
+pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError};
 pub use print_outline::PrintOutline;
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};

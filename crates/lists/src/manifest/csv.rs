@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use super::column_names::missing_column;
 use super::draft::{DraftRow, MAX_ROW_BYTES, RowCollector};
 use super::error::{ManifestError, at_line, of_list};
-use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
-use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
+use super::row::{COLUMNS, ManifestRow, REQUIRED, ReadRows};
+use super::text::{CsvText, LineCounter, encoding_hint, trimmed};
+use crate::columns::{HeaderColumns, SameColumn};
 use crate::quotes::check_quotes;
 
 /// Parses a CSV list with a header line. Columns may be in any order, and their names in any case. Blank lines are
@@ -22,14 +23,17 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 }
 
 /// Parses a CSV list like [`parse_csv`], but passes each row to `each` instead of keeping all rows in memory. Valid
-/// rows are passed even if other rows are invalid. Returns the ids of the rows.
+/// rows are passed even if other rows are invalid. Returns the ids of the rows, and which columns have other names.
 ///
 /// # Errors
 /// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
 /// the lines of invalid rows.
-pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
-    let bytes = &*as_utf8(bytes).map_err(|error| of_list(&error.to_string()))?;
-    let delimiter = delimiter(bytes);
+pub fn read_csv(
+    bytes: &[u8],
+    each: &mut dyn FnMut(ManifestRow),
+) -> Result<ReadRows, ManifestError> {
+    let text = CsvText::new(bytes).map_err(|error| of_list(&error.to_string()))?;
+    let (bytes, delimiter) = (&*text.bytes, text.delimiter);
     check_quotes(bytes, delimiter).map_err(|error| at_line(error.line, &error.to_string()))?;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter)
@@ -51,7 +55,11 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
             (Ok(false), Some(_)) => break,
             (Ok(false), None) => return Err(of_list("the list is empty").into()),
             (Ok(true), Some(header)) => rows.push(line, header.draft(line, &record)),
-            (Ok(true), None) => header = Some(CsvHeader::parse(line, &record, bytes)?),
+            (Ok(true), None) => {
+                let mut parsed = CsvHeader::parse(line, &record, bytes)?;
+                rows.add_renamed(std::mem::take(&mut parsed.renamed));
+                header = Some(parsed);
+            }
             (Err(error), _) => {
                 rows.push(line, Err(error.to_string()));
                 break;
@@ -94,10 +102,38 @@ impl std::io::Read for BoundedRows<'_> {
 /// Longest name of a column in bytes. Every row stores the names of its user-defined columns.
 const MAX_NAME_BYTES: usize = 1000;
 
+/// Returns the names of the columns of a header, without blanks at their ends.
+pub(super) fn column_names<'r>(
+    line: usize,
+    record: &'r ::csv::ByteRecord,
+    encoding_hint: &str,
+) -> Result<Vec<&'r str>, ManifestError> {
+    let mut problems = ManifestError::default();
+    let mut names = Vec::new();
+    for (number, field) in (1..).zip(record) {
+        let Ok(name) = std::str::from_utf8(field) else {
+            let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
+            problems.add(at_line(line, &reason));
+            continue;
+        };
+        if name.len() > MAX_NAME_BYTES {
+            let (len, limit) = (name.len(), MAX_NAME_BYTES);
+            let reason =
+                format!("the name of column {number} has {len} bytes, over the limit of {limit}");
+            problems.add(at_line(line, &reason));
+        }
+        names.push(trimmed(name));
+    }
+    problems.check(false)?;
+    Ok(names)
+}
+
 /// The header of a list.
 struct CsvHeader {
     /// The columns in order. Each has its standard name, if the column is known, and its name as written.
     columns: Vec<(Option<&'static str>, String)>,
+    /// Columns with other names, as written, each with its name.
+    renamed: Vec<(String, &'static str)>,
     /// What to do about cells that are not UTF-8.
     encoding_hint: String,
 }
@@ -108,39 +144,29 @@ impl CsvHeader {
             Ok(_) => String::new(),
             Err(_) => encoding_hint(list),
         };
-        let mut problems = ManifestError::default();
-        let mut seen = BTreeMap::new();
-        let mut columns = Vec::new();
-        for (number, field) in (1..).zip(record) {
-            let Ok(name) = std::str::from_utf8(field) else {
-                let reason = format!("the name of column {number} is not UTF-8{encoding_hint}");
-                problems.add(at_line(line, &reason));
-                continue;
-            };
-            if name.len() > MAX_NAME_BYTES {
-                let (len, limit) = (name.len(), MAX_NAME_BYTES);
-                let reason = format!(
-                    "the name of column {number} has {len} bytes, over the limit of {limit}"
-                );
-                problems.add(at_line(line, &reason));
-            }
-            let known = known_column(name);
-            if !name.is_empty()
-                && let Some(first) = seen.insert(known.unwrap_or(name), number)
+        let names = column_names(line, record, &encoding_hint)?;
+        let refuse = |same: SameColumn| at_line(line, &same.reason(&names));
+        let HeaderColumns { columns, renamed } = COLUMNS.assign(&names).map_err(refuse)?;
+        let mut others = BTreeMap::new();
+        for (k, name) in names.iter().enumerate() {
+            if columns[k].is_none()
+                && !name.is_empty()
+                && let Some(first) = others.insert(*name, k + 1)
             {
-                let reason = format!("columns {first} and {number} are both named {name:?}");
-                problems.add(at_line(line, &reason));
+                let second = k + 1;
+                return Err(refuse(SameColumn { first, second }).into());
             }
-            columns.push((known, name.to_owned()));
         }
-        let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| {
-            let is_known = |name: &str| known_column(name).is_some();
-            at_line(line, &missing_column(name, record, is_known))
-        }));
+        let mut problems = ManifestError::default();
+        let missing = REQUIRED
+            .iter()
+            .filter(|name| !columns.contains(&Some(**name)));
+        problems.extend(missing.map(|name| at_line(line, &missing_column(name, &names, &columns))));
         problems.check(false)?;
+        let names = names.into_iter().map(str::to_owned);
         Ok(Self {
-            columns,
+            columns: columns.into_iter().zip(names).collect(),
+            renamed,
             encoding_hint,
         })
     }
@@ -165,6 +191,7 @@ impl CsvHeader {
                 let hint = &self.encoding_hint;
                 return Err(format!("the cell of column {name:?} is not UTF-8{hint}"));
             };
+            let cell = trimmed(cell);
             if let Some(known) = known {
                 draft.cells.insert(known, cell.to_owned());
             } else if !cell.is_empty() && !name.is_empty() {
@@ -381,18 +408,65 @@ mod tests {
             "line 1: column \"mesh\" is missing; rename \"mech\" to \"mesh\" if it is meant; the header has: id, \
              mech, print"
         );
-        // `in` and `tên` are Vietnamese names of the columns.
-        let vietnamese = refusal("in,mesh,tên\na,b,c\n");
-        let renamed: Vec<_> = vietnamese
+        // Names that may mean something else are offered, not taken.
+        let renamed: Vec<_> = refusal("ảnh,mesh,tên\na,b,c\n")
             .lines()
-            .map(|line| line.split("; ").nth(1))
+            .map(|line| line.split("; ").nth(1).map(str::to_owned))
             .collect();
         assert_eq!(
             renamed,
             [
-                Some("rename \"tên\" to \"id\" if it is meant"),
-                Some("rename \"in\" to \"print\" if it is meant")
+                Some("rename \"tên\" to \"id\" if it is meant".to_owned()),
+                Some("rename \"ảnh\" to \"print\" if it is meant".to_owned())
             ]
         );
+    }
+
+    #[test]
+    fn headers_may_be_vietnamese_in_any_case_and_with_blanks() {
+        let plain = parse(
+            "id,mesh,print,character,block,unit,scanned_face_down,note\na,b,c,d,e,mm,yes,f\n",
+        )
+        .expect("parses");
+        for header in [
+            "Mã số,Bản quét,Bản in,Tên chữ,Khối,Đơn vị,Quét úp,note",
+            "MA SO,BAN QUET,BAN IN,CHU,SO HIEU VAN,DON VI,QUET UP,note",
+            "ID,Mesh ,print\u{a0},ký tự,số hiệu ván,unit,Scanned Face-Down,note",
+        ] {
+            let rows = parse(&format!("{header}\na,b,c,d,e,mm,Có,f\n")).expect(header);
+            assert_eq!(rows, plain, "{header}");
+        }
+        let read = super::read_csv(
+            "id,mesh,print,Khối,ván\na,b,c,d,e\n".as_bytes(),
+            &mut |row| {
+                assert_eq!((row.block.as_deref(), row.meta.len()), (Some("e"), 1));
+            },
+        );
+        let renamed = read.expect("parses").renamed;
+        assert_eq!(
+            renamed.into_iter().collect::<Vec<_>>(),
+            [("ván".to_owned(), "block")]
+        );
+    }
+
+    #[test]
+    fn lists_of_spreadsheets_and_scripts_are_read() {
+        let plain = parse("id,mesh,print\na,b c,d\n").expect("parses");
+        for list in [
+            "sep=;\r\nid;mesh;print\r\na;b c;d\r\n",
+            "id, \"mesh\", \"print\"\na, \"b c\", \"d\"\n",
+            "id,mesh,print\n\u{a0}a,b c\u{a0},\u{feff}d\u{200b}\n",
+        ] {
+            let rows = parse(list).expect(list);
+            assert_eq!(rows[0].mesh, plain[0].mesh, "{list}");
+            assert_eq!(
+                (&rows[0].name, &rows[0].print),
+                (&plain[0].name, &plain[0].print)
+            );
+        }
+        let shifted = refusal("sep=;\nid;mesh;print\na;;d\n");
+        assert_eq!(shifted, "line 3: mesh is empty");
+        let spaced = parse("id,mesh,print\nchữ\u{a0}số,b,c\n").expect("parses");
+        assert_eq!(spaced[0].name.as_str(), "chữ số");
     }
 }

@@ -25,12 +25,12 @@ const KIND_FOLDERS: [&str; 17] = [
 const MAX_SIMILAR: usize = 5;
 
 /// Returns whether the extension of a path is that of a mesh.
-pub(super) fn is_named_like_mesh(path: &Path) -> bool {
+pub fn is_named_like_mesh(path: &Path) -> bool {
     has_extension(path, &MESH_EXTENSIONS)
 }
 
 /// Returns whether the extension of a path is that of a print.
-pub(super) fn is_named_like_print(path: &Path) -> bool {
+pub fn is_named_like_print(path: &Path) -> bool {
     has_extension(path, &PRINT_EXTENSIONS)
 }
 
