@@ -1,4 +1,6 @@
-//! Snapshots of imports: lists of pairs, and directories.
+//! Snapshots of imports: lists of pairs as people have them, workbooks, and directories.
+
+use mocban::workbook::test_helpers::{text_rows, workbook};
 
 use crate::cli::{empty, mocban};
 use crate::snapshots::{TWO_PAIRS, assert_call, write};
@@ -44,6 +46,59 @@ fn import() {
         dir.path(),
         &["-C", "q", "import", "case.csv", "--allow-missing"],
     );
+}
+
+#[test]
+fn lists_as_spreadsheets_and_scripts_write_them() {
+    let dir = empty();
+    std::fs::create_dir(dir.path().join("quét")).expect("a directory");
+    for name in ["quét/0117.STL", "quét/bản in 117.png"] {
+        write(dir.path(), name, "x");
+    }
+    let rows = [
+        &[
+            "Số hiệu",
+            "Bản quét",
+            "Bản in",
+            "Tên chữ",
+            "Khối",
+            "Ghi chú",
+        ][..],
+        &[
+            "0117",
+            "quét/0117.STL",
+            "quét/bản\u{a0}in 117.png",
+            "天",
+            "4",
+            "x",
+        ],
+    ];
+    let sheets = [("Ván 4", text_rows(&rows)), ("Ván 5", String::new())];
+    let sheets = sheets.each_ref().map(|(name, rows)| (*name, rows.as_str()));
+    std::fs::write(dir.path().join("cặp.xlsx"), workbook(&sheets, "", "")).expect("written");
+    let import = |list| ["-C", "p", "import", list];
+    assert_call("import_xlsx", dir.path(), &import("cặp.xlsx"));
+    let sheet = [&import("cặp.xlsx")[..], &["--sheet", "Ván 6"]].concat();
+    assert_call("error_no_sheet", dir.path(), &sheet);
+    write(
+        dir.path(),
+        "117.csv",
+        "sep=;\nid;mesh;print\n117;quét/0117.STL;quét/bản in 117.png\n",
+    );
+    assert_call("error_lost_zeros", dir.path(), &import("117.csv"));
+    write(
+        dir.path(),
+        "nhan.json",
+        "[{\"id\": 118, \"mesh\": \"Quét/117.stl\", \"print\": \"quét/bản in 117.tif\", \"block\": NaN}]",
+    );
+    assert_call("error_similar_files", dir.path(), &import("nhan.json"));
+    write(
+        dir.path(),
+        "chấm.csv",
+        "Mã số,Đánh giá,Người chấm\n117,Đạt,lan\n",
+    );
+    let verdicts = ["-C", "p", "verdict", "import", "chấm.csv"];
+    assert_call("error_verdict_of_similar_pair", dir.path(), &verdicts);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 const ONLY_IN: &[(&str, &[&str])] = &[
     ("anyhow", &["mocban", "project"]),
     ("clap", &["mocban"]),
+    ("flate2", &["lists"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),

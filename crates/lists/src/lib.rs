@@ -4,6 +4,7 @@
 //! - [`columns`]: names of columns in any case, with blanks, and in Vietnamese
 //! - [`json_numbers`]: `NaN` and `Infinity` in JSON
 //! - [`quotes`]: refuses CSV text with a quotation mark that takes in further rows
+//! - [`workbook`]: sheets of XLSX workbooks as CSV
 //! - [`labels`]: readers of eight formats of boxes, writers of VIA and COCO, names in reading order
 //!
 //! **Invariant:** a row or label is either understood or refused with its line and the reason. Nothing is guessed in
@@ -14,3 +15,5 @@ pub mod json_numbers;
 pub mod labels;
 pub mod manifest;
 pub mod quotes;
+pub mod workbook;
+mod xml;

@@ -11,6 +11,7 @@ use mocban_catalog::Catalog;
 use mocban_config::Config;
 use mocban_core::domain::sanitize;
 use mocban_export::{EXPORT_MANIFEST, InputFileLimits};
+use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
@@ -25,6 +26,42 @@ const MAX_LIST_BYTES: u64 = 512 << 20;
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
+}
+
+/// A list that was read.
+#[derive(Debug)]
+pub struct ListFile {
+    /// Its text; of a workbook, the table of a sheet as CSV.
+    pub bytes: Vec<u8>,
+    /// Says which sheet was read if there are others.
+    pub warning: Option<String>,
+}
+
+/// Reads a list that is named on the command line. Of a workbook, reads the sheet that is named, or else the first one.
+///
+/// # Errors
+/// Returns an error if there is no such file or sheet, it cannot be read, or it is too long.
+pub fn read_list(path: &Path, sheet: Option<&str>) -> Result<ListFile, Refusal> {
+    let bytes = read(path)?;
+    let shown = path.display();
+    if is_workbook(&bytes) {
+        let table = read_sheet(&bytes, sheet)
+            .map_err(|error| Refusal::Usage(format!("{shown}: {error}")))?;
+        return Ok(ListFile {
+            bytes: table.csv,
+            warning: table.warning.map(|warning| format!("{shown}: {warning}")),
+        });
+    }
+    match sheet {
+        None => Ok(ListFile {
+            bytes,
+            warning: None,
+        }),
+        Some(sheet) => {
+            let text = format!("{shown} is not an XLSX workbook, so it has no sheet {sheet:?}");
+            Err(Refusal::Usage(text))
+        }
+    }
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.

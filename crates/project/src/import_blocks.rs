@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::exit::Refusal;
-use crate::files;
+use crate::files::{self, ListFile};
 use crate::import_pairs::{AllowedChanges, PairSource};
 use crate::input_paths::SimilarFiles;
 use crate::location::{Location, now};
@@ -72,28 +72,30 @@ pub enum ListedItems {
 }
 
 impl ListedItems {
-    /// Reads a list and decides from its header what it names.
+    /// Reads a list, or a sheet of a workbook, and decides from its header what it names. Returns a warning about other
+    /// sheets, too.
     ///
     /// # Errors
     /// Returns an error if the list cannot be read.
-    pub fn of(file: &Path) -> anyhow::Result<Self> {
+    pub fn of(file: &Path, sheet: Option<&str>) -> anyhow::Result<(Self, Option<String>)> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
             bytes,
         };
         if file.is_dir() {
-            return Ok(Self::Pairs(pairs(None)));
+            return Ok((Self::Pairs(pairs(None)), None));
         }
-        let bytes = files::read(file)?;
+        let ListFile { bytes, warning } = files::read_list(file, sheet)?;
         let is_list = !files::is_jsonl(file, &bytes) && is_block_list(&bytes);
-        Ok(if is_list {
+        let items = if is_list {
             Self::Blocks(BlockSource::List {
                 file: file.to_owned(),
                 bytes,
             })
         } else {
             Self::Pairs(pairs(Some(bytes)))
-        })
+        };
+        Ok((items, warning))
     }
 }
 

@@ -26,11 +26,14 @@ const USAGE: &str = "mocban import [OPTIONS] FILE
 #[derive(Debug, Default, Args)]
 #[command(override_usage = USAGE)]
 pub(crate) struct ImportArgs {
-    /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
-    /// `scanned_face_down`; or a CSV file of whole blocks with the columns block, mesh, page and optionally labels,
+    /// A CSV, XLSX or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
+    /// `scanned_face_down`; or a CSV or XLSX file of whole blocks with the columns block, mesh, page and optionally labels,
     /// unit, side; paths are relative to the file
     #[arg(required_unless_present_any = ["meshes", "block"], conflicts_with_all = ["meshes", "block"])]
     pub(crate) file: Option<PathBuf>,
+    /// Sheet of an XLSX file [default: the first one]
+    #[arg(long, value_name = "NAME", requires = "file")]
+    pub(crate) sheet: Option<String>,
     /// A directory of meshes, paired with --prints by file stem; in folders, also by their names, and ids are `FOLDER_STEM`
     #[arg(long, value_name = "DIR", requires = "prints")]
     pub(crate) meshes: Option<PathBuf>,
@@ -55,7 +58,7 @@ pub(crate) struct ImportArgs {
 }
 
 pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let items = items(&args)?;
+    let (items, warning) = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_truths(&args)?;
     }
@@ -69,6 +72,9 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
             let outcome = import_blocks(&source, allowed, &context.location).await;
             drop(busy);
             let outcome = outcome?;
+            if let Some(warning) = warning {
+                context.warn(&warning);
+            }
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }
@@ -80,7 +86,8 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
             };
             let outcome = import_pairs(import, &context.location).await;
             drop(busy);
-            let outcome = outcome?;
+            let mut outcome = outcome?;
+            outcome.warnings.extend(warning);
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
         }
@@ -89,18 +96,21 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// Returns what the arguments name.
-fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+/// Returns what the arguments name, and a warning about other sheets of a workbook.
+fn items(args: &ImportArgs) -> anyhow::Result<(ListedItems, Option<String>)> {
     if let Some(source) = args.block.source(args.unit) {
-        return Ok(ListedItems::Blocks(source));
+        return Ok((ListedItems::Blocks(source), None));
     }
     match (&args.file, &args.meshes, &args.prints) {
-        (Some(file), ..) => ListedItems::of(file),
-        (None, Some(meshes), Some(prints)) => Ok(ListedItems::Pairs(PairSource::Folders {
-            meshes: meshes.clone(),
-            prints: prints.clone(),
-            unit: args.unit,
-        })),
+        (Some(file), ..) => ListedItems::of(file, args.sheet.as_deref()),
+        (None, Some(meshes), Some(prints)) => {
+            let folders = PairSource::Folders {
+                meshes: meshes.clone(),
+                prints: prints.clone(),
+                unit: args.unit,
+            };
+            Ok((ListedItems::Pairs(folders), None))
+        }
         (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
     }
 }

@@ -17,7 +17,7 @@ use mocban_catalog::{
 };
 use mocban_core::domain::{Reason, ThresholdMetric, Verdict, one_line};
 use mocban_project::exit::{ExitCode, Refusal};
-use mocban_project::files::{self, RefusedLine};
+use mocban_project::files::{self, ListFile, RefusedLine};
 use mocban_project::location::now;
 use mocban_project::shell::shell_quoted;
 use mocban_project::time_text::{duration, local};
@@ -28,7 +28,7 @@ use mocban_project::verdict_file::{self, VerdictList};
 pub(crate) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
-    /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
+    /// Record the verdicts of a CSV or XLSX file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
     /// of the verdicts.jsonl of an export
     Import(VerdictImportArgs),
     /// Print the log, oldest first
@@ -66,6 +66,9 @@ pub(crate) struct VerdictSetArgs {
 pub(crate) struct VerdictImportArgs {
     /// The file
     pub(crate) file: PathBuf,
+    /// Sheet of an XLSX file [default: the first one]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sheet: Option<String>,
 }
 
 /// Arguments of `verdict log`.
@@ -158,7 +161,7 @@ fn verdict_text(new: &NewVerdict) -> String {
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let bytes = files::read(&args.file)?;
+    let ListFile { bytes, warning } = files::read_list(&args.file, args.sheet.as_deref())?;
     let (_project, catalog) = context.open().await?;
     let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
     let is_jsonl = files::is_jsonl(&args.file, &bytes);
@@ -192,6 +195,9 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
         left_out,
     } = catalog.import_verdicts(rows, now()).await?;
     catalog.close().await;
+    if let Some(warning) = warning {
+        context.warn(&warning);
+    }
     context.print_json(
         &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
     )?;

@@ -12,7 +12,7 @@ pub enum NotText {
     DamagedUtf16,
     /// A workbook, such as a file of Excel.
     #[error(
-        "this is a workbook or an archive, not a text file; save the table as \"CSV UTF-8\" in the spreadsheet program"
+        "this is a workbook of an old format or with a password, or an archive; save the table as XLSX or as \"CSV UTF-8\" in the spreadsheet program"
     )]
     Workbook,
 }
