@@ -21,6 +21,7 @@ use super::commands::import;
 use super::commands::man;
 use super::commands::report;
 use super::commands::restore;
+use super::commands::retire;
 use super::commands::retry;
 use super::commands::review;
 use super::commands::run;
@@ -69,6 +70,8 @@ pub(super) enum Command {
     Show(show::ShowArgs),
     /// Let failed pairs run again
     Retry(retry::RetryArgs),
+    /// Take pairs out of every count, or bring them back; their results and verdicts are kept
+    Retire(retire::RetireArgs),
     /// Check files, rows and counters against each other
     Check(check::CheckArgs),
     /// Copy pairs, results, verdicts and settings to one file, also during a run

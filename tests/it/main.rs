@@ -94,6 +94,7 @@ mod refused_writes;
 mod renamed;
 mod report;
 mod resume;
+mod retire;
 mod review_alignment;
 mod review_browser;
 mod review_data;

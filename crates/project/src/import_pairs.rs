@@ -67,6 +67,8 @@ pub struct AllowedChanges {
     pub missing: bool,
     /// Whether most known pairs or blocks may get other files.
     pub files: bool,
+    /// Whether pairs that the list does not have are retired.
+    pub replace: bool,
 }
 
 /// What an import changed.
@@ -137,6 +139,7 @@ async fn store_in(
     let terms = ImportTerms {
         truths: list.truths.clone(),
         changed_files: list.allowed.files,
+        replace: list.allowed.replace,
     };
     let stored = catalog.import_all(rows, terms, now()).await;
     // Return a row's error first, because the catalog then only reports that the list ended early.

@@ -55,16 +55,21 @@ pub(crate) struct ImportArgs {
     /// blocks another scan and another page
     #[arg(long)]
     pub(crate) allow_changed_files: bool,
+    /// Retire the pairs that the list does not have, except for those cut from blocks: they are in no count, and their
+    /// results and verdicts are kept; a list that has them brings them back
+    #[arg(long)]
+    pub(crate) replace: bool,
 }
 
 pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (items, warning) = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
-        refuse_truths(&args)?;
+        refuse_options_of_pairs(&args)?;
     }
     let allowed = AllowedChanges {
         missing: args.allow_missing,
         files: args.allow_changed_files,
+        replace: args.replace,
     };
     let busy = Busy::start(context, "importing");
     match items {
@@ -115,12 +120,15 @@ fn items(args: &ImportArgs) -> anyhow::Result<(ListedItems, Option<String>)> {
     }
 }
 
-/// Refuses true alignments of pairs in an import of blocks.
-fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
-    if args.truth.is_none() {
+/// Refuses options of pairs in an import of blocks.
+fn refuse_options_of_pairs(args: &ImportArgs) -> anyhow::Result<()> {
+    let text = if args.truth.is_some() {
+        "--truth holds true alignments of pairs, but blocks are imported"
+    } else if args.replace {
+        "--replace retires pairs that a list of pairs does not have, but blocks are imported"
+    } else {
         return Ok(());
-    }
-    let text = "--truth holds true alignments of pairs, but blocks are imported";
+    };
     Err(Refusal::Usage(text.to_owned()).into())
 }
 
@@ -148,6 +156,17 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
         summary.changed.len(),
         summary.unchanged
     ));
+    for (number, text) in [
+        (
+            summary.retired,
+            "retired: the list does not have them, and their results are kept",
+        ),
+        (summary.restored, "back in every count"),
+    ] {
+        if number > 0 {
+            context.info(&format!("{} {text}", count(number, "pair")));
+        }
+    }
     for change in summary.changed.iter().take(MAX_CHANGES) {
         let fields = change.fields.join(", ");
         context.info(&format!("  {}: {fields} changed", change.name));
@@ -166,6 +185,8 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "added": summary.added,
         "changed": changed.collect::<Value>(),
         "unchanged": summary.unchanged,
+        "retired": summary.retired,
+        "restored": summary.restored,
         "truths": outcome.truths,
         "missing_files": outcome.missing.lines,
         "more_missing_files": outcome.missing.count - outcome.missing.lines.len(),

@@ -17,7 +17,7 @@ use mocban_catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, 
 use mocban_core::domain::{
     DepthOutcome, JobStatus, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::exit::ExitCode;
 use mocban_project::shell::shell_quoted;
 use mocban_project::time_text::local;
 use mocban_report::ManualCorrection;
@@ -47,12 +47,6 @@ pub(crate) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
     let why = catalog.why(&name, &fingerprints).await?;
     let Some(detail) = catalog.pair(&name).await? else {
-        if catalog.retired_pairs().await?.contains(&name) {
-            let text = format!(
-                "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
-            );
-            return Err(Refusal::NothingSelected(text).into());
-        }
         anyhow::bail!("pair {name} was removed while it was read");
     };
     let manual = manual_results(&catalog, &detail.results).await?;
@@ -79,7 +73,8 @@ const NAMES_AT_ONCE: usize = 1000;
 /// Prints the names of all blocks and pairs, one per line. Retired pairs are left out.
 async fn list_names(catalog: &Catalog, context: &Context) -> anyhow::Result<ExitCode> {
     let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
-    let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired: BTreeSet<PairName> = retired.map(|pair| pair.name).collect();
     pairs.retain(|pair| !retired.contains(pair));
     if context.global.json {
         streams::print_json(&json!({"schema": 1, "blocks": blocks, "pairs": pairs}))?;

@@ -218,7 +218,10 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
 async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
     let pair = match &args.pair {
-        Some(typed) => Some(select::pair(&catalog, typed).await?),
+        Some(typed) => {
+            let pairs = select::known_pairs(&catalog, std::slice::from_ref(typed)).await?;
+            pairs.into_iter().next()
+        }
         None => None,
     };
     let (sound, mut damaged) = catalog.without_faulty_rows().await?;

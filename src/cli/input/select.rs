@@ -2,8 +2,9 @@
 
 use mocban_catalog::Catalog;
 use mocban_core::domain::spelling::nearest;
-use mocban_core::domain::{BlockName, PairName};
+use mocban_core::domain::{BlockName, PairName, RetireCause};
 use mocban_project::exit::Refusal;
+use mocban_project::time_text::local;
 use mocban_runner::NamedWork;
 
 /// Largest number of similar ids in a message.
@@ -14,8 +15,43 @@ const MIN_PART_CHARS: usize = 3;
 /// Looks up pairs by their ids.
 ///
 /// # Errors
-/// Returns an error if a pair does not exist. The message suggests similar ids.
+/// Returns an error if a pair does not exist, or is retired. The message suggests similar ids.
 pub(crate) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
+    let names = known_pairs(catalog, typed).await?;
+    refuse_retired(catalog, &names).await?;
+    Ok(names)
+}
+
+/// Refuses pairs that are retired.
+async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> anyhow::Result<()> {
+    let retired = catalog.retired_pairs().await?;
+    let Some(pair) = retired.iter().find(|pair| names.contains(&pair.name)) else {
+        return Ok(());
+    };
+    let (name, date) = (&pair.name, local(pair.at));
+    let text = match pair.cause {
+        RetireCause::Person => format!(
+            "pair {name} was retired on {date}; its results and verdicts are kept, and `retire --undo` brings it back"
+        ),
+        RetireCause::List => format!(
+            "pair {name} was retired on {date}, because a list that replaced the others does not have it; its results and \
+             verdicts are kept, and `retire --undo` or a list with it brings it back"
+        ),
+        RetireCause::Labels => format!(
+            "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
+        ),
+    };
+    Err(Refusal::NothingSelected(text).into())
+}
+
+/// Looks up pairs by their ids, also retired ones.
+///
+/// # Errors
+/// Returns an error if a pair does not exist. The message suggests similar ids.
+pub(crate) async fn known_pairs(
+    catalog: &Catalog,
+    typed: &[String],
+) -> anyhow::Result<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     let is_known = |text: &&String| {
@@ -70,7 +106,8 @@ pub(crate) async fn block(catalog: &Catalog, typed: &str) -> anyhow::Result<Opti
 /// Looks up pairs and blocks by their ids. An id of both is that of the pair.
 ///
 /// # Errors
-/// Returns an error if there is neither a pair nor a block with an id. The message suggests similar ids.
+/// Returns an error if there is neither a pair nor a block with an id, or a pair is retired. The message suggests similar
+/// ids.
 pub(crate) async fn pairs_and_blocks(
     catalog: &Catalog,
     typed: &[String],
@@ -100,6 +137,7 @@ pub(crate) async fn pairs_and_blocks(
         let all = pairs.iter().map(PairName::as_str).chain(blocks);
         return Err(no_such("pair or block", text, all).into());
     }
+    refuse_retired(catalog, &found.pairs).await?;
     Ok(found)
 }
 

@@ -1,6 +1,6 @@
 //! Import of pairs: names, paths and attributes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
@@ -42,6 +42,8 @@ pub struct ImportTerms {
     pub truths: Vec<(PairName, Value)>,
     /// Whether most of the known pairs may get another mesh and another print.
     pub changed_files: bool,
+    /// Whether pairs that the list does not have are retired, except for those that were cut from blocks.
+    pub replace: bool,
 }
 
 /// Counts of an import.
@@ -53,6 +55,10 @@ pub struct ImportSummary {
     pub changed: Vec<PairChange>,
     /// Number of existing pairs with the same values.
     pub unchanged: u64,
+    /// Number of pairs that the list does not have and that were retired.
+    pub retired: u64,
+    /// Number of retired pairs that came back. They are also counted as changed or unchanged.
+    pub restored: u64,
 }
 
 /// A pair whose values an import changed.
@@ -113,10 +119,11 @@ FROM json_to_recordset(CAST(?1 AS json)) AS item (name text, mesh text, print te
 /// Updates the statistics of PostgreSQL's planner.
 const ANALYZE: &str = "ANALYZE pair, job";
 
-/// Adds jobs for those of some pairs that have none.
+/// Adds jobs for those of some pairs that have none and are not retired.
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
-SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1) WHERE true
+SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1)
+WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = CAST(atom AS bigint))
 ON CONFLICT (pair) DO NOTHING";
 
 impl Catalog {
@@ -138,11 +145,16 @@ impl Catalog {
                 let mut summary = ImportSummary::default();
                 let mut deltas = Deltas::default();
                 let last = similar_names::last_pair(conn).await?;
+                let mut listed = HashSet::new();
                 loop {
                     match chunks.recv().await {
                         Some(ImportChunk::Rows(rows)) => {
                             for chunk in rows.chunks(CHUNK) {
-                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
+                                let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
+                                let ids = ids.await?;
+                                if terms.replace {
+                                    listed.extend(ids);
+                                }
                             }
                         }
                         Some(ImportChunk::End) => break,
@@ -152,6 +164,10 @@ impl Catalog {
                 similar_names::refuse_pairs(conn, last).await?;
                 if !terms.changed_files {
                     refuse_changed_files(&summary)?;
+                }
+                if terms.replace {
+                    let retired = retired::retire_unlisted(conn, &listed, now, &mut deltas);
+                    summary.retired = retired.await?;
                 }
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
@@ -220,16 +236,16 @@ fn refuse_changed_files(summary: &ImportSummary) -> Result<()> {
     }
 }
 
-/// Adds and updates pairs. Retired pairs get their jobs back.
+/// Adds and updates pairs. Pairs that no person retired get their jobs back. Returns the ids of the rows.
 pub(crate) async fn import_chunk(
     conn: &mut Conn,
     chunk: &[ImportRow],
     now: UnixMillis,
     summary: &mut ImportSummary,
     deltas: &mut Deltas,
-) -> Result<()> {
+) -> Result<Vec<i64>> {
     let names = json_array(chunk.iter().map(|row| row.name.as_str()));
-    retired::restore(conn, &names, deltas).await?;
+    summary.restored += retired::restore(conn, &names, false, deltas).await?;
     let known = query(SELECT).bind(&names);
     let mut stored: BTreeMap<PairName, Option<PairAttributes>> = BTreeMap::new();
     for row in &known.fetch_all(&mut *conn).await? {
@@ -269,9 +285,12 @@ pub(crate) async fn import_chunk(
     let upsert = query(UPSERT).bind(items).bind(now);
     let rows = upsert.fetch_all(&mut *conn).await?;
     checksums::store_of_rows(conn, ChecksummedTable::Pair, &rows).await?;
-    let ids: Result<Vec<i64>> = rows.iter().map(|row| row.get(0)).collect();
-    let ids = json_array(ids?);
-    query(NEW_JOBS).bind(ids).execute(conn).await
+    let ids: Vec<i64> = rows.iter().map(|row| row.get(0)).collect::<Result<_>>()?;
+    query(NEW_JOBS)
+        .bind(json_array(ids.iter().copied()))
+        .execute(conn)
+        .await?;
+    Ok(ids)
 }
 
 fn item(row: &ImportRow) -> Value {

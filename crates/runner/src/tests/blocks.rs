@@ -102,10 +102,8 @@ async fn changed_labels_run_only_the_changed_characters_again() {
     assert_eq!(fixture.counts("b_1"), [1, 1, 2, 2]);
     assert_eq!(fixture.executor.count("b_1_r1", Stage::Fit), 1);
     assert_eq!(fixture.executor.count("b_1_r2", Stage::Fit), 2);
-    assert_eq!(
-        fixture.catalog.retired_pairs().await.expect("a read"),
-        [name("b_1_r3")]
-    );
+    let retired = fixture.catalog.retired_pairs().await.expect("a read");
+    assert_eq!((retired.len(), &retired[0].name), (1, &name("b_1_r3")));
     assert_eq!(changed.status.pairs, 2);
     fixture.write("b_1", "txt", "r1 a\nr2 new b\nr3 c");
     let back = fixture.run(&options(2)).await;
