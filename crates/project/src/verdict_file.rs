@@ -10,7 +10,6 @@ use csv::StringRecord;
 use serde::Deserialize;
 
 use super::files::RefusedLine;
-use super::time_text::parse_utc;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, Reason, UnixMillis, Verdict};
@@ -18,6 +17,7 @@ use mocban_lists::columns::{HeaderColumns, KnownColumns, SameColumn, plain_name}
 use mocban_lists::json_numbers::nan_as_null;
 use mocban_lists::manifest::{CsvText, LineCounter, NotText, as_utf8, trimmed};
 use mocban_lists::quotes::check_quotes;
+use mocban_system::time_text::parse_utc;
 
 /// The columns, and their other names in English and Vietnamese. Every file must have the first three.
 const COLUMNS: KnownColumns = KnownColumns {
@@ -136,9 +136,6 @@ impl VerdictList {
 }
 
 /// Parses a CSV file.
-///
-/// # Errors
-/// Returns an error if the header is invalid.
 fn csv_rows(
     text: ListText,
     delimiter: u8,
@@ -158,18 +155,13 @@ fn csv_rows(
 }
 
 /// Refuses a row with values that no verdict has.
-///
-/// # Errors
-/// Returns an error with the line and the reason.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
     let checked = row.listed.verdict.check(now);
     checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
 }
 
-/// Refuses a list with unknown pairs. `first_lines` has the first line of each pair, `known` the pairs that exist.
-///
-/// # Errors
-/// Returns an error for the first line with such a pair. It suggests a similar one.
+/// Refuses a list with unknown pairs. `first_lines` has the first line of each pair, `known` the pairs that exist, of which
+/// a similar one is suggested.
 pub fn refuse_unknown(
     first_lines: &BTreeMap<PairName, usize>,
     unknown: &[PairName],
@@ -232,7 +224,7 @@ fn row(
         metric: cell(3).map(|text| word(text, &[], line)).transpose()?,
         reason: cell(4).map(|text| word(text, &REASONS, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     let judged = None;

@@ -7,15 +7,15 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::LengthUnit;
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{
     AllowedChanges, ImportOutcome, PairImport, PairSource, import_pairs,
 };
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -61,7 +61,7 @@ pub(crate) struct ImportArgs {
     pub(crate) replace: bool,
 }
 
-pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (items, warning) = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_options_of_pairs(&args)?;
@@ -71,12 +71,10 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
         files: args.allow_changed_files,
         replace: args.replace,
     };
-    let busy = Busy::start(context, "importing");
+    let (location, terminal) = (&context.location, Terminal::new(context));
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, allowed, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_blocks(&source, allowed, location, &terminal).await?;
             if let Some(warning) = warning {
                 context.warn(&warning);
             }
@@ -89,9 +87,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
                 truth: args.truth,
                 allowed,
             };
-            let outcome = import_pairs(import, &context.location).await;
-            drop(busy);
-            let mut outcome = outcome?;
+            let mut outcome = import_pairs(import, location, &terminal).await?;
             outcome.warnings.extend(warning);
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
@@ -102,7 +98,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
 }
 
 /// Returns what the arguments name, and a warning about other sheets of a workbook.
-fn items(args: &ImportArgs) -> anyhow::Result<(ListedItems, Option<String>)> {
+fn items(args: &ImportArgs) -> ProjectResult<(ListedItems, Option<String>)> {
     if let Some(source) = args.block.source(args.unit) {
         return Ok((ListedItems::Blocks(source), None));
     }
@@ -116,12 +112,15 @@ fn items(args: &ImportArgs) -> anyhow::Result<(ListedItems, Option<String>)> {
             };
             Ok((ListedItems::Pairs(folders), None))
         }
-        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+        (None, ..) => {
+            let text = "give a manifest, or --meshes and --prints";
+            Err(Refusal::Usage(text.to_owned()).into())
+        }
     }
 }
 
 /// Refuses options of pairs in an import of blocks.
-fn refuse_options_of_pairs(args: &ImportArgs) -> anyhow::Result<()> {
+fn refuse_options_of_pairs(args: &ImportArgs) -> ProjectResult<()> {
     let text = if args.truth.is_some() {
         "--truth holds true alignments of pairs, but blocks are imported"
     } else if args.replace {

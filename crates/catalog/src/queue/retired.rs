@@ -11,6 +11,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::row::from_row;
 use crate::db::rows::{json_array, names_json};
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{Deltas, KeyedJob};
 use crate::{Catalog, Result};
 use mocban_core::domain::{JobStatus, PairId, PairName, RetireCause, UnixMillis};
@@ -57,24 +58,6 @@ const IDS: &str = "SELECT id FROM pair WHERE name IN (SELECT atom FROM json_each
 const CLEAR: &str = "
 DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
-/// Selects jobs with their keys. In PostgreSQL, locks them in the order of pairs.
-const LOCK: Sql = Sql::pair(
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT atom FROM json_each(?1)) ORDER BY pair",
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE",
-);
-
-/// Sends jobs back to the first stage and ends their leases.
-const RESET: &str = "
-UPDATE job SET stage = 0, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0, exclusive = 0, worker = NULL,
-    deadline = NULL, token = token + 1, fingerprint = NULL
-WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint";
-
-const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
-
 const RETIRED: &str = "
 SELECT p.name, r.cause, r.at FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
 
@@ -109,55 +92,40 @@ from_row! { RemovedJob { job in row, token, low_confidence } }
 
 impl Catalog {
     /// Returns the retired pairs, sorted by name.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn retired_pairs(&self) -> Result<Vec<RetiredPair>> {
         let mut conn = self.read_conn().await?;
         query_as(RETIRED).fetch_all(&mut conn).await
     }
 
     /// Retires pairs for a person. Their leases end. Returns how many were not retired before.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn retire_pairs(&self, names: &[PairName], now: UnixMillis) -> Result<u64> {
         let names = names.to_vec();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut deltas = Deltas::default();
-                let mut retired = 0;
-                for chunk in names.chunks(CHUNK) {
-                    let pairs = query_scalar(IDS).bind(names_json(chunk));
-                    let pairs: Vec<PairId> = pairs.fetch_all(&mut *conn).await?;
-                    retired += retire(conn, &pairs, RetireCause::Person, now, &mut deltas).await?;
-                }
-                deltas.apply(conn).await?;
-                Ok(retired)
-            })
+        in_transaction!(self, |conn| {
+            let mut deltas = Deltas::default();
+            let mut retired = 0;
+            for chunk in names.chunks(CHUNK) {
+                let pairs = query_scalar(IDS).bind(names_json(chunk));
+                let pairs: Vec<PairId> = pairs.fetch_all(&mut *conn).await?;
+                retired += retire(conn, &pairs, RetireCause::Person, now, &mut deltas).await?;
+            }
+            deltas.apply(conn).await?;
+            Ok(retired)
         })
-        .await
     }
 
     /// Gives retired pairs their jobs back, except for pairs whose boxes are gone from the labels of their blocks. Returns
     /// how many came back.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn restore_pairs(&self, names: &[PairName]) -> Result<u64> {
         let names = names.to_vec();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut deltas = Deltas::default();
-                let mut restored = 0;
-                for chunk in names.chunks(CHUNK) {
-                    restored += restore(conn, &names_json(chunk), true, &mut deltas).await?;
-                }
-                deltas.apply(conn).await?;
-                Ok(restored)
-            })
+        in_transaction!(self, |conn| {
+            let mut deltas = Deltas::default();
+            let mut restored = 0;
+            for chunk in names.chunks(CHUNK) {
+                restored += restore(conn, &names_json(chunk), true, &mut deltas).await?;
+            }
+            deltas.apply(conn).await?;
+            Ok(restored)
         })
-        .await
     }
 }
 
@@ -171,8 +139,7 @@ pub(crate) async fn retire(
     deltas: &mut Deltas,
 ) -> Result<u64> {
     let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let removed = query_as(REMOVE).bind(ids);
-    let removed: Vec<RemovedJob> = removed.fetch_all(&mut *conn).await?;
+    let removed: Vec<RemovedJob> = query_as(REMOVE).bind(ids).fetch_all(&mut *conn).await?;
     let mut items = Vec::new();
     for one in &removed {
         let KeyedJob { unit: pair, key } = one.job;
@@ -235,19 +202,4 @@ pub(crate) async fn restore(
         query(CLEAR).bind(ids).execute(conn).await?;
     }
     Ok(restored.len() as u64)
-}
-
-/// Sends pairs whose files or attributes changed back to the first stage. Ends their leases, because the workers that
-/// hold them read the old files.
-pub(crate) async fn reset(conn: &mut Conn, pairs: &[PairId], deltas: &mut Deltas) -> Result<()> {
-    let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let before: Vec<KeyedJob> = query_as(LOCK).bind(&ids).fetch_all(&mut *conn).await?;
-    let after: Vec<KeyedJob> = query_as(RESET).bind(&ids).fetch_all(&mut *conn).await?;
-    for job in before {
-        deltas.add(job.key, -1);
-    }
-    for job in after {
-        deltas.add(job.key, 1);
-    }
-    query(CLEAR_FAILURES).bind(&ids).execute(conn).await
 }

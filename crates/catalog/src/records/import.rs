@@ -10,6 +10,7 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
@@ -140,51 +141,45 @@ impl Catalog {
         terms: ImportTerms,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = ImportSummary::default();
-                let mut deltas = Deltas::default();
-                let last = similar_names::last_pair(conn).await?;
-                let mut listed = HashSet::new();
-                loop {
-                    match chunks.recv().await {
-                        Some(ImportChunk::Rows(rows)) => {
-                            for chunk in rows.chunks(CHUNK) {
-                                let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
-                                let ids = ids.await?;
-                                if terms.replace {
-                                    listed.extend(ids);
-                                }
+        in_transaction!(self, |conn| {
+            let mut summary = ImportSummary::default();
+            let mut deltas = Deltas::default();
+            let last = similar_names::last_pair(conn).await?;
+            let mut listed = HashSet::new();
+            loop {
+                match chunks.recv().await {
+                    Some(ImportChunk::Rows(rows)) => {
+                        for chunk in rows.chunks(CHUNK) {
+                            let ids = import_chunk(conn, chunk, now, &mut summary, &mut deltas);
+                            let ids = ids.await?;
+                            if terms.replace {
+                                listed.extend(ids);
                             }
                         }
-                        Some(ImportChunk::End) => break,
-                        None => return Err(CatalogError::CutShort),
                     }
+                    Some(ImportChunk::End) => break,
+                    None => return Err(CatalogError::CutShort),
                 }
-                similar_names::refuse_pairs(conn, last).await?;
-                if !terms.changed_files {
-                    refuse_changed_files(&summary)?;
-                }
-                if terms.replace {
-                    let retired = retired::retire_unlisted(conn, &listed, now, &mut deltas);
-                    summary.retired = retired.await?;
-                }
-                deltas.apply(conn).await?;
-                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                let stored = ground_truth::set(conn, &terms.truths).await?;
-                if let Conn::Postgres(_) = conn {
-                    query(ANALYZE).execute(conn).await?;
-                }
-                Ok((summary, stored))
-            })
+            }
+            similar_names::refuse_pairs(conn, last).await?;
+            if !terms.changed_files {
+                refuse_changed_files(&summary)?;
+            }
+            if terms.replace {
+                let retired = retired::retire_unlisted(conn, &listed, now, &mut deltas);
+                summary.retired = retired.await?;
+            }
+            deltas.apply(conn).await?;
+            summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+            let stored = ground_truth::set(conn, &terms.truths).await?;
+            if let Conn::Postgres(_) = conn {
+                query(ANALYZE).execute(conn).await?;
+            }
+            Ok((summary, stored))
         })
-        .await
     }
 
     /// Returns the names of all pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
@@ -192,18 +187,12 @@ impl Catalog {
     }
 
     /// Returns the unknown names among `names`, in the given order.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
     }
 
     /// Returns the pairs with the given names. Unknown names are left out.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await

@@ -24,13 +24,15 @@ pub enum FileKind {
     OtherMesh(&'static str),
     /// Another format with a known signature.
     Other(&'static str),
+    /// The text that Git LFS stores in place of a large file that was not fetched.
+    LfsPointer,
     /// Printable text without a signature.
     Text,
     /// Bytes without a known signature.
     Binary,
 }
 
-const SIGNATURES: [(&[u8], FileKind); 28] = [
+const SIGNATURES: [(&[u8], FileKind); 31] = [
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\xff\xd8\xff", FileKind::Jpeg),
     (b"II*\0", FileKind::Tiff),
@@ -41,6 +43,11 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"BM", FileKind::OtherImage("a BMP image")),
     (b"8BPS", FileKind::OtherImage("a Photoshop image")),
     (b"\0\0\0\x0cjP  ", FileKind::OtherImage("a JPEG 2000 image")),
+    (
+        b"\xff\x4f\xff\x51",
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (b"\0\0\0\x0cJXL ", FileKind::OtherImage("a JPEG XL image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
     (b"glTF", FileKind::OtherMesh("a binary glTF scene")),
@@ -51,6 +58,7 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
     (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
     (b"%PDF", FileKind::Other("a PDF document")),
+    (b"version https://git-lfs", FileKind::LfsPointer),
     (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
     (b"\x1f\x8b", FileKind::Other("a gzip archive")),
     (b"7z\xbc\xaf", FileKind::Other("a 7-Zip archive")),
@@ -61,20 +69,35 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"<", FileKind::Other("XML or HTML text")),
 ];
 
+/// Extensions of unsupported images and documents.
+const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
+    (&["bmp", "dib"], FileKind::OtherImage("a BMP image")),
+    (&["webp"], FileKind::OtherImage("a WebP image")),
+    (&["gif"], FileKind::OtherImage("a GIF image")),
+    (
+        &["jp2", "j2k", "jpf", "jpx"],
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (&["jxl"], FileKind::OtherImage("a JPEG XL image")),
+    (&["heic", "heif"], FileKind::OtherImage("a HEIC image")),
+    (&["avif"], FileKind::OtherImage("an AVIF image")),
+    (&["psd"], FileKind::OtherImage("a Photoshop image")),
+    (&["pdf"], FileKind::Other("a PDF document")),
+];
+
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
             return Self::OtherImage("a WebP image");
         }
-        if let Some(brand @ (b"avif" | b"heic" | b"mif1" | b"heix")) =
-            bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp")
-        {
-            return Self::OtherImage(if brand == b"avif" {
-                "an AVIF image"
-            } else {
-                "a HEIC image"
-            });
+        let brand = bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp");
+        match brand {
+            Some(b"avif" | b"avis") => return Self::OtherImage("an AVIF image"),
+            Some(b"heic" | b"heim" | b"heis" | b"heix" | b"hevc" | b"mif1" | b"msf1") => {
+                return Self::OtherImage("a HEIC image");
+            }
+            _ => {}
         }
         SIGNATURES
             .iter()
@@ -100,9 +123,33 @@ impl FileKind {
             Self::Tiff => "a TIFF image",
             Self::Ply => "a PLY mesh",
             Self::OtherImage(name) | Self::OtherMesh(name) | Self::Other(name) => name,
+            Self::LfsPointer => "a pointer of Git LFS",
             Self::Text => "text",
             Self::Binary => "binary data of unknown kind",
         }
+    }
+
+    /// Returns the type of image that files with an extension usually are, if it is not read.
+    pub fn of_unread_extension(extension: &str) -> Option<Self> {
+        let extension = extension.to_ascii_lowercase();
+        let mut images = UNREAD_IMAGES.into_iter();
+        let found = images.find(|(extensions, _)| extensions.contains(&extension.as_str()));
+        found.map(|(_, kind)| kind)
+    }
+
+    /// Returns what to do with files of this type where images are needed, if that does not depend on the file.
+    pub fn image_advice(self) -> Option<String> {
+        let mut images = UNREAD_IMAGES.into_iter();
+        let (extensions, _) = images.find(|(_, kind)| *kind == self)?;
+        let extension = extensions[0];
+        Some(if extension == "pdf" {
+            "save their pages as images, such as with `pdftoppm -r 600 -png FILE.pdf page`"
+                .to_owned()
+        } else {
+            format!(
+                "convert them, such as with ImageMagick: `magick mogrify -format png *.{extension}`"
+            )
+        })
     }
 
     /// Returns the description without the article.
@@ -121,7 +168,24 @@ impl std::fmt::Display for FileKind {
 
 #[cfg(test)]
 mod tests {
-    use super::FileKind;
+    use super::{FileKind, UNREAD_IMAGES};
+
+    #[test]
+    fn unread_images_are_known_by_extension_and_have_advice() {
+        for (extensions, kind) in UNREAD_IMAGES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            let advice = kind.image_advice().expect("advice");
+            assert!(advice.contains(extensions[0]), "{advice}");
+        }
+        assert_eq!(
+            FileKind::of_unread_extension("PDF"),
+            Some(FileKind::Other("a PDF document"))
+        );
+        assert_eq!(FileKind::of_unread_extension("png"), None);
+        assert_eq!(FileKind::Text.image_advice(), None);
+    }
 
     #[test]
     fn types_are_detected_by_content() {
@@ -136,6 +200,8 @@ mod tests {
             FileKind::of(b"\0\0\0\x1cftypheic"),
             FileKind::OtherImage("a HEIC image")
         );
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n";
+        assert_eq!(FileKind::of(pointer), FileKind::LfsPointer);
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
     }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use unicode_normalization::UnicodeNormalization as _;
 
 use super::spelling::fold_case;
-use super::{is_hidden, sanitize};
+use super::{ErrorCode, Explained, is_hidden, sanitize};
 
 /// Characters of an id that a file name on Windows may not have, and the escape character itself. All are ASCII.
 const ESCAPED: &str = "%\"*:<>?|";
@@ -55,6 +55,12 @@ pub enum PairNameError {
     /// The id is too long for file names derived from it.
     #[error("an id of {0} bytes is too long; the limit is {limit}", limit = PairName::MAX_BYTES)]
     TooLong(usize),
+}
+
+impl Explained for PairNameError {
+    fn code(&self) -> ErrorCode {
+        ErrorCode::Usage
+    }
 }
 
 impl PairName {

@@ -104,6 +104,9 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: u64,
     },
+    /// A face refers to a missing vertex, and neither is known.
+    #[error("a face refers to a vertex that the file does not have")]
+    NoSuchVertex,
     /// A line of a text format cannot be parsed.
     #[error("line {line}: {reason}")]
     Line {

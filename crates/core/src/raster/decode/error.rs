@@ -9,7 +9,7 @@ pub enum DecodeError {
     #[error("the file is empty (0 bytes)")]
     Empty,
     /// The content is of another kind than PNG, JPEG or TIFF.
-    #[error("the file is {0}; PNG, JPEG and TIFF images are read")]
+    #[error("{}", not_an_image(*.0))]
     NotAnImage(FileKind),
     /// More bytes than the settings allow.
     #[error("the file has {bytes} bytes; limits.image.max_bytes is {limit}")]
@@ -73,4 +73,15 @@ pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
         kind,
         reason: sanitize(reason, 160),
     }
+}
+
+fn not_an_image(kind: FileKind) -> String {
+    if kind == FileKind::LfsPointer {
+        return format!(
+            "the file is {kind} and does not hold the image; fetch the image with `git lfs pull`"
+        );
+    }
+    let advice = kind.image_advice();
+    let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
+    format!("the file is {kind}; PNG, JPEG and TIFF images are read{advice}")
 }
