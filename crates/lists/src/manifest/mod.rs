@@ -22,5 +22,6 @@ pub use folders::{
 };
 pub use jsonl::{parse_jsonl, read_jsonl};
 pub use misspelt_columns::MisspeltColumns;
+pub(crate) use row::is_text_column;
 pub use row::{ManifestRow, ReadRows, RowIds};
 pub use text::{CsvText, LineCounter, NotText, as_utf8, trimmed};

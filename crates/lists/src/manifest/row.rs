@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
-use crate::columns::KnownColumns;
+use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
 /// One pair of a list. Paths are stored as written; a relative path is relative to the list.
@@ -83,6 +83,19 @@ pub(super) const COLUMNS: KnownColumns = KnownColumns {
         ("quet_up_mat", "scanned_face_down"),
     ],
 };
+
+/// Returns whether the values of a column in a list of pairs, of blocks or of verdicts are names of things or of files, so
+/// that none is a date.
+pub(crate) fn is_text_column(header: &str) -> bool {
+    const OTHERS: [&str; 6] = ["pair", "cap", "ma_cap", "page", "trang", "labels"];
+    let plain = plain_name(header);
+    let others = COLUMNS.other_names.iter();
+    let names = COLUMNS.names.iter().copied();
+    names
+        .chain(OTHERS)
+        .chain(others.map(|(name, _)| *name))
+        .any(|name| name == plain)
+}
 
 /// What was read of a list whose rows were passed on.
 #[derive(Debug, Default)]

@@ -32,6 +32,36 @@ pub enum WorkbookError {
         /// Names of the sheets.
         sheets: Vec<String>,
     },
+    /// An id or a file name that the spreadsheet program took for a date or a number.
+    #[error("cell {cell} of column \"{}\" is {kind}, {}, which the spreadsheet program may have made of a text such as {example}; give the column the format Text and write the cell again", sanitize(.column, MAX_SHOWN), sanitize(.text, MAX_SHOWN))]
+    Converted {
+        /// The cell, such as `B5`.
+        cell: String,
+        /// Name of its column.
+        column: String,
+        /// `a date` or `a power of ten`.
+        kind: &'static str,
+        /// What it shows.
+        text: String,
+        /// A text that is converted in this way.
+        example: &'static str,
+    },
+    /// A text longer than a spreadsheet program allows.
+    #[error("cell {cell} has more than {limit} bytes of text; shorten it")]
+    LongCell {
+        /// The cell.
+        cell: String,
+        /// Longest text in bytes.
+        limit: usize,
+    },
+    /// A formula that was never computed, as in a workbook that a script wrote.
+    #[error(
+        "cell {cell} has a formula without its result; open the workbook in a spreadsheet program and save it"
+    )]
+    NoResult {
+        /// The cell.
+        cell: String,
+    },
     /// A formula that failed.
     #[error("cell {cell} has the error {}; correct it, or clear the cell", sanitize(.value, MAX_SHOWN))]
     CellError {

@@ -6,8 +6,10 @@ pub(super) enum NumberFormat {
     /// As a number.
     #[default]
     Plain,
-    /// As a whole number with at least this many digits, such as `0000`.
-    Digits(usize),
+    /// With at least this many digits before the point, and after it, such as `0000` and `0.00`.
+    Digits(usize, usize),
+    /// As a power of ten, such as `1.00E+05`.
+    Scientific,
     /// As a date, a time, or both.
     Date,
 }
@@ -20,17 +22,24 @@ const MAX_DIGITS: usize = 30;
 impl NumberFormat {
     /// Returns the format with an id that every workbook has.
     pub(super) fn built_in(id: u32) -> Self {
-        if DATE_FORMATS.iter().any(|ids| ids.contains(&id)) {
-            Self::Date
-        } else {
-            Self::Plain
+        match id {
+            2 => Self::Digits(1, 2),
+            11 | 48 => Self::Scientific,
+            id if DATE_FORMATS.iter().any(|ids| ids.contains(&id)) => Self::Date,
+            _ => Self::Plain,
         }
     }
 
     /// Returns the format that a code such as `0000` or `dd/mm/yyyy` describes.
     pub(super) fn of_code(code: &str) -> Self {
-        if code.len() > 1 && code.len() <= MAX_DIGITS && code.bytes().all(|byte| byte == b'0') {
-            return Self::Digits(code.len());
+        let (whole, decimals) = code.split_once('.').unwrap_or((code, ""));
+        let are_zeros = |digits: &str| digits.bytes().all(|byte| byte == b'0');
+        if !whole.is_empty()
+            && (2..=MAX_DIGITS).contains(&code.len())
+            && are_zeros(whole)
+            && are_zeros(decimals)
+        {
+            return Self::Digits(whole.len(), decimals.len());
         }
         let (mut in_quotes, mut in_brackets, mut is_escaped) = (false, false, false);
         let is_of_date = |c: char| {
@@ -46,10 +55,23 @@ impl NumberFormat {
         };
         // The first part is that of positive numbers.
         let first = code.split(';').next().unwrap_or(code);
-        if !first.eq_ignore_ascii_case("general") && first.chars().any(is_of_date) {
+        if first.eq_ignore_ascii_case("general") {
+            Self::Plain
+        } else if first.chars().any(is_of_date) {
             Self::Date
+        } else if first.contains("0E+") || first.contains("0E-") {
+            Self::Scientific
         } else {
             Self::Plain
+        }
+    }
+
+    /// Returns what a spreadsheet program may have made of a text in this format, such as an id, with an example of the text.
+    pub(super) const fn conversion(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::Date => Some(("a date", "3-4")),
+            Self::Scientific => Some(("a power of ten", "1E5")),
+            Self::Plain | Self::Digits(..) => None,
         }
     }
 
@@ -61,13 +83,24 @@ impl NumberFormat {
         let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
         match self {
             Self::Date => date(number, is_1904).unwrap_or_else(|| number.to_string()),
-            Self::Digits(width) if is_whole && number >= 0.0 => {
-                format!("{number:0width$.0}")
+            Self::Digits(whole, decimals) if number >= 0.0 && number < 1e15 => {
+                padded(&number.to_string(), whole, decimals)
             }
             _ if is_whole => format!("{number:.0}"),
             _ => number.to_string(),
         }
     }
+}
+
+/// Adds zeros to a number, and takes no digit away.
+fn padded(number: &str, min_whole: usize, min_decimals: usize) -> String {
+    let (whole, decimals) = number.split_once('.').unwrap_or((number, ""));
+    let point = if min_decimals.max(decimals.len()) > 0 {
+        "."
+    } else {
+        ""
+    };
+    format!("{whole:0>min_whole$}{point}{decimals:0<min_decimals$}")
 }
 
 /// Seconds of a day.
@@ -127,15 +160,19 @@ mod tests {
 
     #[test]
     fn codes_tell_dates_and_digits_from_numbers() {
-        use NumberFormat::{Date, Digits, Plain};
+        use NumberFormat::{Date, Digits, Plain, Scientific};
         for (code, expected) in [
-            ("0000", Digits(4)),
+            ("0000", Digits(4, 0)),
+            ("0.00", Digits(1, 2)),
+            ("00.0", Digits(2, 1)),
+            (".00", Plain),
             ("0", Plain),
             ("General", Plain),
             ("#,##0.00 \"ms\"", Plain),
             ("[Red]0.00", Plain),
             ("0.0\\m", Plain),
-            ("0.00E+00;[Red]\"d\"", Plain),
+            ("0.00E+00;[Red]\"d\"", Scientific),
+            ("##0.0E+0", Scientific),
             ("dd/mm/yyyy", Date),
             ("[$-42A]d mmmm yyyy", Date),
             ("hh:mm:ss", Date),
@@ -143,8 +180,8 @@ mod tests {
             assert_eq!(NumberFormat::of_code(code), expected, "{code}");
         }
         assert_eq!(
-            [14, 22, 1, 49].map(NumberFormat::built_in),
-            [Date, Date, Plain, Plain]
+            [14, 22, 1, 49, 2, 11].map(NumberFormat::built_in),
+            [Date, Date, Plain, Plain, Digits(1, 2), Scientific]
         );
     }
 
@@ -158,9 +195,14 @@ mod tests {
             (Plain, "123456789012", "123456789012"),
             (Plain, "-2.5", "-2.5"),
             (Plain, "x", "x"),
-            (Digits(4), "117", "0117"),
-            (Digits(2), "1234", "1234"),
-            (Digits(4), "1.5", "1.5"),
+            (Plain, "1.1000000000000001", "1.1"),
+            (Digits(4, 0), "117", "0117"),
+            (Digits(2, 0), "1234", "1234"),
+            (Digits(4, 0), "1.5", "0001.5"),
+            (Digits(1, 2), "1.1000000000000001", "1.10"),
+            (Digits(1, 2), "3", "3.00"),
+            (Digits(1, 2), "1.125", "1.125"),
+            (Digits(1, 2), "-1", "-1"),
             (Date, "1", "1900-01-01"),
             (Date, "59", "1900-02-28"),
             (Date, "60", "1900-02-29"),

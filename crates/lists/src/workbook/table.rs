@@ -1,8 +1,11 @@
 //! The cells of a sheet as CSV: one line for each row, so that a line is the row of the same number.
 
+use std::collections::BTreeMap;
+
 use super::archive::damaged;
 use super::error::WorkbookError;
 use super::parts::{TextCollector, Workbook, read_part, value};
+use crate::manifest::is_text_column;
 use crate::xml::{XmlPart, local_name};
 
 /// Largest sheet: rows and columns of Excel.
@@ -11,12 +14,16 @@ const MAX_COLUMNS: usize = 1 << 14;
 /// Longest table, in bytes. Cells share texts, so a small workbook may hold a large one. Less in tests.
 const MAX_TABLE_BYTES: usize = if cfg!(test) { 4 << 20 } else { 512 << 20 };
 
+/// Longest text of a cell, in bytes. Excel allows 32,767 units of UTF-16, each of up to 3 bytes in UTF-8.
+const MAX_CELL_BYTES: usize = 3 * 32_767;
+
 /// A cell whose element is open.
 #[derive(Default)]
 struct OpenCell {
     column: usize,
     kind: String,
     style: usize,
+    has_formula: bool,
     /// Text of its value.
     value: String,
 }
@@ -29,9 +36,14 @@ struct TableWriter<'w> {
     rows: usize,
     /// Number of columns of the header, the first row with a value; 0 before it.
     width: usize,
-    /// Number of the open row, from 1, and its cells.
+    /// Columns whose values are names, with the header's.
+    text_columns: BTreeMap<usize, String>,
+    /// Number of the open row, from 1, its cells, and the bytes of their texts.
     row: usize,
     cells: Vec<String>,
+    row_bytes: usize,
+    /// Column of the next cell if it does not say where it is.
+    next_column: usize,
     cell: Option<OpenCell>,
 }
 
@@ -43,8 +55,11 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
         csv: Vec::new(),
         rows: 0,
         width: 0,
+        text_columns: BTreeMap::new(),
         row: 0,
         cells: Vec::new(),
+        row_bytes: 0,
+        next_column: 0,
         cell: None,
     };
     let mut collector = TextCollector::default();
@@ -63,6 +78,12 @@ pub(super) fn csv(workbook: &Workbook, file: &str, text: &str) -> Result<Vec<u8>
                 "c" => {
                     let style = value(&element, "s")?.parse().unwrap_or_default();
                     writer.begin_cell(&value(&element, "r")?, value(&element, "t")?, style)
+                }
+                "f" => {
+                    if let Some(cell) = &mut writer.cell {
+                        cell.has_formula = true;
+                    }
+                    Ok(())
                 }
                 _ => Ok(()),
             },
@@ -84,20 +105,27 @@ impl TableWriter<'_> {
             return Err(damaged(&format!("a row has the number {number}")));
         }
         self.cells.clear();
+        self.row_bytes = 0;
+        self.next_column = 0;
         Ok(())
     }
 
     fn begin_cell(&mut self, place: &str, kind: String, style: usize) -> Result<(), WorkbookError> {
+        if place.is_empty() && self.next_column >= MAX_COLUMNS {
+            return Err(damaged(&format!("a row has more than {MAX_COLUMNS} cells")));
+        }
         let column = match place {
-            "" => Some(self.cells.len()),
+            "" => Some(self.next_column),
             place => column(place),
         };
         let column = column.filter(|column| *column < MAX_COLUMNS);
         let column = column.ok_or_else(|| damaged(&format!("there is no cell {place}")))?;
+        self.next_column = column + 1;
         self.cell = Some(OpenCell {
             column,
             kind,
             style,
+            has_formula: false,
             value: String::new(),
         });
         Ok(())
@@ -115,6 +143,8 @@ impl TableWriter<'_> {
         if text.trim().is_empty() {
             return Ok(());
         }
+        self.row_bytes += text.len();
+        check_table(self.csv.len() + self.row_bytes)?;
         if self.cells.len() <= column {
             self.cells.resize(column + 1, String::new());
         }
@@ -128,30 +158,64 @@ impl TableWriter<'_> {
             column,
             kind,
             style,
+            has_formula,
             value,
         } = cell;
         Ok(match kind.as_str() {
             "s" => {
                 let index = value.trim().parse::<usize>().ok();
                 let string = index.and_then(|index| self.workbook.strings.get(index));
-                string
-                    .ok_or_else(|| damaged(&format!("there is no string {value}")))?
-                    .clone()
+                let string =
+                    string.ok_or_else(|| damaged(&format!("there is no string {value}")))?;
+                self.check_length(column, string)?;
+                string.clone()
             }
             "b" if value.trim() == "1" => "true".to_owned(),
             "b" => "false".to_owned(),
             "e" => {
-                let cell = format!("{}{}", letters(column), self.row);
+                let cell = self.name(column);
                 return Err(WorkbookError::CellError { cell, value });
             }
-            "str" | "inlineStr" | "d" => value,
+            "str" | "inlineStr" | "d" => {
+                self.check_length(column, &value)?;
+                value
+            }
+            _ if value.trim().is_empty() && has_formula => {
+                let cell = self.name(column);
+                return Err(WorkbookError::NoResult { cell });
+            }
             _ if value.trim().is_empty() => String::new(),
             _ => {
                 let format = self.workbook.formats.get(style).copied();
-                let is_1904 = self.workbook.is_1904;
-                format.unwrap_or_default().text(&value, is_1904)
+                let format = format.unwrap_or_default();
+                let text = format.text(&value, self.workbook.is_1904);
+                if let (Some((kind, example)), Some(header)) =
+                    (format.conversion(), self.text_columns.get(&column))
+                {
+                    return Err(WorkbookError::Converted {
+                        cell: self.name(column),
+                        column: header.clone(),
+                        kind,
+                        text,
+                        example,
+                    });
+                }
+                text
             }
         })
+    }
+
+    /// Returns the name of a cell of the open row, such as `B5`.
+    fn name(&self, column: usize) -> String {
+        format!("{}{}", letters(column), self.row)
+    }
+
+    fn check_length(&self, column: usize, text: &str) -> Result<(), WorkbookError> {
+        if text.len() <= MAX_CELL_BYTES {
+            return Ok(());
+        }
+        let (cell, limit) = (self.name(column), MAX_CELL_BYTES);
+        Err(WorkbookError::LongCell { cell, limit })
     }
 
     /// Writes the open row. Rows before it that are missing become blank lines.
@@ -161,6 +225,9 @@ impl TableWriter<'_> {
         }
         if self.width == 0 {
             self.width = self.cells.len();
+            let cells = self.cells.iter().enumerate();
+            let names = cells.filter(|(_, name)| is_text_column(name));
+            self.text_columns = names.map(|(k, name)| (k, name.clone())).collect();
         }
         for _ in self.rows + 1..self.row {
             self.csv.push(b'\n');
@@ -174,14 +241,19 @@ impl TableWriter<'_> {
         }
         self.csv.push(b'\n');
         self.rows = self.row;
-        if self.csv.len() > MAX_TABLE_BYTES {
-            return Err(WorkbookError::TooLarge {
-                part: "the table".to_owned(),
-                limit: MAX_TABLE_BYTES as u64,
-            });
-        }
-        Ok(())
+        check_table(self.csv.len())
     }
+}
+
+/// Refuses a table of too many bytes.
+fn check_table(bytes: usize) -> Result<(), WorkbookError> {
+    if bytes <= MAX_TABLE_BYTES {
+        return Ok(());
+    }
+    Err(WorkbookError::TooLarge {
+        part: "the table".to_owned(),
+        limit: MAX_TABLE_BYTES as u64,
+    })
 }
 
 /// Writes a cell in quotes. Line breaks become blanks.

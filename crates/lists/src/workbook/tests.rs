@@ -49,6 +49,38 @@ fn a_sheet_becomes_lines_with_the_numbers_of_its_rows() {
 }
 
 #[test]
+fn cells_without_places_follow_each_other_also_after_empty_ones() {
+    let rows = "<row><c t=\"s\"><v>0</v></c><c t=\"s\"><v>1</v></c><c t=\"s\"><v>2</v></c></row>\
+        <row><c><v>7</v></c><c/><c><v>9</v></c></row>";
+    let bytes = workbook(&[("a", rows)], STRINGS, "");
+    assert_eq!(csv(&bytes), "\"id\",\"mesh \",\"print\"\n\"7\",,\"9\"\n");
+}
+
+#[test]
+fn ids_that_became_dates_or_powers_of_ten_are_refused_and_other_columns_are_not() {
+    let styles = "<styleSheet><cellXfs><xf numFmtId=\"0\"/><xf numFmtId=\"16\"/><xf numFmtId=\"11\"/>\
+        <xf numFmtId=\"2\"/></cellXfs></styleSheet>";
+    let sheet = |header: &str, style: u32| {
+        let cell = format!("<c t=\"inlineStr\"><is><t>{header}</t></is></c>");
+        let rows = format!("<row>{cell}</row><row><c s=\"{style}\"><v>46115</v></c></row>");
+        workbook(&[("a", &rows)], "", styles)
+    };
+    for header in ["id", "Mã số", "Pair", "khối", "mesh"] {
+        for (style, kind) in [(1, "a date, 2026-04-03, "), (2, "a power of ten, 46115, ")] {
+            let refused = refusal(&sheet(header, style));
+            let start = format!("cell A2 of column \"{header}\" is {kind}which");
+            assert!(refused.starts_with(&start), "{refused}");
+        }
+        assert_eq!(
+            csv(&sheet(header, 3)),
+            format!("\"{header}\"\n\"46115.00\"\n")
+        );
+    }
+    assert_eq!(csv(&sheet("at", 1)), "\"at\"\n\"2026-04-03\"\n");
+    assert_eq!(csv(&sheet("weight", 2)), "\"weight\"\n\"46115\"\n");
+}
+
+#[test]
 fn the_first_visible_sheet_is_read_or_the_one_that_is_named() {
     let rows = |id: &str| text_rows(&[&["id", "mesh", "print"], &[id, "m", "p"]]);
     let (a, b) = (rows("a"), rows("b"));
@@ -103,6 +135,7 @@ fn what_is_no_workbook_is_named() {
         refusal(&changed),
         refusal(&sheet(error)),
         refusal(&sheet(missing)),
+        refusal(&sheet("<row><c><f>B1&amp;C1</f><v></v></c></row>")),
         refusal(&sheet("<row r=\"2\"><c><v>1</v></c></row><row r=\"2\"/>")),
         refusal(&sheet("<row r=\"1048577\"/>")),
         refusal(&sheet("<row><c r=\"ZZZZ1\"><v>1</v></c></row>")),
@@ -128,6 +161,28 @@ fn a_small_archive_cannot_become_a_huge_table() {
     assert_eq!(
         refused.to_string(),
         "the table of the workbook has more than 4 MiB; save the sheet alone"
+    );
+    let shared = "<c t=\"s\"><v>0</v></c>".repeat(200);
+    let row = format!("<row>{shared}</row>");
+    let refused = read_sheet(&workbook(&[("a", &row)], &strings, ""), None).expect_err("too large");
+    assert!(
+        matches!(refused, WorkbookError::TooLarge { .. }),
+        "{refused}"
+    );
+    let text = "x".repeat(1 << 20);
+    let strings = format!("<sst><si><t>{text}</t></si></sst>");
+    assert_eq!(
+        refusal(&workbook(
+            &[("a", "<row><c t=\"s\"><v>0</v></c></row>")],
+            &strings,
+            ""
+        )),
+        "cell A1 has more than 98301 bytes of text; shorten it"
+    );
+    let columns = format!("<row>{}</row>", "<c/>".repeat(16_385));
+    assert_eq!(
+        refusal(&workbook(&[("a", &columns)], "", "")),
+        "the workbook is damaged: a row has more than 16384 cells; save it again"
     );
     let many = "<si/>".repeat(1001);
     let refused = refusal(&workbook(&[("a", ROWS)], &format!("<sst>{many}</sst>"), ""));
