@@ -5,7 +5,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::cli::mocban;
+use crate::cli::{call, mocban};
+use crate::processes::Running;
+use crate::resume::{project, results, run};
 use crate::snapshots::assert_call;
 
 const PAIRS: [&str; 3] = ["upright-0000", "upright-0001", "upright-0002"];
@@ -102,4 +104,78 @@ fn retired_pairs_are_in_no_count_and_come_back() {
         (&1.into(), &0.into())
     );
     assert_eq!(counts(dir.path()), before);
+}
+
+#[test]
+fn pairs_that_are_retired_during_a_run_come_back_whole_also_after_a_kill() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let expected = project(dir.path(), "expected", "3");
+    call(&mut run(&expected, &[])).expect(0);
+    let retire = |project: &str, undo: &[&str]| {
+        mocban(
+            dir.path(),
+            &[&["-C", project, "retire"], undo, &PAIRS].concat(),
+        )
+    };
+    for (name, is_killed) in [("released", false), ("killed", true)] {
+        let p = project(dir.path(), name, "3");
+        let hold = dir.path().join(format!("{name}.hold"));
+        let mut command = run(&p, &["-j", "1"]);
+        command.env("MOCBAN_HOLD_AT", "depth:synced");
+        command.env("MOCBAN_HOLD_FILE", &hold);
+        let mut running = Running::start(&mut command);
+        running.wait_until("it is held", || hold.exists());
+        retire(name, &[]).expect(0);
+        if is_killed {
+            drop(running);
+        } else {
+            fs::remove_file(&hold).expect("released");
+            let (code, _, err) = running.end();
+            assert_eq!(code, Some(0), "{err}");
+        }
+        let status = mocban(dir.path(), &["-C", name, "status", "--json"]).expect(0);
+        let status = status.json();
+        assert_eq!(
+            (&status["pairs"], &status["retired"]),
+            (&0.into(), &3.into())
+        );
+        assert_eq!(status["jobs"]["leased"], 0);
+        mocban(dir.path(), &["-C", name, "check"]).expect(0);
+        retire(name, &["--undo"]).expect(0);
+        call(&mut run(&p, &[])).expect(0);
+        assert_eq!(results(&p), results(&expected), "{name}");
+        mocban(dir.path(), &["-C", name, "check"]).expect(0);
+    }
+}
+
+#[test]
+fn copies_backups_and_verdict_files_keep_retired_pairs_apart() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    mocban(dir.path(), &["demo", "p", "--pairs", "3"]).expect(0);
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "p"], args].concat());
+    at(&["verdict", "set", PAIRS[1], "pass", "--reviewer", "lan"]).expect(0);
+    at(&["retire", PAIRS[1]]).expect(0);
+    at(&["backup", "b.sqlite"]).expect(0);
+    mocban(dir.path(), &["restore", "b.sqlite", "q"]).expect(0);
+    let status = mocban(dir.path(), &["-C", "q", "status", "--json"]).expect(0);
+    let status = status.json();
+    assert_eq!(
+        (&status["pairs"], &status["retired"]),
+        (&2.into(), &1.into())
+    );
+    // A verdict on a retired pair is refused with the way out, and the log of an export can be imported again.
+    fs::write(
+        dir.path().join("v.csv"),
+        format!("pair,verdict,reviewer\n{},Pass,minh\n", PAIRS[1]),
+    )
+    .expect("written");
+    assert_call(
+        "error_verdict_of_retired_pair",
+        dir.path(),
+        &["-C", "p", "verdict", "import", "v.csv"],
+    );
+    at(&["export", "-o", "out"]).expect(0);
+    let log = fs::read_to_string(dir.path().join("out/verdicts.jsonl")).expect("a log");
+    assert_eq!(log.lines().count(), 4);
+    at(&["verdict", "import", "out/verdicts.jsonl"]).expect(0);
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use mocban_catalog::Catalog;
+use mocban_catalog::{Catalog, RetiredPair};
 use mocban_core::domain::spelling::nearest;
 use mocban_core::domain::{BlockName, PairName, RetireCause};
 use mocban_runner::NamedWork;
@@ -32,8 +32,13 @@ async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> ProjectResult<
     let Some(pair) = retired.iter().find(|pair| names.contains(&pair.name)) else {
         return Ok(());
     };
+    Err(Refusal::NothingSelected(retired_text(pair)).into())
+}
+
+/// Says who retired a pair, and how it comes back.
+pub(crate) fn retired_text(pair: &RetiredPair) -> String {
     let (name, date) = (&pair.name, local(pair.at));
-    let text = match pair.cause {
+    match pair.cause {
         RetireCause::Person => format!(
             "pair {name} was retired on {date}; its results and verdicts are kept, and `retire --undo` brings it back"
         ),
@@ -44,8 +49,7 @@ async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> ProjectResult<
         RetireCause::Labels => format!(
             "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
         ),
-    };
-    Err(Refusal::NothingSelected(text).into())
+    }
 }
 
 /// Looks up pairs by their ids, also retired ones.

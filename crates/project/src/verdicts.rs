@@ -47,10 +47,15 @@ pub async fn import(
     let is_jsonl = files::is_jsonl(file, &bytes);
     let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
     let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
+    // Lines with verdicts on the current results, whatever these are.
+    let mut current_lines = BTreeMap::new();
     for row in list.rows() {
         let row = row.map_err(refused)?;
         verdict_file::check_values(&row, now()).map_err(refused)?;
         let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
+        if row.listed.judged.is_none() {
+            current_lines.entry(pair.clone()).or_insert(row.line);
+        }
         first_lines.entry(pair).or_insert(row.line);
         reviewers.insert(reviewer);
     }
@@ -63,6 +68,12 @@ pub async fn import(
     if !unknown.is_empty() {
         let known = catalog.pair_names().await?;
         verdict_file::refuse_unknown(&first_lines, &unknown, &known).map_err(refused)?;
+    }
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired = retired.filter_map(|pair| Some((*current_lines.get(&pair.name)?, pair)));
+    if let Some((line, pair)) = retired.min_by_key(|(line, _)| *line) {
+        let reason = selection::retired_text(&pair);
+        return Err(refused(RefusedLine::new(line, &reason)).into());
     }
     // All rows were valid in the first pass.
     let rows = list.rows().map(|row| match row {

@@ -4,7 +4,8 @@ use super::block_pairs::{judge, names_of, status_of};
 use super::blocks::{block, character, world};
 use super::{World, fingerprints, name, row};
 use crate::{
-    CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, RetiredPair, StatusCounts,
+    CatalogError, CheckpointOutcome, ImportChunk, ImportSummary, ImportTerms, RetiredPair,
+    StatusCounts,
 };
 use mocban_core::domain::{BlockStage, JobStatus, PairName, RetireCause, Stage, Verdict};
 
@@ -148,6 +149,28 @@ async fn a_list_that_replaces_the_others_retires_pairs_until_a_list_has_them_aga
     );
     assert_eq!(names_of(&retired(&world).await), [name("p3")]);
     world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn an_interrupted_list_that_replaces_the_others_changes_nothing() {
+    let world = World::new(3).await;
+    let before = status(&world).await;
+    let (sender, chunks) = tokio::sync::mpsc::channel(1);
+    let rows = ImportChunk::Rows(vec![row("p0"), row("new")]);
+    sender.try_send(rows).expect("room");
+    drop(sender);
+    let terms = ImportTerms {
+        replace: true,
+        ..ImportTerms::default()
+    };
+    let refused = world.catalog.import_all(chunks, terms, 7).await;
+    assert!(
+        matches!(refused, Err(CatalogError::CutShort)),
+        "{refused:?}"
+    );
+    world.assert_counters().await;
+    assert_eq!(status(&world).await, before);
+    assert!(retired(&world).await.is_empty());
 }
 
 #[tokio::test]
