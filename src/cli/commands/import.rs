@@ -158,7 +158,7 @@ pub(crate) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     for (number, text) in [
         (
             summary.retired,
-            "retired: the list does not have them, and their results are kept",
+            "retired, not in the list; results and verdicts are kept",
         ),
         (summary.restored, "back in every count"),
     ] {

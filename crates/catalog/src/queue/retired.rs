@@ -28,7 +28,7 @@ SELECT CAST(value ->> 0 AS bigint), CAST(value ->> 1 AS bigint), CAST(value ->> 
 ON CONFLICT (pair) DO NOTHING";
 
 /// Builds the statement that gives retired pairs of some names their jobs back, from the condition on the name. If `?2` is
-/// 0, those that a person retired stay retired; so does a pair whose box is gone. A job whose pair changed meanwhile is
+/// 0, pairs that a person retired stay retired; so does a pair whose box is gone. A job whose pair changed meanwhile is
 /// stale, so it is dirty. A pair stays quarantined if its failure is stored. The first condition saves looking up all names.
 macro_rules! restore {
     ($has_name:literal) => {
@@ -165,7 +165,7 @@ pub(crate) async fn retire(
     Ok(removed.len() as u64)
 }
 
-/// Retires the pairs that a list does not have, except for those that were cut from blocks. Returns how many.
+/// Retires the pairs that a list does not have, except for pairs of blocks. Returns how many.
 pub(crate) async fn retire_unlisted(
     conn: &mut Conn,
     listed: &HashSet<i64>,
@@ -185,7 +185,7 @@ pub(crate) async fn retire_unlisted(
 }
 
 /// Gives the retired pairs among these names, a JSON array, their jobs back: for a person, those with a box if they were
-/// cut from a block; otherwise those that no person retired. Returns how many there were.
+/// cut from a block; otherwise those without a person as cause. Returns how many there were.
 pub(crate) async fn restore(
     conn: &mut Conn,
     names: &str,

@@ -43,7 +43,7 @@ pub struct ImportTerms {
     pub truths: Vec<(PairName, Value)>,
     /// Whether most of the known pairs may get another mesh and another print.
     pub changed_files: bool,
-    /// Whether pairs that the list does not have are retired, except for those that were cut from blocks.
+    /// Whether pairs that the list does not have are retired, except for pairs of blocks.
     pub replace: bool,
 }
 

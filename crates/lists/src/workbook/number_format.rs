@@ -83,7 +83,7 @@ impl NumberFormat {
         let is_whole = number.fract() == 0.0 && number.abs() < 1e15;
         match self {
             Self::Date => date(number, is_1904).unwrap_or_else(|| number.to_string()),
-            Self::Digits(whole, decimals) if number >= 0.0 && number < 1e15 => {
+            Self::Digits(whole, decimals) if (0.0..1e15).contains(&number) => {
                 padded(&number.to_string(), whole, decimals)
             }
             _ if is_whole => format!("{number:.0}"),
