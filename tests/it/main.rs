@@ -2,6 +2,7 @@
 
 mod accessible;
 mod agreement;
+mod align_command;
 mod all_pages;
 #[cfg(target_os = "linux")]
 mod attacks;

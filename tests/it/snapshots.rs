@@ -93,34 +93,14 @@ pub(crate) fn imported() -> tempfile::TempDir {
 fn help_of_every_command() {
     let dir = empty();
     assert_call("help", dir.path(), &["--help"]);
-    for command in [
-        &["demo"] as &[&str],
-        &["import"],
-        &["run"],
-        &["status"],
-        &["show"],
-        &["retry"],
-        &["check"],
-        &["backup"],
-        &["db", "init"],
-        &["restore"],
-        &["verdict"],
-        &["verdict", "set"],
-        &["verdict", "import"],
-        &["verdict", "log"],
-        &["verdict", "undo"],
-        &["review"],
-        &["view"],
-        &["agreement"],
-        &["report"],
-        &["export"],
-        &["contact-sheet"],
-        &["config", "show"],
-        &["completions"],
-        &["man"],
-    ] {
-        let name = format!("help_{}", command.join("_").replace('-', "_"));
-        let args = [&["help"], command].concat();
+    let commands = "demo align import run status show retry check backup db_init restore \
+        verdict verdict_set verdict_import verdict_log verdict_undo review \
+        view agreement report export contact-sheet config_show completions \
+        man";
+    for command in commands.split(' ') {
+        let words: Vec<&str> = command.split('_').collect();
+        let name = format!("help_{}", command.replace('-', "_"));
+        let args = [&["help"], &*words].concat();
         // The global options are in the snapshot of `--help`.
         let text = transcript(dir.path(), &args);
         let (own, _) = text

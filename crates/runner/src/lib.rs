@@ -75,7 +75,6 @@ mod run_guard;
 mod run_metrics;
 mod run_plan;
 mod run_selection;
-mod scan_size;
 mod scheduler;
 mod stage_executor;
 mod stage_files;

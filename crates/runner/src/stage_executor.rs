@@ -9,9 +9,8 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
-use crate::scan_size;
-use mocban_align::stages::normalize::{NormalizeError, Normalized, PrintMasks};
-use mocban_align::stages::register::RegisterError;
+use mocban_align::scan_size;
+use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::{Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
@@ -77,7 +76,7 @@ impl PipelineExecutor {
         };
         let face_down = pair.attributes.scanned_face_down;
         let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
-            .map_err(|error| in_file(pair, &pair.attributes.mesh_path, &error.into(), length))?;
+            .map_err(|error| in_file(pair, &error.into(), length))?;
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
@@ -89,7 +88,7 @@ impl PipelineExecutor {
         // This function drops the scan, because no later stage needs it. Another pair can then use the memory.
         let scan = self.inputs.fitted_scan(pair)?;
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
-            .map_err(|error| in_file(pair, &pair.attributes.mesh_path, &error.into(), 0.0))?;
+            .map_err(|error| in_file(pair, &error.into(), 0.0))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
         let output = StageOutput {
             files: vec![png(DEPTH, png_grey16(&map.levels))],
@@ -106,13 +105,8 @@ impl PipelineExecutor {
         let depth = self.inputs.depth_map(pair)?;
         let fit = StageInputs::fit(pair)?;
         let print = self.inputs.print(pair)?.within(fit.print_outline.as_ref());
-        let normalized = pipeline::normalize(&depth, &print, &self.settings).map_err(|error| {
-            let path = match error {
-                NormalizeError::Print(_) => &pair.attributes.print_path,
-                NormalizeError::NoStrokes => &pair.attributes.mesh_path,
-            };
-            in_file(pair, path, &error.into(), scan_size::length_of_map(&depth))
-        })?;
+        let normalized = pipeline::normalize(&depth, &print, &self.settings)
+            .map_err(|error| in_file(pair, &error.into(), scan_size::length_of_map(&depth)))?;
         pair.depth = Some(depth);
         let (outcome, json) = round_trip(&normalized.outcome)?;
         let masks: Vec<_> = normalized.prints.iter().map(PrintMasks::to_grey).collect();
@@ -125,8 +119,7 @@ impl PipelineExecutor {
         };
         pair.normalized = Some(Normalized {
             outcome,
-            // Decoded again, so that a resumed run gives the same results.
-            prints: masks.iter().map(PrintMasks::from_grey).collect(),
+            ..normalized
         });
         Ok(output)
     }
@@ -136,16 +129,7 @@ impl PipelineExecutor {
         let normalized = self.inputs.normalized(pair)?;
         let expected = expected_pose(pair, &depth)?;
         let registered = pipeline::register(&depth, &normalized, expected.as_ref(), &self.settings)
-            .map_err(|error| {
-                // Name the print if the characters do not match. For other errors, the mesh is the likelier cause.
-                let path = match error {
-                    RegisterError::NoMatch { .. } | RegisterError::OtherCharacter { .. } => {
-                        &pair.attributes.print_path
-                    }
-                    _ => &pair.attributes.mesh_path,
-                };
-                in_file(pair, path, &error.into(), scan_size::length_of_map(&depth))
-            })?;
+            .map_err(|error| in_file(pair, &error.into(), scan_size::length_of_map(&depth)))?;
         let (outcome, json) = round_trip(&registered.outcome)?;
         let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
         for (metric, mask) in outcome.metrics.iter().zip(&registered.canvas_depths) {
@@ -187,12 +171,15 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
         .print_from_depth(scale, &fit.plane_from_mesh))
 }
 
-/// Returns the failure of a stage on a file. `length` is that of the scan in its unit, or 0 if it does not matter.
-fn in_file(pair: &PairContext, path: &str, error: &StageError, length: f64) -> ExecutionError {
-    let advice = match error.class() {
-        FailureClass::NoSolution => scan_size::advice(length, pair.attributes.unit),
-        _ => String::new(),
+/// Returns the failure of a stage on the likelier of the two files. `length` is that of the scan in its unit, or 0 if it
+/// does not matter.
+fn in_file(pair: &PairContext, error: &StageError, length: f64) -> ExecutionError {
+    let path = if error.is_of_print() {
+        &pair.attributes.print_path
+    } else {
+        &pair.attributes.mesh_path
     };
+    let advice = scan_size::advice_for(error, length, pair.attributes.unit);
     ExecutionError::failed(error.class(), format!("{path}: {error}{advice}"))
 }
 

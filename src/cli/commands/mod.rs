@@ -1,6 +1,7 @@
 //! The commands, one per file.
 
 pub(crate) mod agreement;
+pub(crate) mod align;
 pub(crate) mod backup;
 pub(crate) mod block_points;
 pub(crate) mod check;

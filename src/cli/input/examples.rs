@@ -3,10 +3,14 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 30] = [
+const EXAMPLES: [(&str, &str); 31] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
+    ),
+    (
+        "align",
+        "mocban align 0117.stl 0117.png\nmocban align 0117.stl 0117.png -o aligned",
     ),
     (
         "import",
