@@ -65,6 +65,13 @@ fn retired_pairs_are_in_no_count_and_come_back() {
     let before = counts(dir.path());
     assert_eq!((before.status, before.report), ([3, 3, 12], [3, 3, 3, 3]));
     shown("retire", &["retire", PAIRS[1]]);
+    let again = at(&["retire", PAIRS[1]]).expect(0);
+    assert!(
+        again.err.starts_with("1 pair retired already\n"),
+        "{}",
+        again.err
+    );
+    at(&["retire", "--undo", PAIRS[0]]).expect(4);
     let without = counts(dir.path());
     assert_eq!((without.status, without.report), ([2, 2, 8], [2, 2, 2, 2]));
     assert_eq!(

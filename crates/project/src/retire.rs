@@ -36,7 +36,8 @@ pub async fn retire(typed: &[String], location: &Location) -> ProjectResult<Reti
 /// Brings retired pairs back, with their results and verdicts.
 ///
 /// # Errors
-/// Returns an error if none comes back, because they have no boxes any more in the labels of their blocks.
+/// Returns an error if none comes back, because none is retired, or they have no boxes any more in the labels of their
+/// blocks.
 pub async fn undo(typed: &[String], location: &Location) -> ProjectResult<RetireOutcome> {
     let (_project, catalog) = location.open().await?;
     let names = named(&catalog, typed).await?;
@@ -44,14 +45,16 @@ pub async fn undo(typed: &[String], location: &Location) -> ProjectResult<Retire
     let still_retired = still_retired(&catalog, &names).await?;
     catalog.close().await;
     let warnings: Vec<String> = still_retired.iter().map(box_is_gone).collect();
-    match warnings.first() {
-        Some(text) if changed == 0 => Err(Refusal::NothingSelected(text.clone()).into()),
-        _ => Ok(RetireOutcome {
-            names,
-            changed,
-            warnings,
-        }),
+    if changed == 0 {
+        let not_retired = || "none of these pairs is retired".to_owned();
+        let text = warnings.into_iter().next().unwrap_or_else(not_retired);
+        return Err(Refusal::NothingSelected(text).into());
     }
+    Ok(RetireOutcome {
+        names,
+        changed,
+        warnings,
+    })
 }
 
 async fn named(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {

@@ -38,7 +38,9 @@ pub(crate) async fn retire(args: RetireArgs, context: &Context) -> ProjectResult
         ("retired", text)
     };
     context.print_json(&json!({"schema": 1, key: changed, "unchanged": others}))?;
-    context.info(&format!("{} {text}", count(changed, "pair")));
+    if changed > 0 {
+        context.info(&format!("{} {text}", count(changed, "pair")));
+    }
     if others > 0 && !args.undo {
         context.info(&format!("{} retired already", count(others, "pair")));
     }
