@@ -32,7 +32,7 @@ use mocban_project::run::{PreparedRun, options};
 use mocban_project::sheets::contact_sheet;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
-use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
+use mocban_store::{SETTINGS_FILE, TargetLock, create_folders, write_atomic};
 
 /// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.
 const SPACING_MM: RangeInclusive<f64> = 0.05..=2.0;
@@ -252,7 +252,7 @@ fn save_settings(dir: &Path, context: &Context) -> ProjectResult<Context> {
     let text = changed_settings(&context.location.settings()?.tree);
     let file = dir.join(SETTINGS_FILE);
     let shown = file.display();
-    std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
+    create_folders(dir).with_context(|| format!("cannot create {}", dir.display()))?;
     let _lock = TargetLock::acquire(&file)?;
     match files::small(&file)? {
         Some(there) if there == text.as_bytes() => {}
