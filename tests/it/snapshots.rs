@@ -93,7 +93,7 @@ pub(crate) fn imported() -> tempfile::TempDir {
 fn help_of_every_command() {
     let dir = empty();
     assert_call("help", dir.path(), &["--help"]);
-    let commands = "demo align import run status show retry check backup db_init restore \
+    let commands = "demo align import run status show retry retire check backup db_init restore \
         verdict verdict_set verdict_import verdict_log verdict_undo review \
         view agreement report export contact-sheet config_show completions \
         man";
