@@ -10,7 +10,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("anyhow", &[]),
     ("clap", &["mocban"]),
     ("fax", &["core"]),
-    ("flate2", &["core"]),
+    ("flate2", &["core", "lists"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),

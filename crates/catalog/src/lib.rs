@@ -82,6 +82,7 @@ pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use queue::provenance::{FingerprintId, InputVersions, PairProvenance};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
+pub use queue::retired::RetiredPair;
 pub use queue::selection::PairSelection;
 pub use queue::shared_runs::SharedSettings;
 pub use queue::staleness::RerunPolicy;
@@ -90,7 +91,7 @@ pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo, WorkerSettings};
 pub use records::append_verdicts::{ImportedVerdicts, ListedVerdict};
 pub use records::checksums::ChecksummedTable;
 pub use records::faulty_rows::{FaultyRow, RowFault};
-pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
+pub use records::import::{ImportChunk, ImportRow, ImportSummary, ImportTerms, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,

@@ -99,11 +99,11 @@ fn refusal(error: &StageError, files: &AlignInput, length: f64) -> Failure {
 fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let opened = open_input(&input, limits.mesh.max_bytes, "limits.mesh.max_bytes");
-    let mut file = opened.map_err(unreadable)?;
+    let mut file = opened.map_err(|error| unreadable(&error))?;
     let (size, name) = (file.size(), path.to_string_lossy());
     match mesh::read_from(&mut file, size, &name, &limits.mesh) {
         Ok(mesh) => Ok(Ok(mesh.into())),
-        Err(mesh::MeshReadError::Io(error)) => Err(unreadable(file.error(error))),
+        Err(mesh::MeshReadError::Io(error)) => Err(unreadable(&file.error(error))),
         Err(mesh::MeshReadError::Mesh(error)) => {
             Ok(Err(Failure::new(error.class(), format!("{name}: {error}"))))
         }
@@ -114,14 +114,14 @@ fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>,
 fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let read = read_input(&input, limits.image.max_bytes, "limits.image.max_bytes");
-    let file = read.map_err(unreadable)?;
+    let file = read.map_err(|error| unreadable(&error))?;
     let decoded = raster::decode(&file.bytes, &limits.image);
     Ok(decoded
         .map(Print::from)
         .map_err(|error| Failure::new(error.class(), format!("{}: {error}", path.display()))))
 }
 
-fn unreadable(error: InputError) -> Refusal {
+fn unreadable(error: &InputError) -> Refusal {
     Refusal::Usage(error.to_string())
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use mocban_store::{Leftover, ReplacementFolder};
+use mocban_store::{Leftover, ReplacementFolder, create_folders};
 
 /// A folder and what it is for.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ impl GeneratedFolder<'_> {
         for (path, bytes) in files {
             let path = folder.path().join(path);
             let parent = path.parent().unwrap_or(folder.path());
-            fs::create_dir_all(parent).with_context(failed)?;
+            create_folders(parent).with_context(failed)?;
             fs::write(path, bytes).with_context(failed)?;
         }
         // Somebody may have put files there in the meantime.

@@ -4,6 +4,7 @@
 //! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
+//! - [`retire`]: takes pairs out of every count, and brings them back
 //! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
 //!   files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
@@ -48,6 +49,7 @@ pub mod missing_files;
 pub mod new_project;
 pub mod report;
 pub mod restore;
+pub mod retire;
 pub mod retry;
 pub mod run;
 pub mod selection;

@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 30] = [
+const EXAMPLES: [(&str, &str); 31] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
@@ -34,6 +34,10 @@ const EXAMPLES: [(&str, &str); 30] = [
     ),
     ("show", "mocban -C blocks show b01-0117"),
     ("retry", "mocban -C blocks retry --class io"),
+    (
+        "retire",
+        "mocban -C blocks retire b01-0117\nmocban -C blocks retire --undo b01-0117",
+    ),
     ("check", "mocban -C blocks check --repair"),
     ("backup", "mocban -C blocks backup blocks.sqlite"),
     (

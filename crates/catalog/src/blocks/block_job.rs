@@ -85,6 +85,7 @@ impl StoredKind for BlockJob {
         ("and_fail", ""),
         ("and_requeue", ""),
         ("and_send_back", ""),
+        ("and_not_retired", ""),
         ("and_recover", ""),
         ("and_overdue", ""),
         ("and_count_claimed", ""),

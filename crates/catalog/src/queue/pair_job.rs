@@ -142,6 +142,10 @@ impl StoredKind for PairJob {
                 go_back_to!("min(job.stage, [1])")
             ),
         ),
+        (
+            "and_not_retired",
+            " AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = [0])",
+        ),
         ("and_recover", ", exclusive = max(exclusive, [1])"),
         ("and_overdue", ", exclusive = 1"),
         ("and_count_claimed", COUNT_CLAIMED),

@@ -145,7 +145,7 @@ impl World {
     }
 
     pub(super) async fn import_block(&self, row: BlockAttributes) {
-        let imported = self.catalog.import_blocks(vec![row], 1).await;
+        let imported = self.catalog.import_blocks(vec![row], false, 1).await;
         imported.expect("imported");
     }
 
@@ -178,7 +178,10 @@ pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> 
 #[tokio::test]
 async fn an_import_is_idempotent_and_names_what_changed() {
     let world = world().await;
-    let again = world.catalog.import_blocks(vec![attributes("b")], 2).await;
+    let again = world
+        .catalog
+        .import_blocks(vec![attributes("b")], false, 2)
+        .await;
     let again = again.expect("imported");
     assert_eq!((again.added, again.unchanged), (0, 1));
     let other = BlockAttributes {
@@ -186,7 +189,7 @@ async fn an_import_is_idempotent_and_names_what_changed() {
         labels_path: None,
         ..attributes("b")
     };
-    let changed = world.catalog.import_blocks(vec![other], 2).await;
+    let changed = world.catalog.import_blocks(vec![other], true, 2).await;
     let changed = changed.expect("imported").changed;
     assert_eq!(changed, [(block("b"), vec!["page", "labels"])]);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);

@@ -70,7 +70,7 @@ async fn a_stage_is_cancelled_when_the_stage_before_it_is_refused() {
         assert_eq!(recovered.expect("a recovery").ready, 1);
         fixture.pairs.open();
     };
-    let summary = fixture.run_during(recovered).await;
+    let summary = Box::pin(fixture.run_during(recovered)).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
     assert_eq!(fixture.pairs.count("outlives_1", Stage::Fit), 2);
     assert_eq!(fixture.pairs.endless.load(Ordering::SeqCst), 0);
@@ -84,7 +84,7 @@ async fn a_stage_of_a_pair_is_cancelled_when_the_heartbeat_is_refused() {
         let worker = fixture.worker_when(computes).await;
         fixture.end_leases_of(worker).await;
     };
-    let summary = fixture.run_during(expired).await;
+    let summary = Box::pin(fixture.run_during(expired)).await;
     assert_eq!((summary.left, summary.failed), (1, 0));
     assert_eq!(fixture.pairs.endless.load(Ordering::SeqCst), 0);
     assert_eq!(fixture.status("loops_1").await, JobStatus::Ready);
@@ -98,7 +98,7 @@ async fn a_stage_of_a_block_is_cancelled_when_the_heartbeat_is_refused() {
         let worker = fixture.worker_when(computes).await;
         fixture.end_leases_of(worker).await;
     };
-    let summary = fixture.run_during(expired).await;
+    let summary = Box::pin(fixture.run_during(expired)).await;
     assert_eq!((summary.blocks.left, summary.blocks.failed), (1, 0));
     assert_eq!(fixture.blocks.endless.load(Ordering::SeqCst), 0);
     assert_eq!(
