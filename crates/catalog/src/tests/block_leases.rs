@@ -1,4 +1,4 @@
-//! Leases of blocks whose workers died.
+//! Leases of blocks that are lost: what a worker stores under them is refused.
 
 use super::blocks::{continued, done, inputs, world};
 use super::register;
