@@ -3,8 +3,8 @@
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
-//! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
-//!   files and rows are sound
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
+//!   block, and whether files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
@@ -43,6 +43,7 @@ pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
+pub mod pair_table;
 pub mod report;
 pub mod restore;
 pub mod retry;
