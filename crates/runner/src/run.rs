@@ -171,7 +171,10 @@ impl RunStart<'_> {
             planned?;
         }
         let left = catalog.work_left(options.until, self.pairs()).await?;
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let blocks = catalog.outstanding_blocks(blocks).await?;
         on_event(RunEvent::Started {
+            blocks: blocks.left(),
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
             by_stage: left.by_stage,
