@@ -8,24 +8,32 @@ use clap::Args;
 use crate::cli::output::context::Context;
 use crate::documentation::web_files;
 use mocban_project::error::WithContext as _;
+use mocban_project::files::refuse_project_file;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::ReplacementFolder;
 
 /// The first page.
 const INDEX: &str = "index.html";
+/// The directory that is written if none is named.
+const DEFAULT_DIR: &str = "mocban-docs";
 
 /// Arguments of `docs`.
 #[derive(Debug, Args)]
 pub(crate) struct DocsArgs {
-    /// The directory to write; pages that this command wrote there earlier are replaced
-    #[arg(default_value = "mocban-docs")]
-    pub(crate) dir: PathBuf,
+    /// The directory to write; pages that this command wrote there earlier are replaced [default: mocban-docs]
+    pub(crate) dir: Option<PathBuf>,
+    /// The same as DIR
+    #[arg(short, long, value_name = "DIR", conflicts_with = "dir")]
+    pub(crate) output: Option<PathBuf>,
 }
 
-pub(crate) fn docs(args: &DocsArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let (dir, shown) = (&args.dir, args.dir.display());
+pub(crate) fn docs(args: DocsArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let dir = args.dir.or(args.output);
+    let dir = &dir.unwrap_or_else(|| PathBuf::from(DEFAULT_DIR));
+    let shown = dir.display();
     let failed = || format!("cannot write the documentation to {shown}");
     let files = web_files();
+    refuse_project_file(dir)?;
     refuse_foreign(dir, &files)?;
     let folder = ReplacementFolder::begin(dir).with_context(failed)?;
     for (path, bytes) in &files {
