@@ -107,7 +107,7 @@ impl PageWords {
         } else {
             Self {
                 contents: "Contents",
-                search: "Search the documentation",
+                search: "Search these pages",
                 found: "{n} sections",
                 previous: "Previous",
                 next: "Next",

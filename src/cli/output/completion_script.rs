@@ -102,7 +102,7 @@ fn with_zsh_names(script: &str) -> String {
             ["':", "'::", "'*::"]
                 .iter()
                 .any(|start| line.starts_with(&format!("{start}{name} -- ")))
-        }) || line.starts_with("'--block=[Draw")
+        }) || line.contains("--block=[Draw")
     };
     let lines = script.lines().map(|line| {
         if line == "_mocban() {" {
