@@ -8,8 +8,8 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use super::commands::{
-    backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import, man,
-    report, restore, retry, review, run, show, status, verdict, view, worker,
+    align, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import,
+    man, report, restore, retire, retry, review, run, show, status, verdict, view, worker,
 };
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
@@ -37,6 +37,8 @@ pub(super) struct Cli {
 pub(super) enum Command {
     /// Create the built-in dataset, run it and print the report
     Demo(demo::DemoArgs),
+    /// Align one scan with one print, without a project
+    Align(align::AlignArgs),
     /// Add pairs of meshes and prints to the project
     Import(import::ImportArgs),
     /// Align the pairs that are not aligned yet
@@ -51,6 +53,8 @@ pub(super) enum Command {
     Show(show::ShowArgs),
     /// Let failed pairs run again
     Retry(retry::RetryArgs),
+    /// Take pairs out of every count, or bring them back; their results and verdicts are kept
+    Retire(retire::RetireArgs),
     /// Check files, rows and counters against each other
     Check(check::CheckArgs),
     /// Copy pairs, results, verdicts and settings to one file, also during a run

@@ -13,8 +13,9 @@ use tokio::runtime::{Builder, Runtime};
 
 use args::Command;
 use commands::{
-    agreement, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export,
-    import, man, report, restore, retry, review, run, show, status, verdict, view, worker,
+    agreement, align, backup, check, completions, config, contact_sheet, copy, db, demo, docs,
+    export, import, man, report, restore, retire, retry, review, run, show, status, verdict, view,
+    worker,
 };
 use input::nearby_projects;
 pub use mocban_project::ExitCode;
@@ -79,6 +80,7 @@ fn runtime(command: &Command) -> std::io::Result<Runtime> {
 async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode> {
     match command {
         Command::Demo(args) => demo::demo(args, context).await,
+        Command::Align(args) => align::align(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
         Command::Plan(args) => worker::plan(args, context).await,
@@ -86,6 +88,7 @@ async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
+        Command::Retire(args) => retire::retire(args, context).await,
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Copy(args) => copy::copy(args, context).await,

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use mocban::export::ExportFormat;
 use mocban::store::Project;
 
 use crate::backup::files as names;
 use crate::check::{at, done};
 use crate::cli::{binary, call};
-use crate::export_readback::FORMATS;
+use crate::export_readback::every_format;
 use crate::fault::{ENOSPC, Fault};
 use crate::uninterrupted::files;
 
@@ -28,6 +29,15 @@ const FILES: [&str; 11] = [
     ".out.*/new/viewer/pairs/*/viewer.html",
     ".out.*/new/export.json",
 ];
+
+#[test]
+fn writes_of_every_format_are_interrupted() {
+    for format in ExportFormat::ALL {
+        let folder = format!(".out.*/new/{format}/");
+        let is_listed = FILES.iter().any(|path| path.starts_with(&folder));
+        assert!(is_listed, "no file of {format}");
+    }
+}
 
 /// How long an interrupted write takes, in milliseconds: until the process is killed.
 const UNTIL_KILLED: u32 = 600_000;
@@ -97,7 +107,7 @@ fn export(root: &Path, out: &str) -> Command {
     let mut command = binary();
     let project = Project::at(&root.join("p"));
     command.arg("-C").arg(project.dir());
-    command.args(["export", "--to", FORMATS, "--images", "-o"]);
+    command.args(["export", "--to", &every_format(), "--images", "-o"]);
     command.arg(root.join(out));
     command
 }

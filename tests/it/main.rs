@@ -2,6 +2,7 @@
 
 mod accessible;
 mod agreement;
+mod align_command;
 mod all_pages;
 #[cfg(target_os = "linux")]
 mod attacks;
@@ -55,6 +56,7 @@ mod hostile;
 #[cfg(target_os = "linux")]
 mod hostile_pairs;
 mod image_pages;
+mod import_snapshots;
 mod invariance;
 mod kill;
 #[cfg(unix)]
@@ -96,6 +98,7 @@ mod refused_writes;
 mod renamed;
 mod report;
 mod resume;
+mod retire;
 mod review_alignment;
 mod review_browser;
 mod review_data;

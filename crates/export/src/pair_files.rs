@@ -200,7 +200,8 @@ fn first_of_each<T>(items: &[T], is_same: impl Fn(&T, &T) -> bool) -> Vec<usize>
     found.collect()
 }
 
-fn sidecar(scale: &DepthScale) -> String {
+/// Returns the text of the file beside a depth map that gives its scale.
+pub(super) fn sidecar(scale: &DepthScale) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,

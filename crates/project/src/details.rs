@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use crate::error::{ProjectError, ProjectResult};
-use crate::exit::Refusal;
 use crate::location::Location;
 use crate::selection;
 use mocban_catalog::{
@@ -32,7 +31,7 @@ pub enum Details {
 pub struct PairOverview {
     /// The pair.
     pub detail: PairDetail,
-    /// Its manual alignments, oldest first, without those that were undone.
+    /// Its manual alignments, oldest first, without the undone ones.
     pub manual: Vec<ManualResult>,
     /// What the next run would do.
     pub next_run: Option<PlanEntry>,
@@ -81,12 +80,6 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
     let fingerprints = fingerprints(&location.settings()?.config.stages);
     let next_run = catalog.why(name, &fingerprints).await?;
     let Some(detail) = catalog.pair(name).await? else {
-        if catalog.retired_pairs().await?.contains(name) {
-            let text = format!(
-                "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
-            );
-            return Err(Refusal::NothingSelected(text).into());
-        }
         let text = format!("pair {name} was removed while it was read");
         return Err(ProjectError::unexpected(text));
     };
@@ -101,7 +94,8 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
 /// Returns the names of all blocks and of all pairs that are not retired.
 pub async fn names(catalog: &Catalog) -> ProjectResult<(Vec<BlockName>, Vec<PairName>)> {
     let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
-    let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired: BTreeSet<PairName> = retired.map(|pair| pair.name).collect();
     pairs.retain(|pair| !retired.contains(pair));
     Ok((blocks, pairs))
 }

@@ -15,7 +15,7 @@ use crate::manifest_file::Listing;
 use crate::missing_files::MissingFiles;
 use crate::new_project::import_with;
 use crate::truth_file::{self, TruthRow};
-use mocban_catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
+use mocban_catalog::{Catalog, ImportChunk, ImportRow, ImportSummary, ImportTerms};
 use mocban_core::domain::{LengthUnit, PairName};
 use mocban_lists::manifest::{ManifestRow, RowIds};
 use mocban_store::Project;
@@ -57,8 +57,19 @@ pub struct PairImport {
     pub source: PairSource,
     /// A file of true alignments, one JSON object per line.
     pub truth: Option<PathBuf>,
-    /// Whether files may be missing; such pairs fail if they are run before the files exist.
-    pub allow_missing: bool,
+    /// What is accepted.
+    pub allowed: AllowedChanges,
+}
+
+/// What an import accepts only if it is asked for.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AllowedChanges {
+    /// Whether files may be missing; such pairs and blocks fail if they are run before the files exist.
+    pub missing: bool,
+    /// Whether most known pairs or blocks may get other files.
+    pub files: bool,
+    /// Whether pairs that the list does not have are retired.
+    pub replace: bool,
 }
 
 /// What an import changed.
@@ -93,7 +104,7 @@ pub async fn import_pairs(
     let list = Arc::new(ImportList {
         listing,
         truths,
-        allow_missing: import.allow_missing,
+        allowed: import.allowed,
     });
     let check = async || check_rows(&project, &list).await;
     let store = async |catalog: &Catalog| store_in(catalog, &project, &list).await;
@@ -110,8 +121,7 @@ pub async fn import_pairs(
 struct ImportList {
     listing: Listing,
     truths: Vec<(PairName, Value)>,
-    /// Whether files may be missing.
-    allow_missing: bool,
+    allowed: AllowedChanges,
 }
 
 /// The summary of an import, the number of stored true alignments, and the missing files.
@@ -126,7 +136,12 @@ async fn store_in(
     let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
     let (project, shared) = (project.clone(), Arc::clone(list));
     let sent = tokio::task::spawn_blocking(move || send_rows(&shared, &project, &sender));
-    let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
+    let terms = ImportTerms {
+        truths: list.truths.clone(),
+        changed_files: list.allowed.files,
+        replace: list.allowed.replace,
+    };
+    let stored = catalog.import_all(rows, terms, now()).await;
     // Return a row's error first, because the catalog then only reports that the list ended early.
     let missing = sent.await.map_err(|error| {
         ProjectError::from(TaskStopped(error)).context("the task that reads the list stopped")
@@ -175,7 +190,7 @@ fn send_rows(
         }
     });
     outcome?;
-    if missing.count > 0 && !list.allow_missing {
+    if missing.count > 0 && !list.allowed.missing {
         return Err(missing.refusal().into());
     }
     for last in [ImportChunk::Rows(chunk), ImportChunk::End] {
@@ -214,16 +229,20 @@ async fn read_truths(
     if others.is_empty() {
         return Ok(truths);
     }
-    let unknown = match location.open_read_only().await {
+    let (unknown, known) = match location.open_read_only().await {
         Ok((_, catalog)) => {
             let unknown = catalog.unknown_names(&others).await?;
+            let known = match unknown.as_slice() {
+                [] => Vec::new(),
+                _ => catalog.pair_names().await?,
+            };
             catalog.close().await;
-            unknown
+            (unknown, known)
         }
-        Err(_) => others,
+        Err(_) => (others, Vec::new()),
     };
     match truths.iter().find(|truth| unknown.contains(&truth.name)) {
-        Some(truth) => Err(truth_file::unknown_pair(truth)
+        Some(truth) => Err(truth_file::unknown_pair(truth, &known)
             .in_file(file, NOT_IMPORTED)
             .into()),
         None => Ok(truths),

@@ -1,16 +1,18 @@
 //! What a command does, without the terminal: the same for the command line, a Python package and a page.
 //!
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
+//! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
+//! - [`retire`]: takes pairs out of every count, and brings them back
 //! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
 //!   block, and whether files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
-//! - [`demo_folder`]: what a demo may replace
-//! - [`events`]: what a function tells its caller while it works
+//! - [`demo_folder`], [`generated_folder`]: what may be replaced
+//! - [`events`]: what a function reports while it works
 //! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
 //!
 //! A function that needs the catalog, the disk or the settings fails if they do. `# Errors` says what else it refuses.
@@ -22,6 +24,7 @@
     reason = "the page of the crate says what can fail in all functions"
 )]
 
+pub mod align;
 pub mod backup;
 pub mod block_status;
 pub mod check;
@@ -35,6 +38,7 @@ pub mod exit;
 pub mod export;
 pub mod failures;
 pub mod files;
+pub mod generated_folder;
 pub mod hosts;
 pub mod import_blocks;
 pub mod import_pairs;
@@ -46,6 +50,7 @@ pub mod new_project;
 pub mod pair_table;
 pub mod report;
 pub mod restore;
+pub mod retire;
 pub mod retry;
 pub mod run;
 pub mod selection;

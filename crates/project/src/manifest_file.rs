@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{find_on_disk, is_windows_path, similar_file};
+use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::missing_files::WINDOWS_HINT;
 use crate::error::ProjectResult;
 use mocban_core::domain::{FileKind, LengthUnit, sanitize};
 use mocban_lists::manifest::{
-    ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
+    ListedFolder, ManifestError, ManifestRow, MisspeltColumns, ReadRows, RowIds, pair_folders,
+    read_csv, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -40,8 +41,8 @@ enum ListingSource {
     Folders(Vec<ManifestRow>),
 }
 
-/// Calls a function for each row; returns the ids of all rows.
-type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
+/// Calls a function for each row; returns the ids of all rows, and which columns have other names.
+type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<ReadRows, ManifestError>;
 
 /// Refuses a manifest as a whole.
 pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
@@ -74,8 +75,9 @@ impl Listing {
         };
         let mut misspelt = MisspeltColumns::default();
         let mut each = |row: ManifestRow| misspelt.add(&row);
-        let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let warnings = misspelt.warnings();
+        let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let mut warnings = misspelt.warnings();
+        warnings.extend(renamed(&read));
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -83,13 +85,13 @@ impl Listing {
                 parse,
                 folder,
             },
-            ids,
+            ids: read.ids,
             warnings,
             row_label: format!("{shown}: line"),
         })
     }
 
-    /// Pairs each mesh of one directory with the print of the same file stem in the other directory.
+    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory.
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
@@ -98,9 +100,13 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> ProjectResult<Self> {
-        let print_files = files::list(prints)?;
-        let unread = unread_images(&print_files);
-        let found = pair_folders(&files::list(meshes)?, &print_files).map_err(|problems| {
+        let listed = |root: &Path| {
+            let root = root.to_owned();
+            files::list_below(&root).map(|files| ListedFolder { root, files })
+        };
+        let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
+        let unread = unread_images(&print_folder.files);
+        let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
             let lines = [&[problems.to_string()][..], &unread].concat();
             refuse(meshes, &lines.join("\n"))
         })?;
@@ -119,7 +125,7 @@ impl Listing {
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.collect(),
+            warnings: warnings.chain(found.similar).collect(),
             row_label: "pair".to_owned(),
         })
     }
@@ -131,21 +137,13 @@ impl Listing {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
         };
-        // A search for a similar name lists a folder, so only the first missing files get one.
-        let mut searches = MAX_SEARCHES;
+        let mut searches = SimilarFiles::default();
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
             let missing = files
                 .filter_map(|(kind, path)| {
-                    let text = locate_file(place, kind, path, &row.name, project)?;
-                    if searches == 0 || path.exists() {
-                        return Some(text);
-                    }
-                    searches -= 1;
-                    let similar = similar_file(path).map(|name| sanitize(&name, MAX_PATH_CHARS));
-                    let hint = similar.map(|name| format!("; there is {name}"));
-                    Some(text + &hint.unwrap_or_default())
+                    locate_file(place, kind, path, &row.name, project, &mut searches)
                 })
                 .collect();
             each(row, missing);
@@ -171,8 +169,18 @@ impl Listing {
     }
 }
 
-/// Maximum number of missing files for which a similar name is searched.
-const MAX_SEARCHES: usize = 10;
+/// Says which columns were read under other names.
+fn renamed(read: &ReadRows) -> Option<String> {
+    let columns = read.renamed.iter();
+    let columns =
+        columns.map(|(written, name)| format!("{:?} as {name}", sanitize(written, MAX_NAME_CHARS)));
+    let columns: Vec<String> = columns.collect();
+    (!columns.is_empty())
+        .then(|| format!("columns with other names were read: {}", columns.join(", ")))
+}
+
+/// Longest name of a column in a message, in characters.
+const MAX_NAME_CHARS: usize = 60;
 
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
@@ -185,6 +193,7 @@ pub fn locate_file(
     path: &mut PathBuf,
     name: &dyn std::fmt::Display,
     project: &Project,
+    searches: &mut SimilarFiles,
 ) -> Option<String> {
     let exists = match path.to_str() {
         Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
@@ -193,7 +202,13 @@ pub fn locate_file(
     let problem = match exists {
         Ok(true) => return None,
         Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
-        Ok(false) => "does not exist".to_owned(),
+        Ok(false) => {
+            let similar = searches
+                .find(path)
+                .map(|path| sanitize(&path, MAX_PATH_CHARS));
+            let hint = similar.map(|path| format!("; there is {path}"));
+            format!("does not exist{}", hint.unwrap_or_default())
+        }
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);

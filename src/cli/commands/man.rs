@@ -9,7 +9,7 @@ use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult, Refusal};
-use mocban_store::{StagingFolder, rename_into_place};
+use mocban_store::{StagingFolder, create_folders, rename_into_place};
 
 /// Arguments of `man`.
 #[derive(Debug, Args)]
@@ -26,7 +26,7 @@ pub(crate) fn man(args: ManArgs, command: Command, context: &Context) -> Project
     let folder = args.dir.or(args.output).unwrap_or_default();
     let dir = folder.display();
     files::refuse_project_file(&folder)?;
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {dir}"))?;
+    create_folders(&folder).with_context(|| format!("cannot create {dir}"))?;
     let failed = || format!("cannot write manual pages to {dir}");
     let staging = StagingFolder::beside(&folder.join("mocban.1")).with_context(failed)?;
     let pages = write_pages(command, staging.path()).with_context(failed)?;

@@ -163,6 +163,11 @@ fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Palette) -> Str
         let text = format!("{pairs} computed with other settings or files than the current ones");
         parts.push(line("stale", &text));
     }
+    if status.counts.retired > 0 {
+        let pairs = count(status.counts.retired, "pair");
+        let text = format!("{pairs} out of every count; results and verdicts are kept");
+        parts.push(line("retired", &text));
+    }
     if status.are_results_missing {
         parts.push(line("files", missing_results::TEXT));
     }
@@ -292,6 +297,7 @@ mod tests {
             counts: StatusCounts {
                 schema: 1,
                 pairs: done + ready,
+                retired: 0,
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,

@@ -90,7 +90,7 @@ function __mocban_names
     set -l words (commandline -opc) (commandline -ct)
     $words[1] completions fish -- $words[2..-1] 2>/dev/null
 end
-complete -c mocban -n "__fish_seen_subcommand_from show view run retry contact-sheet sheet verdict" -a "(__mocban_names)"
+complete -c mocban -n "__fish_seen_subcommand_from show view run retry retire contact-sheet sheet verdict" -a "(__mocban_names)"
 "#;
 
 /// Lets zsh complete names for the arguments that are pairs or blocks, and keeps the whole command line for it.

@@ -23,7 +23,7 @@ pub(crate) struct RunProgress {
     /// Pairs failed.
     pub(crate) failed: u64,
     /// Done and total per stage.
-    pub(crate) by_stage: [(u64, u64); 4],
+    pub(crate) by_stage: [(u64, u64); Stage::COUNT],
     /// The blocks, whose pairs are added to the counts when they are cut.
     pub(crate) blocks: BlockProgress,
 }

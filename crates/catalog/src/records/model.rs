@@ -23,6 +23,8 @@ pub struct StatusCounts {
     pub schema: u32,
     /// Number of pairs.
     pub pairs: u64,
+    /// Number of pairs that a person or a shorter list retired. They are in no other count.
+    pub retired: u64,
     /// Number of pairs by job status, all statuses included.
     pub jobs: BTreeMap<JobStatus, u64>,
     /// Number of pairs by stage, all stages included.

@@ -145,7 +145,7 @@ impl World {
     }
 
     pub(super) async fn import_block(&self, row: BlockAttributes) {
-        let imported = self.catalog.import_blocks(vec![row], 1).await;
+        let imported = self.catalog.import_blocks(vec![row], false, 1).await;
         imported.expect("imported");
     }
 
@@ -178,7 +178,10 @@ pub(super) fn stored(added: u64, changed: u64, unchanged: u64, retired: u64) -> 
 #[tokio::test]
 async fn an_import_is_idempotent_and_names_what_changed() {
     let world = world().await;
-    let again = world.catalog.import_blocks(vec![attributes("b")], 2).await;
+    let again = world
+        .catalog
+        .import_blocks(vec![attributes("b")], false, 2)
+        .await;
     let again = again.expect("imported");
     assert_eq!((again.added, again.unchanged), (0, 1));
     let other = BlockAttributes {
@@ -186,7 +189,7 @@ async fn an_import_is_idempotent_and_names_what_changed() {
         labels_path: None,
         ..attributes("b")
     };
-    let changed = world.catalog.import_blocks(vec![other], 2).await;
+    let changed = world.catalog.import_blocks(vec![other], true, 2).await;
     let changed = changed.expect("imported").changed;
     assert_eq!(changed, [(block("b"), vec!["page", "labels"])]);
     assert_eq!(world.catalog.faulty_rows().await.expect("a read"), []);
@@ -409,9 +412,22 @@ async fn the_lease_of_a_dead_worker_is_recovered_and_its_writes_are_refused() {
         .await;
     assert_eq!(recovered.expect("a recovery").blocks, 1);
     let stage = done(&work, BlockStage::Face);
+    let lost = lease.clone();
     let late = world.catalog.checkpoint_block(lease, stage.clone()).await;
     assert_eq!(late.expect("a reply"), CheckpointOutcome::LeaseLost);
+    let [kept, late_ones] = ["mesh", "other"].map(|mesh| inputs([mesh, "page", "labels"]));
+    let store = async |lease: &Lease<BlockJob>, seen: &BlockInputVersions| {
+        let stored = world
+            .catalog
+            .store_leased_inputs(lease.clone(), seen.clone(), 0);
+        stored.await.expect("a reply")
+    };
+    assert!(!store(&lost, &late_ones).await);
     let (lease, _) = world.claim_block(other).await.expect("a ready block");
+    assert!(store(&lease, &kept).await);
+    assert!(!store(&lost, &late_ones).await);
+    let known = world.catalog.known_blocks().await.expect("a read");
+    assert_eq!(known[0].inputs, kept);
     let advanced = world
         .catalog
         .checkpoint_block(lease.clone(), stage.clone())

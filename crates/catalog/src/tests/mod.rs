@@ -14,6 +14,7 @@ mod model;
 mod place;
 mod protocol;
 mod recovery;
+mod retired;
 mod schema;
 mod server_plans;
 mod set_apart;

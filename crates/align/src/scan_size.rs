@@ -1,7 +1,8 @@
 //! Recognizes scans of an unexpected size: a whole block that was given as one character, or a wrong unit.
 
-use mocban_core::domain::LengthUnit;
+use crate::stages::StageError;
 use mocban_core::domain::cancel::polled;
+use mocban_core::domain::{FailureClass, LengthUnit};
 use mocban_core::mesh::Vertices;
 use mocban_core::mesh::robust_bounds::{bulk_box, is_in_box};
 use mocban_core::raster::DepthMap;
@@ -12,7 +13,7 @@ const BLOCK_MM: std::ops::RangeInclusive<f64> = 120.0..=1_000.0;
 /// Returns the advice for a scan that is as long as a whole block: a part of a sentence, or nothing for other scans.
 ///
 /// `length` is in units of the mesh; an unknown unit counts as millimetres.
-pub(crate) fn advice(length: f64, unit: Option<LengthUnit>) -> String {
+fn advice(length: f64, unit: Option<LengthUnit>) -> String {
     let length_mm = length * unit.map_or(1.0, LengthUnit::mm);
     if !BLOCK_MM.contains(&length_mm) {
         return String::new();
@@ -22,6 +23,14 @@ pub(crate) fn advice(length: f64, unit: Option<LengthUnit>) -> String {
     )
 }
 
+/// Returns the advice of [`advice`] for an error of a stage that found no solution, nothing for other errors.
+pub fn advice_for(error: &StageError, length: f64, unit: Option<LengthUnit>) -> String {
+    match error.class() {
+        FailureClass::NoSolution => advice(length, unit),
+        _ => String::new(),
+    }
+}
+
 /// Lengths that a scan of a character or block can have, mm.
 const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
 
@@ -29,7 +38,7 @@ const POSSIBLE_MM: std::ops::RangeInclusive<f64> = 0.5..=10_000.0;
 const USUAL_MM: std::ops::RangeInclusive<f64> = 5.0..=1_000.0;
 
 /// Returns why the unit of a scan must be wrong, or `None` if it may be right. `length` is in units of the mesh.
-pub(crate) fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
+pub fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String> {
     let unit = unit?;
     let length_mm = length * unit.mm();
     if length == 0.0 || POSSIBLE_MM.contains(&length_mm) {
@@ -49,7 +58,7 @@ pub(crate) fn wrong_unit(length: f64, unit: Option<LengthUnit>) -> Option<String
 }
 
 /// Returns the longest side of the bounding box of vertices without distant specks, in units of the mesh.
-pub(crate) fn length_of(vertices: &Vertices) -> f64 {
+pub fn length_of(vertices: &Vertices) -> f64 {
     let bulk = match vertices {
         Vertices::Single(all) => bulk_box(all),
         Vertices::Double(all) => bulk_box(all),
@@ -67,7 +76,7 @@ pub(crate) fn length_of(vertices: &Vertices) -> f64 {
 }
 
 /// Returns the longer side of a depth map, in units of the mesh.
-pub(crate) fn length_of_map(depth: &DepthMap) -> f64 {
+pub fn length_of_map(depth: &DepthMap) -> f64 {
     let pixels = depth.levels.width().max(depth.levels.height());
     pixels as f64 * depth.scale.mesh_unit_per_px
 }
