@@ -70,7 +70,7 @@ impl Context {
         }
     }
 
-    /// Writes a warning to stderr, also with `-q`. Of equal ones, only the first is written, unless `-v` is given.
+    /// Writes a warning to stderr, also with `-q`. Of equal ones, only the first few are written, unless `-v` is given.
     pub(crate) fn warn(&self, text: &str) {
         let label = format!("{} ", self.stderr.paint(Tone::Warn, "warning:"));
         if self.global.verbose > 0 {

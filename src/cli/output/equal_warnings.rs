@@ -1,10 +1,10 @@
-//! Collapses warnings that differ only in names, numbers and paths: the first is shown, the others are counted.
+//! Collapses warnings that differ only in names, numbers and paths: the first ones are shown, the others are counted.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Further warnings that are shown in full if there are not more.
-const SHOWN_IN_FULL: usize = 2;
+/// Warnings of a kind that are shown in full.
+const SHOWN_IN_FULL: u64 = 3;
 /// A warning that comes this long after the last one of its kind is shown at once, because it may be news.
 const OLD: Duration = Duration::from_secs(10);
 /// Largest number of kinds. Warnings of further kinds are all shown.
@@ -13,84 +13,73 @@ const MAX_KINDS: usize = 1000;
 /// The warnings of a command.
 #[derive(Debug, Default)]
 pub(crate) struct EqualWarnings {
-    kinds: BTreeMap<String, HeldWarnings>,
+    kinds: BTreeMap<String, WarningKind>,
     /// The kind of the last line that was shown.
     last: Option<String>,
 }
 
-/// Warnings of a kind that are not shown yet.
+/// The warnings of a kind.
 #[derive(Debug)]
-struct HeldWarnings {
+struct WarningKind {
     label: String,
-    /// The warning of this kind that was shown.
+    /// The first one.
     first: String,
     shown_at: Instant,
-    /// The first ones that are held back.
-    held: Vec<String>,
-    count: usize,
+    /// Number of those that were shown in full.
+    shown: u64,
+    /// Number of those that were only counted since.
+    counted: u64,
 }
 
-impl HeldWarnings {
-    /// Returns the lines for what is held back, and holds nothing any more.
-    fn take(&mut self, follows: bool) -> Vec<String> {
-        let (held, count) = (
-            std::mem::take(&mut self.held),
-            std::mem::take(&mut self.count),
-        );
-        let label = &self.label;
-        if count <= SHOWN_IN_FULL {
-            return held.iter().map(|text| format!("{label}{text}")).collect();
-        }
-        vec![if follows {
-            format!("{label}{count} more like this one; -v shows all")
-        } else {
-            format!("{label}{count} more like this one: {}", self.first)
-        }]
+impl WarningKind {
+    /// Returns the line for what was only counted, and counts anew.
+    fn take(&mut self, follows: bool) -> Option<String> {
+        let (label, counted) = (&self.label, std::mem::take(&mut self.counted));
+        (counted > 0).then(|| {
+            if follows {
+                format!("{label}{counted} more like this one; -v shows all")
+            } else {
+                format!("{label}{counted} more like this one: {}", self.first)
+            }
+        })
     }
 }
 
 impl EqualWarnings {
     /// Adds a warning. Returns the lines to show now.
     pub(crate) fn add(&mut self, label: &str, text: &str, now: Instant) -> Vec<String> {
-        let kind = kind_of(text);
-        let is_room = self.kinds.len() < MAX_KINDS;
-        let line = || format!("{label}{text}");
-        match self.kinds.get_mut(&kind) {
-            Some(warnings) if now.duration_since(warnings.shown_at) < OLD => {
-                if warnings.held.len() < SHOWN_IN_FULL {
-                    warnings.held.push(text.to_owned());
-                }
-                warnings.count += 1;
-                Vec::new()
+        let name = kind_of(text);
+        let mut lines = Vec::new();
+        if let Some(kind) = self.kinds.get_mut(&name) {
+            if now.duration_since(kind.shown_at) >= OLD {
+                lines.extend(kind.take(false));
+                kind.shown = 0;
             }
-            Some(warnings) => {
-                let mut lines = warnings.take(false);
-                lines.push(line());
-                warnings.shown_at = now;
-                lines
+            if kind.shown == SHOWN_IN_FULL {
+                kind.counted += 1;
+                return lines;
             }
-            None => {
-                if is_room {
-                    let warnings = HeldWarnings {
-                        label: label.to_owned(),
-                        first: text.to_owned(),
-                        shown_at: now,
-                        held: Vec::new(),
-                        count: 0,
-                    };
-                    self.kinds.insert(kind.clone(), warnings);
-                }
-                self.last = Some(kind);
-                vec![line()]
-            }
+            (kind.shown, kind.shown_at) = (kind.shown + 1, now);
+        } else if self.kinds.len() < MAX_KINDS {
+            let kind = WarningKind {
+                label: label.to_owned(),
+                first: text.to_owned(),
+                shown_at: now,
+                shown: 1,
+                counted: 0,
+            };
+            self.kinds.insert(name.clone(), kind);
         }
+        self.last = Some(name);
+        lines.push(format!("{label}{text}"));
+        lines
     }
 
-    /// Returns the lines for all that is held back.
+    /// Returns the lines for all that was only counted.
     pub(crate) fn take(&mut self) -> Vec<String> {
         let last = self.last.take();
         let kinds = self.kinds.iter_mut();
-        let lines = kinds.flat_map(|(kind, warnings)| warnings.take(last.as_ref() == Some(kind)));
+        let lines = kinds.filter_map(|(name, kind)| kind.take(last.as_ref() == Some(name)));
         lines.collect()
     }
 }
@@ -118,42 +107,39 @@ mod tests {
     }
 
     #[test]
-    fn a_hundred_equal_warnings_are_one_with_a_count() {
+    fn a_hundred_equal_warnings_are_a_few_with_a_count() {
         let (mut warnings, now) = (EqualWarnings::default(), Instant::now());
         let mut add = |text: &str| warnings.add("warning: ", text, now);
-        assert_eq!(add(&lost(0)), [format!("warning: {}", lost(0))]);
-        for number in 1..100 {
+        for number in 0..3 {
+            assert_eq!(add(&lost(number)), [format!("warning: {}", lost(number))]);
+        }
+        for number in 3..100 {
             assert!(add(&lost(number)).is_empty());
         }
         assert_eq!(add("b1 has no page"), ["warning: b1 has no page"]);
-        let first = format!("warning: 99 more like this one: {}", lost(0));
-        assert_eq!(warnings.take(), [first]);
+        let count = format!("warning: 97 more like this one: {}", lost(0));
+        assert_eq!(warnings.take(), [count]);
         assert!(warnings.take().is_empty());
     }
 
     #[test]
-    fn few_equal_warnings_are_all_shown() {
+    fn a_count_that_follows_its_warnings_does_not_repeat_them() {
         let (mut warnings, now) = (EqualWarnings::default(), Instant::now());
-        for number in 0..3 {
+        for number in 0..5 {
             warnings.add("", &lost(number), now);
         }
-        assert_eq!(warnings.take(), [lost(1), lost(2)]);
-        for number in 3..7 {
-            warnings.add("", &lost(number), now);
-        }
-        assert_eq!(
-            warnings.take(),
-            [format!("4 more like this one: {}", lost(0))]
-        );
+        assert_eq!(warnings.take(), ["2 more like this one; -v shows all"]);
     }
 
     #[test]
     fn a_warning_after_a_while_is_news() {
         let (mut warnings, now) = (EqualWarnings::default(), Instant::now());
-        warnings.add("", &lost(0), now);
-        warnings.add("", &lost(1), now + Duration::from_secs(5));
-        let later = warnings.add("", &lost(2), now + Duration::from_secs(11));
-        assert_eq!(later, [lost(1), lost(2)]);
+        for number in 0..5 {
+            warnings.add("", &lost(number), now);
+        }
+        let later = warnings.add("", &lost(5), now + Duration::from_secs(11));
+        let count = format!("2 more like this one: {}", lost(0));
+        assert_eq!(later, [count, lost(5)]);
         assert!(warnings.take().is_empty());
     }
 

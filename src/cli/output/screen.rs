@@ -55,7 +55,7 @@ impl Screen {
         }
     }
 
-    /// Writes a warning, or counts it if an equal one was written before.
+    /// Writes a warning, or counts it if equal ones were written before.
     pub(crate) fn warning(&self, label: &str, text: &str) {
         let lines = self.warnings().add(label, text, Instant::now());
         lines.iter().for_each(|line| self.line(line));
