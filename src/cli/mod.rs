@@ -54,7 +54,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => report_error(&error, &context),
     };
-    panics::catch(work, |text| context.error(text, ExitCode::Error))
+    let code = panics::catch(work, |text| context.error(text, ExitCode::Error));
+    context.screen.count_warnings();
+    code
 }
 
 fn start(command: Command, context: &Context) -> ProjectResult<ExitCode> {
@@ -100,9 +102,9 @@ async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode
         Command::Export(args) => export::export(args, context).await,
         Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
-        Command::Completions(args) => completions::completions(&args, args::command()),
-        Command::Docs(args) => docs::docs(&args, context),
-        Command::Man(args) => man::man(&args, args::command(), context),
+        Command::Completions(args) => completions::completions(&args, args::command()).await,
+        Command::Docs(args) => docs::docs(args, context),
+        Command::Man(args) => man::man(args, args::command(), context),
     }
 }
 

@@ -16,9 +16,10 @@ use crate::fault::{ENOSPC, Fault};
 use crate::uninterrupted::files;
 
 /// Files of each format, whose writes are interrupted.
-const FILES: [&str; 10] = [
+const FILES: [&str; 11] = [
     ".out.*/new/jsonl/pairs/*",
     ".out.*/new/csv/pairs.csv",
+    ".out.*/new/csv/matrices.csv",
     ".out.*/new/parquet/pairs.parquet",
     ".out.*/new/huggingface/data/*",
     ".out.*/new/webdataset/*.tar",

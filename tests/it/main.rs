@@ -79,6 +79,8 @@ mod odd;
 #[cfg(unix)]
 mod old_snapshots;
 mod one_pair;
+#[cfg(unix)]
+mod outputs;
 mod page;
 mod parsers;
 mod place_owner;

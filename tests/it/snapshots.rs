@@ -220,6 +220,8 @@ fn finished_project() {
         dir.path(),
         &["-C", "p", "sheet", "--json"],
     );
+    at("status_pairs", &["status", "--pairs"]);
+    at("show_low_none", &["show", "--low"]);
     at("export", &["export", "-o", "out"]);
     at("export_csv", &["export", "--to", "csv", "-o", "csv"]);
     at("agreement_without_pairs_in_common", &["agreement"]);

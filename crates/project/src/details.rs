@@ -100,6 +100,26 @@ pub async fn names(catalog: &Catalog) -> ProjectResult<(Vec<BlockName>, Vec<Pair
     Ok((blocks, pairs))
 }
 
+/// Returns the first ids of blocks, and of pairs unless `only_blocks` is set, that begin with a text.
+pub async fn names_with_prefix(
+    location: &Location,
+    prefix: &str,
+    only_blocks: bool,
+    limit: usize,
+) -> ProjectResult<Vec<String>> {
+    let (_, catalog) = location.open_read_only().await?;
+    let blocks = catalog.block_names().await?.into_iter();
+    let blocks = blocks.map(|name| name.to_string());
+    let mut names: Vec<String> = blocks.filter(|name| name.starts_with(prefix)).collect();
+    if !only_blocks {
+        let pairs = catalog.pair_names_with_prefix(prefix, limit).await?;
+        names.extend(pairs.iter().map(PairName::to_string));
+    }
+    catalog.close().await;
+    names.truncate(limit);
+    Ok(names)
+}
+
 async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,

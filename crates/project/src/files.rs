@@ -12,7 +12,8 @@ use mocban_core::domain::{ErrorCode, sanitize};
 use mocban_export::EXPORT_MANIFEST;
 use mocban_lists::workbook::{is_workbook, read_sheet};
 use mocban_store::{
-    CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
+    CATALOG_FILE, Project, SETTINGS_FILE, create_folders, open_regular, read_file_or_pipe,
+    write_atomic,
 };
 
 /// Longest list that is read, in bytes.
@@ -91,25 +92,21 @@ pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     Ok(Some(bytes))
 }
 
-/// Refuses to write into a folder that does not exist.
-pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    match folder.filter(|folder| matches!(metadata(folder), Ok(None))) {
+/// Creates the folder of a file that will be written.
+pub fn create_parent(path: &Path) -> ProjectResult<()> {
+    let parent = path.parent();
+    match parent.filter(|folder| !folder.as_os_str().is_empty()) {
         None => Ok(()),
-        Some(folder) => Err(Refusal::Usage(format!(
-            "{} cannot be written, because there is no folder {}; create it first",
-            path.display(),
-            folder.display()
-        ))),
+        Some(folder) => create_folders(folder).with_context(|| {
+            let (shown, folder) = (path.display(), folder.display());
+            format!("cannot write {shown}, because the folder {folder} cannot be created")
+        }),
     }
 }
 
-/// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
+/// Refuses to write over a catalog, a backup, or another file that a project needs, or into its folder of results.
 pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
-    refuse_missing_folder(path)?;
-    let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let real = real_path(path);
     let name = real.file_name().unwrap_or_default().to_string_lossy();
     let is_known = name.starts_with(CATALOG_FILE)
         || [SETTINGS_FILE, "run.lock", "run.members"].contains(&&*name);
@@ -117,6 +114,8 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     let folder = Path::new(".").join(real.parent().unwrap_or(&real));
     let reason = if is_known && folder.join(CATALOG_FILE).exists() {
         "is a file of a project"
+    } else if is_among_results(&real) {
+        "belongs to the results of a project"
     } else if is_backup(&real).unwrap_or(false) {
         "is a backup"
     } else {
@@ -128,7 +127,33 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     )))
 }
 
-/// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
+/// Returns the absolute path of a file that need not exist, without links.
+fn real_path(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let found = absolute.ancestors().find_map(|folder| {
+        let below = absolute.strip_prefix(folder).ok()?;
+        let real = folder.canonicalize().ok()?;
+        // Joining an empty path would add a separator.
+        Some(if below == Path::new("") {
+            real
+        } else {
+            real.join(below)
+        })
+    });
+    found.unwrap_or(absolute)
+}
+
+/// Returns whether a path is the folder of results of a project, or inside it.
+fn is_among_results(real: &Path) -> bool {
+    real.ancestors().any(|folder| {
+        let project = folder.parent().map(Project::at);
+        project.is_some_and(|project| {
+            project.artifacts_dir() == folder && project.catalog_path().exists()
+        })
+    })
+}
+
+/// Refuses to write over a file of a project, or over an input of its pairs and blocks.
 pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
@@ -175,7 +200,7 @@ pub fn is_backup(file: &Path) -> std::io::Result<bool> {
 }
 
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
-/// complete.
+/// complete. Creates the folder of the file.
 pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResult<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
@@ -185,6 +210,7 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResu
         );
         return Err(Refusal::Incomplete(text).into());
     }
+    create_parent(path)?;
     write_atomic(path, bytes).with_context(failed)
 }
 

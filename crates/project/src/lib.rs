@@ -5,8 +5,8 @@
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
 //! - [`retire`]: takes pairs out of every count, and brings them back
-//! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
-//!   files and rows are sound
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
+//!   block, and whether files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
@@ -47,6 +47,7 @@ pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
+pub mod pair_table;
 pub mod report;
 pub mod restore;
 pub mod retire;

@@ -20,6 +20,8 @@ pub enum RunEvent {
         stages: u64,
         /// Pairs that each stage has to run for.
         by_stage: [u64; Stage::COUNT],
+        /// Blocks with stages to run. Their pairs are counted when they are cut, not here.
+        blocks: u64,
         /// Pairs computed at the same time.
         workers: usize,
     },

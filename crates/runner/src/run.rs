@@ -173,7 +173,10 @@ impl RunStart<'_> {
         }
         let (until, pairs) = (options.until, self.pairs());
         let left = retried!(catalog.work_left(until, pairs))?;
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let blocks = retried!(catalog.outstanding_blocks(blocks))?;
         on_event(RunEvent::Started {
+            blocks: blocks.left(),
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
             by_stage: left.by_stage,

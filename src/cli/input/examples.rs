@@ -30,9 +30,12 @@ const EXAMPLES: [(&str, &str); 31] = [
     ),
     (
         "status",
-        "mocban -C blocks status --watch\nmocban -C blocks status --hosts",
+        "mocban -C blocks status --watch\nmocban -C blocks status --pairs\nmocban -C blocks status --hosts",
     ),
-    ("show", "mocban -C blocks show b01-0117"),
+    (
+        "show",
+        "mocban -C blocks show b01-0117\nmocban -C blocks show --low",
+    ),
     ("retry", "mocban -C blocks retry --class io"),
     (
         "retire",

@@ -127,6 +127,11 @@ SELECT CAST(atom AS bigint), 0, 0 FROM json_each(?1)
 WHERE NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = CAST(atom AS bigint))
 ON CONFLICT (pair) DO NOTHING";
 
+/// Pairs with a job whose names are between two texts, so that an index finds them.
+const WITH_PREFIX: &str = "
+SELECT p.name FROM pair AS p JOIN job AS j ON j.pair = p.id
+WHERE p.name >= ?1 AND p.name < ?2 ORDER BY p.name LIMIT ?3";
+
 impl Catalog {
     /// Imports streamed rows, and true alignments, in one transaction. Adds new pairs and updates existing ones. If a
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
@@ -184,6 +189,18 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
         names.fetch_all(&mut conn).await
+    }
+
+    /// Returns the first names that begin with a text, sorted, without those of retired pairs.
+    pub async fn pair_names_with_prefix(
+        &self,
+        prefix: &str,
+        limit: usize,
+    ) -> Result<Vec<PairName>> {
+        let mut conn = self.read_conn().await?;
+        let names = query_scalar(WITH_PREFIX).bind(prefix);
+        let names = names.bind(format!("{prefix}{}", char::MAX));
+        names.bind(limit as i64).fetch_all(&mut conn).await
     }
 
     /// Returns the unknown names among `names`, in the given order.
