@@ -133,5 +133,6 @@ mod tiff_kinds;
 #[cfg(unix)]
 mod tls_to_server;
 mod uninterrupted;
+mod unusual_scans;
 #[cfg(unix)]
 mod watch_workers;

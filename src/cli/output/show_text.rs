@@ -9,6 +9,7 @@ use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     ThresholdMetric, Verdict, one_line,
 };
+use mocban_core::mesh::missing_sentence;
 use mocban_project::time_text::{duration, local};
 use mocban_report::ManualCorrection;
 use mocban_store::Project;
@@ -202,8 +203,12 @@ fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
         Some(_) => format!(", curvature {:.3} {unit}", fit.bow_height),
         None => String::new(),
     };
+    let missing = match fit.missing_vertices {
+        0 => String::new(),
+        missing => format!("; {}", missing_sentence(missing)),
+    };
     format!(
-        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
+        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles{missing}",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }

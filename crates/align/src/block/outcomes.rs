@@ -15,6 +15,9 @@ pub struct FaceOutcome {
     pub unit: LengthUnit,
     /// Triangles of the scan.
     pub triangles: u64,
+    /// Number of vertices of the scan that were left out because they have no position.
+    #[serde(default)]
+    pub missing_vertices: u64,
     /// The faces that were found.
     pub faces: Vec<FoundFace>,
 }

@@ -264,6 +264,7 @@ mod tests {
             print_outline: None,
             vertices: 0,
             triangles: 0,
+            missing_vertices: 0,
         }
     }
 

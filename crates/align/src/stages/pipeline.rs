@@ -68,10 +68,12 @@ pub fn fit(
     scanned_face_down: Option<bool>,
     settings: &Settings,
 ) -> Result<FitOutcome, FitError> {
-    match settings.pipeline.method {
+    let mut outcome = match settings.pipeline.method {
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
-    }
+    }?;
+    outcome.missing_vertices = scan.missing();
+    Ok(outcome)
 }
 
 /// Prepares print and depth map for registration.

@@ -30,7 +30,7 @@ pub enum FileKind {
     Binary,
 }
 
-const SIGNATURES: [(&[u8], FileKind); 28] = [
+const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\xff\xd8\xff", FileKind::Jpeg),
     (b"II*\0", FileKind::Tiff),
@@ -43,13 +43,23 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"\0\0\0\x0cjP  ", FileKind::OtherImage("a JPEG 2000 image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
-    (b"glTF", FileKind::OtherMesh("a binary glTF scene")),
-    (b"OFF\n", FileKind::OtherMesh("an OFF mesh")),
-    (b"OFF\r", FileKind::OtherMesh("an OFF mesh")),
+    (b"glTF", GLTF),
     (b"Kaydara FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"; FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"BLENDER", FileKind::OtherMesh("a Blender scene")),
+    (b"PXR-USDC", FileKind::OtherMesh("a USD scene")),
+    (b"#usda", FileKind::OtherMesh("a USD scene")),
+    (b"ISO-10303-21", FileKind::OtherMesh("a STEP model")),
     (b"#VRML", FileKind::OtherMesh("a VRML scene")),
     (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
     (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
+    (b"ASTM-E57", FileKind::OtherMesh("an E57 point cloud")),
+    (b"version https://git-lfs", LFS_POINTER),
+    (b"version https://hawser", LFS_POINTER),
+    (
+        b"/annex/objects/",
+        FileKind::Other("a git-annex pointer, whose content `git annex get` fetches"),
+    ),
     (b"%PDF", FileKind::Other("a PDF document")),
     (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
     (b"\x1f\x8b", FileKind::Other("a gzip archive")),
@@ -60,6 +70,14 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"\xfe\xff", FileKind::Other("UTF-16 text")),
     (b"<", FileKind::Other("XML or HTML text")),
 ];
+
+const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
+/// Stands in a clone of a Git repository for a large file whose content was not downloaded.
+const LFS_POINTER: FileKind =
+    FileKind::Other("a Git LFS pointer, whose content `git lfs pull` fetches");
+
+/// Bytes at the beginning and the end of a container that are searched for the name of its content.
+const SEARCHED_BYTES: usize = 1 << 16;
 
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
@@ -76,10 +94,32 @@ impl FileKind {
                 "a HEIC image"
             });
         }
-        SIGNATURES
+        let found = SIGNATURES
             .iter()
             .find(|(signature, _)| bytes.starts_with(signature))
-            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind)
+            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind);
+        Self::scene_within(found, bytes).unwrap_or(found)
+    }
+
+    /// Returns the 3D format whose files are archives, XML or text.
+    fn scene_within(outer: Self, bytes: &[u8]) -> Option<Self> {
+        let part = bytes.len().min(SEARCHED_BYTES);
+        let (head, tail) = (&bytes[..part], &bytes[bytes.len() - part..]);
+        let has = |word: &str| {
+            let mut places = head.windows(word.len()).chain(tail.windows(word.len()));
+            places.any(|place| place == word.as_bytes())
+        };
+        let name = match outer {
+            Self::Other("a ZIP archive") if has("3D/3dmodel.model") => "a 3MF model",
+            Self::Other("XML or HTML text") if has("<COLLADA") => "a COLLADA scene",
+            Self::Other("XML or HTML text") if has("<X3D") => "an X3D scene",
+            Self::Text if is_off(head) => "an OFF mesh",
+            Self::Text if head.trim_ascii_start().starts_with(b"{") => {
+                return (has("\"asset\"") && has("\"version\"")).then_some(GLTF);
+            }
+            _ => return None,
+        };
+        Some(Self::OtherMesh(name))
     }
 
     fn without_signature(bytes: &[u8]) -> Self {
@@ -113,6 +153,21 @@ impl FileKind {
     }
 }
 
+/// Returns whether the first word of a text, which comments may precede, is `OFF` or names one of its variants.
+fn is_off(text: &[u8]) -> bool {
+    let mut lines = text.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let is_content = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"#");
+    let first = lines.find(is_content).unwrap_or_default();
+    let mut words = first.split(u8::is_ascii_whitespace);
+    let Some(mut variant) = words.next().and_then(|word| word.strip_suffix(b"OFF")) else {
+        return false;
+    };
+    for prefix in [&b"ST"[..], b"C", b"N", b"4", b"n"] {
+        variant = variant.strip_prefix(prefix).unwrap_or(variant);
+    }
+    variant.is_empty()
+}
+
 impl std::fmt::Display for FileKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.description())
@@ -136,7 +191,72 @@ mod tests {
             FileKind::of(b"\0\0\0\x1cftypheic"),
             FileKind::OtherImage("a HEIC image")
         );
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+        assert_eq!(
+            FileKind::of(pointer).to_string(),
+            "a Git LFS pointer, whose content `git lfs pull` fetches"
+        );
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
+    }
+
+    #[test]
+    fn all_files_of_a_scene_format_have_one_description() {
+        let zip = |name: &str| [b"PK\x03\x04", &[b'x'; 99_999][..], name.as_bytes()].concat();
+        let embedded = format!(
+            "{{\"buffers\":[{{\"uri\":\"data:{}\"}}],\"asset\":{{\"version\":\"2.0\"}}}}",
+            "A".repeat(9999)
+        );
+        for (wanted, files) in [
+            (
+                "a glTF scene",
+                vec![
+                    b"glTF\x02\0\0\0".to_vec(),
+                    b" {\n \"asset\": {\"version\": \"2.0\"}, \"meshes\": []}".to_vec(),
+                    embedded.into_bytes(),
+                ],
+            ),
+            (
+                "an OFF mesh",
+                [
+                    "OFF\n3 1 0\n",
+                    "OFF\r\n3 1 0",
+                    "OFF 3 1 0\n",
+                    "# a scan\n\nOFF\n",
+                    "COFF\n3 1 0\n",
+                    "STCNOFF\n",
+                    "OFF BINARY\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+            ("a 3MF model", vec![zip("3D/3dmodel.model")]),
+            ("a ZIP archive", vec![zip("xl/workbook.xml")]),
+            (
+                "a COLLADA scene",
+                vec![b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">".to_vec()],
+            ),
+            (
+                "text",
+                [
+                    "OFFICE\n",
+                    "off we go",
+                    "{\"images\": []}",
+                    "# OFF\n1 2 3\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+        ] {
+            for file in files {
+                let said = FileKind::of(&file).to_string();
+                assert_eq!(
+                    said,
+                    wanted,
+                    "{}",
+                    String::from_utf8_lossy(&file[..20.min(file.len())])
+                );
+            }
+        }
     }
 }

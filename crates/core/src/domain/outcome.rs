@@ -87,6 +87,18 @@ pub struct FitOutcome {
     pub vertices: u64,
     /// Number of triangles in the file; 0 for a point set.
     pub triangles: u64,
+    /// Number of vertices of the file that were left out because they have no position.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub missing_vertices: u64,
+}
+
+/// Returns whether a number is zero, and need not be stored.
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+const fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 /// Conversion of levels and pixels of a depth map to mesh units.
