@@ -68,7 +68,7 @@ fn cases() -> Vec<Case> {
                 [0.0, 1.0, 0.0],
             ]])),
             "bad_input",
-            "vertex 2 has the coordinate NaN",
+            "1 of 3 vertices have no position (NaN, infinite or repeated 0 0 0)",
         ),
         case("no_faces", mesh(stl(&[])), "bad_input", "has no faces"),
         case(

@@ -25,4 +25,5 @@ pub mod restore;
 pub mod shell;
 pub mod time_text;
 pub mod truth_file;
+mod unread_meshes;
 pub mod verdict_file;

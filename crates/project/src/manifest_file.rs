@@ -1,12 +1,14 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
 use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
+use super::unread_meshes::{mesh_kind, unread_meshes};
 use mocban_core::domain::{ContentHash, LengthUnit, PairName, sanitize};
 use mocban_lists::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
@@ -42,7 +44,7 @@ enum ListingSource {
 type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
 
 /// Refuses a manifest as a whole.
-pub fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
+pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
     let problems = problems.to_string().replace('\n', "\n  ");
     let from = from.display();
     Refusal::Usage(format!(
@@ -107,8 +109,14 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> anyhow::Result<Self> {
-        let found = pair_folders(&files::list(meshes)?, &files::list(prints)?)
-            .map_err(|problems| refuse(meshes, &problems))?;
+        let mesh_files = files::list(meshes)?;
+        let unread = unread_meshes(&mesh_files);
+        let found = pair_folders(&mesh_files, &files::list(prints)?).map_err(|problems| {
+            let lines = [&[problems.to_string()][..], &unread].concat();
+            refuse(meshes, &lines.join("\n"))
+        })?;
+        let mut ignored = found.ignored;
+        ignored.retain(|path| mesh_kind(path).is_none());
         let mut rows = found.rows;
         let mut similar = SimilarIds::default();
         for row in &mut rows {
@@ -118,13 +126,13 @@ impl Listing {
         let warnings = [
             ignored_files("mesh without print", &found.meshes_alone),
             ignored_files("print without mesh", &found.prints_alone),
-            ignored_files("neither mesh nor print", &found.ignored),
+            ignored_files("neither mesh nor print", &ignored),
             similar.warning(),
         ];
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.into_iter().flatten().collect(),
+            warnings: warnings.into_iter().flatten().chain(unread).collect(),
             row_label: "pair".to_owned(),
         })
     }

@@ -24,6 +24,8 @@ pub enum FileKind {
     OtherMesh(&'static str),
     /// Another format with a known signature.
     Other(&'static str),
+    /// The text that Git LFS stores in place of a large file that was not fetched.
+    LfsPointer,
     /// Printable text without a signature.
     Text,
     /// Bytes without a known signature.
@@ -54,11 +56,11 @@ const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
     (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
     (b"ASTM-E57", FileKind::OtherMesh("an E57 point cloud")),
-    (b"version https://git-lfs", LFS_POINTER),
-    (b"version https://hawser", LFS_POINTER),
+    (b"version https://git-lfs", FileKind::LfsPointer),
+    (b"version https://hawser", FileKind::LfsPointer),
     (
         b"/annex/objects/",
-        FileKind::Other("a git-annex pointer, whose content `git annex get` fetches"),
+        FileKind::Other("a pointer of git-annex, whose content `git annex get` fetches"),
     ),
     (b"%PDF", FileKind::Other("a PDF document")),
     (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
@@ -71,11 +73,27 @@ const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"<", FileKind::Other("XML or HTML text")),
 ];
 
-const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
-/// Stands in a clone of a Git repository for a large file whose content was not downloaded.
-const LFS_POINTER: FileKind =
-    FileKind::Other("a Git LFS pointer, whose content `git lfs pull` fetches");
+/// Extensions of unsupported 3D formats.
+const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
+    (&["glb", "gltf"], GLTF),
+    (&["off"], FileKind::OtherMesh("an OFF mesh")),
+    (&["3mf"], FileKind::OtherMesh("a 3MF model")),
+    (&["fbx"], FileKind::OtherMesh("an FBX scene")),
+    (&["dae"], FileKind::OtherMesh("a COLLADA scene")),
+    (&["x3d"], FileKind::OtherMesh("an X3D scene")),
+    (&["wrl"], FileKind::OtherMesh("a VRML scene")),
+    (&["blend"], FileKind::OtherMesh("a Blender scene")),
+    (
+        &["usd", "usda", "usdc", "usdz"],
+        FileKind::OtherMesh("a USD scene"),
+    ),
+    (&["step", "stp"], FileKind::OtherMesh("a STEP model")),
+    (&["pcd"], FileKind::OtherMesh("a PCD point cloud")),
+    (&["las", "laz"], FileKind::OtherMesh("a LAS point cloud")),
+    (&["e57"], FileKind::OtherMesh("an E57 point cloud")),
+];
 
+const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
 /// Bytes at the beginning and the end of a container that are searched for the name of its content.
 const SEARCHED_BYTES: usize = 1 << 16;
 
@@ -140,9 +158,18 @@ impl FileKind {
             Self::Tiff => "a TIFF image",
             Self::Ply => "a PLY mesh",
             Self::OtherImage(name) | Self::OtherMesh(name) | Self::Other(name) => name,
+            Self::LfsPointer => "a pointer of Git LFS",
             Self::Text => "text",
             Self::Binary => "binary data of unknown kind",
         }
+    }
+
+    /// Returns the 3D format that files with an extension usually have, if it is not read.
+    pub fn of_unread_mesh_extension(extension: &str) -> Option<Self> {
+        let extension = extension.to_ascii_lowercase();
+        let mut meshes = UNREAD_MESHES.into_iter();
+        let found = meshes.find(|(extensions, _)| extensions.contains(&extension.as_str()));
+        found.map(|(_, kind)| kind)
     }
 
     /// Returns the description without the article.
@@ -191,18 +218,22 @@ mod tests {
             FileKind::of(b"\0\0\0\x1cftypheic"),
             FileKind::OtherImage("a HEIC image")
         );
-        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
-        assert_eq!(
-            FileKind::of(pointer).to_string(),
-            "a Git LFS pointer, whose content `git lfs pull` fetches"
-        );
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n";
+        assert_eq!(FileKind::of(pointer), FileKind::LfsPointer);
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
     }
 
     #[test]
     fn all_files_of_a_scene_format_have_one_description() {
-        let zip = |name: &str| [b"PK\x03\x04", &[b'x'; 99_999][..], name.as_bytes()].concat();
+        let zip = |name: &str| {
+            [
+                b"PK\x03\x04".as_slice(),
+                &vec![b'x'; 99_999],
+                name.as_bytes(),
+            ]
+            .concat()
+        };
         let embedded = format!(
             "{{\"buffers\":[{{\"uri\":\"data:{}\"}}],\"asset\":{{\"version\":\"2.0\"}}}}",
             "A".repeat(9999)

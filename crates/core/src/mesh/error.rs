@@ -151,6 +151,7 @@ impl MeshError {
 /// Returns what to do with a file of another format.
 const fn way_out(kind: FileKind) -> &'static str {
     match kind {
+        FileKind::LfsPointer => "it does not hold the mesh, which `git lfs pull` fetches",
         FileKind::OtherMesh(_) => {
             "open it in MeshLab, Blender or CloudCompare and export it as PLY"
         }

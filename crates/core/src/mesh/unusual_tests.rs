@@ -326,8 +326,7 @@ fn pointers_of_git_are_named_whatever_the_file_is_called() {
         ] {
             assert_eq!(
                 refused(text.as_bytes(), name),
-                "the file is a Git LFS pointer, whose content `git lfs pull` fetches; OBJ, PLY and STL meshes and XYZ \
-                 points are read"
+                "the file is a pointer of Git LFS; it does not hold the mesh, which `git lfs pull` fetches"
             );
         }
         let said = refused(b"/annex/objects/SHA256E-s12--ab.stl\n", name);

@@ -4,7 +4,7 @@ mod layout;
 
 use super::{Mesh, MeshError, MeshLimits, text};
 use crate::domain::cancel::polled;
-use layout::Layout;
+use layout::PointLayout;
 
 pub(super) use layout::{is_comment, is_data_or_title};
 
@@ -18,7 +18,7 @@ const NUMBERED_POINTS: usize = 10;
 /// points or the names of the columns. A first column with numbers of points is ignored.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     text::check_lines(bytes)?;
-    let layout = Layout::of(bytes)?;
+    let layout = PointLayout::of(bytes)?;
     let points = points(bytes, &layout, limits)?;
     let vertices = match layout.numbered() {
         Some(numbered) if are_numbers(&points) => self::points(bytes, &numbered, limits)?,
@@ -30,7 +30,11 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     })
 }
 
-fn points(bytes: &[u8], layout: &Layout, limits: &MeshLimits) -> Result<Vec<[f64; 3]>, MeshError> {
+fn points(
+    bytes: &[u8],
+    layout: &PointLayout,
+    limits: &MeshLimits,
+) -> Result<Vec<[f64; 3]>, MeshError> {
     let mut points = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
     let lines = text::lines(bytes).skip_while(|(line, _)| *line < layout.first_point);
     for (line, content) in lines {
@@ -113,22 +117,18 @@ mod tests {
 
     #[test]
     fn a_first_column_of_increasing_numbers_is_no_coordinate() {
-        let rows = |step: usize| (0..12).map(move |k| (k * step, k % 4, k / 4));
-        let numbered: String = rows(3)
-            .map(|(k, x, y)| format!("{k} {x} {y} 1.5\n"))
-            .collect();
-        let plain: String = rows(3).map(|(_, x, y)| format!("{x} {y} 1.5\n")).collect();
+        let rows = |row: &dyn Fn(usize) -> String| (0..12).map(row).collect::<Vec<_>>().concat();
+        let numbered = rows(&|k| format!("{} {} {} 1.5\n", 3 * k, k % 4, k / 4));
+        let plain = rows(&|k| format!("{} {} 1.5\n", k % 4, k / 4));
         assert_eq!(open(&numbered), open(&plain));
         // Three columns are coordinates, and so are numbers that repeat.
-        let three: String = rows(1).map(|(k, x, _)| format!("{k} {x} 1.5\n")).collect();
+        let three = rows(&|k| format!("{k} {} 1.5\n", k % 4));
+        let grid = rows(&|k| format!("{} {} 1.5 9\n", k / 2, k % 4));
+        let last = |text: &str| open(text).expect("reads").vertices.at(11);
         assert_eq!(
-            open(&three).expect("reads").vertices.at(11),
-            [11.0, 3.0, 1.5]
+            (last(&three), last(&grid)),
+            ([11.0, 3.0, 1.5], [5.0, 3.0, 1.5])
         );
-        let grid: String = rows(1)
-            .map(|(k, x, _)| format!("{} {x} 1.5 9\n", k / 2))
-            .collect();
-        assert_eq!(open(&grid).expect("reads").vertices.at(11), [5.0, 3.0, 1.5]);
     }
 
     #[test]

@@ -22,7 +22,7 @@ enum CommaUse {
 
 /// Where the coordinates are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Layout {
+pub(super) struct PointLayout {
     /// Line of the first point, counted from 1.
     pub(super) first_point: u64,
     /// Columns of x, y and z.
@@ -32,7 +32,7 @@ pub(super) struct Layout {
     may_be_numbered: bool,
 }
 
-impl Layout {
+impl PointLayout {
     /// Determines the layout from the title and the first point, and from the first point with a comma.
     ///
     /// # Errors
