@@ -21,5 +21,6 @@ pub use mocban_lists::{labels, manifest};
 pub use mocban_pages::{local_server, review, view};
 pub use mocban_project as project;
 pub use mocban_report as report;
+pub use mocban_results as results;
 pub use mocban_runner::{self as runner, check};
 pub use mocban_store as store;

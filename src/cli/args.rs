@@ -7,31 +7,13 @@ use clap::builder::{Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use super::commands::backup;
-use super::commands::check;
-use super::commands::completions;
-use super::commands::config;
-use super::commands::contact_sheet;
-use super::commands::copy;
-use super::commands::db;
-use super::commands::demo;
-use super::commands::docs;
-use super::commands::export;
-use super::commands::import;
-use super::commands::man;
-use super::commands::report;
-use super::commands::restore;
-use super::commands::retry;
-use super::commands::review;
-use super::commands::run;
-use super::commands::show;
-use super::commands::status;
-use super::commands::verdict;
-use super::commands::view;
-use super::commands::worker;
+use super::commands::{
+    backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import, man,
+    report, restore, retry, review, run, show, status, verdict, view, worker,
+};
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
-use mocban_project::exit::ExitCode;
+use mocban_project::ExitCode;
 use mocban_project::shell::shell_quoted;
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.

@@ -141,7 +141,7 @@ fn heading_text(events: &[Event<'_>]) -> String {
     text.collect()
 }
 
-/// Returns the id of a heading, as mdBook forms it: lower case, hyphens for spaces, no punctuation.
+/// Returns the id of a heading, as GitHub forms it: lower case, hyphens for spaces, no punctuation.
 pub fn anchor(heading: &str) -> String {
     let lower = heading.to_lowercase();
     let kept = lower

@@ -64,6 +64,21 @@ impl Fleet {
         worker.expect("the binary starts")
     }
 
+    /// Starts a worker, and waits until the server knows it. A crash of the server before that ends a worker.
+    fn registered_worker(&self, known: &mut i64) -> Child {
+        let mut worker = self.worker();
+        loop {
+            let count = self.on_server(async |conn| {
+                let count = "SELECT count(*) FROM mocban.worker";
+                sqlx::query_scalar(count).fetch_one(conn).await
+            });
+            if count > *known || worker.try_wait().expect("a state").is_some() {
+                *known = count;
+                return worker;
+            }
+        }
+    }
+
     /// Calls a function with a connection to the server.
     pub(crate) fn on_server<T>(
         &self,
@@ -168,7 +183,10 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
     };
     fleet.shared(&["plan"]).expect(0);
     let mut dice = ChaCha8Rng::seed_from_u64(24);
-    let mut workers = vec![fleet.worker(), fleet.worker(), fleet.worker()];
+    let mut known = 1;
+    let mut workers: Vec<Child> = (0..3)
+        .map(|_| fleet.registered_worker(&mut known))
+        .collect();
     let mut crashes_at_work = 0;
     for kill in 0..kills {
         // The crash must come at a random moment, so the test waits for a time and not for an event.
@@ -183,7 +201,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
             // It may have ended.
             let _ = workers[victim].kill();
             workers[victim].wait().expect("an exit code");
-            workers[victim] = fleet.worker();
+            workers[victim] = fleet.registered_worker(&mut known);
         }
     }
     assert!(

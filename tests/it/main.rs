@@ -16,6 +16,7 @@ mod browser;
 mod check;
 mod check_files;
 mod cli;
+mod colour_profiles;
 #[cfg(unix)]
 mod copies;
 mod corruption;

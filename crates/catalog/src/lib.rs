@@ -13,6 +13,8 @@
 //! - Rows that no run can compute again, such as verdicts, have checksums (`records/checksums.rs`).
 //! - `db init --roles` gives the tables to group roles: the database refuses what a role may not do.
 //!
+//! Every call fails if a database operation fails. `# Errors` names other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** no other crate contains SQL, a write under a lost lease changes nothing, and every test of this crate runs
 //! on both databases.
 
@@ -31,7 +33,6 @@ mod records;
 mod recovery;
 mod retry;
 #[cfg(any(test, feature = "test-helpers"))]
-#[expect(clippy::missing_errors_doc, reason = "only tests call these methods")]
 mod test_helpers;
 #[cfg(test)]
 mod tests;
@@ -53,14 +54,11 @@ pub use blocks::control_points::ControlPointsChange;
 pub use blocks::cut::{CutReply, CutSummary};
 pub use blocks::import::BlockImportSummary;
 pub use blocks::model::{
-    BlockAttributes, BlockInputVersions, BlockWork, CharacterMaps, CutOrigin, CutPair, MadeWith,
-    NewCharacter, StoredCharacter,
+    BlockAttributes, BlockInputVersions, BlockProvenance, BlockWork, CharacterMaps, CutOrigin,
+    CutPair, NewCharacter, StoredCharacter,
 };
 pub use blocks::queue::OutstandingBlocks;
-pub use blocks::records::{
-    AuditedBlock, BlockAttemptRecord, BlockDetail, BlockStageDetail, BlockState, KnownBlock,
-    StoredBlockFailure,
-};
+pub use blocks::records::{AuditedBlock, BlockDetail, BlockStageDetail, BlockState, KnownBlock};
 pub use blocks::selection::BlockSelection;
 pub use blocks::staleness::{BlockPlanEntry, BlockReason};
 pub use db::error::{CatalogError, LogLoss, Result};

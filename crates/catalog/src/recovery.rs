@@ -2,6 +2,7 @@
 
 use crate::blocks::block_job::BlockJob;
 use crate::db::conn::Conn;
+use crate::db::transaction::in_transaction;
 use crate::queue::pair_job::PairJob;
 use crate::queue::recovery::{
     self as recovery, DeadWorker, Recovered, RecoveredJobs, holders_but, mark_dead,
@@ -16,30 +17,21 @@ impl Catalog {
     /// A pair or block is blamed for a death if it was the worker's only lease. It is quarantined if `is_poisoned`
     /// returns true, which also considers other recent deaths. Therefore, killing processes from outside rarely
     /// quarantines one.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let workers = mark_dead(conn, &dead).await?;
-                let items = recovery::left_by(conn, &workers).await?;
-                let deaths = recovery::deaths(conn).await?;
-                let left = [&*workers, &items];
-                let pairs = recovery::recover::<PairJob>(conn, left, deaths, now).await?;
-                let blocks = recovery::recover::<BlockJob>(conn, left, deaths, now).await?;
-                Ok(both(pairs, &blocks))
-            })
+        in_transaction!(self, |conn| {
+            let workers = mark_dead(conn, &dead).await?;
+            let items = recovery::orphaned(conn, &workers).await?;
+            let deaths = recovery::deaths(conn).await?;
+            let left = [&*workers, &items];
+            let pairs = recovery::recover::<PairJob>(conn, left, deaths, now).await?;
+            let blocks = recovery::recover::<BlockJob>(conn, left, deaths, now).await?;
+            Ok(both(pairs, &blocks))
         })
-        .await
     }
 
     /// Recovers overdue leases of other workers that are not known to be dead. A lease is overdue if its worker's last
     /// heartbeat is more than `margin_ms` after the deadline. This is rare, because processes enforce their own
     /// deadlines.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn recover_overdue(
         &self,
         me: WorkerId,

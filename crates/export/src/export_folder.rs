@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, MANIFEST};
+use mocban_core::domain::{ErrorCode, Explained};
 use mocban_store::{Leftover, ReplaceError, ReplacementFolder};
 
 /// An export that is written next to its target and then replaces the target.
@@ -35,6 +36,16 @@ pub enum FolderError {
     },
 }
 
+impl Explained for FolderError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::NotAnExport(_) | Self::IsFile(_) => ErrorCode::Usage,
+            Self::Replace(error) => error.code(),
+            Self::Io { .. } => ErrorCode::Unexpected,
+        }
+    }
+}
+
 impl Folder {
     /// Creates an empty folder next to `target`, which must be new, empty or an earlier export.
     ///
@@ -51,9 +62,6 @@ impl Folder {
     }
 
     /// Returns whether finishing would replace an earlier export.
-    ///
-    /// # Errors
-    /// Returns an error if the disk fails.
     pub(super) fn replaces(&self) -> Result<bool, FolderError> {
         let manifest = self.0.target().join(MANIFEST);
         manifest.try_exists().map_err(at(&manifest))
@@ -131,9 +139,6 @@ pub(super) struct SharedFile {
 
 impl SharedFile {
     /// Creates an empty file below a folder.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be created.
     pub(super) fn create(root: &Path, below: &str) -> Result<Self, FolderError> {
         let path = root.join(below);
         let file = BufWriter::new(File::create(&path).map_err(at(&path))?);
@@ -141,17 +146,11 @@ impl SharedFile {
     }
 
     /// Appends bytes.
-    ///
-    /// # Errors
-    /// Returns an error if they cannot be written.
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), FolderError> {
         self.file.write_all(bytes).map_err(at(&self.path))
     }
 
     /// Writes what is buffered.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written.
     pub(super) fn flush(&mut self) -> Result<(), FolderError> {
         self.file.flush().map_err(at(&self.path))
     }

@@ -9,6 +9,9 @@
 //!   both
 //! - `scan_view` encodes a scan in the frame of its print for the viewer, on pages of a server and in files
 //!
+//! Every call fails if the catalog, an input or an artifact cannot be read, or the output cannot be written. `# Errors` names
+//! other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** equal results give equal bytes, memory does not grow with the number of pairs, and an earlier export is
 //! replaced as a whole or not at all.
 
@@ -56,7 +59,7 @@ pub use format::ExportFormat;
 pub use gallery_selection::{GallerySelection, draw_gallery};
 pub use manifest::PairCounts;
 pub use options::{ExportOptions, ResultFilter, UnusedOption};
-pub use pair_pictures::{InputFileLimits, PictureError};
+pub use pair_pictures::PictureError;
 pub use record::{
     ManualAlignmentFields, MetricFields, PairFields, PairRecord, RecordStatus, ReviewerFields,
     SplitName,

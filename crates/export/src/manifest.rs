@@ -91,9 +91,6 @@ impl<'a> ExportManifest<'a> {
 }
 
 /// Returns a file or folder below `dir` that no export wrote, or `None` if `dir` is empty or an earlier export.
-///
-/// # Errors
-/// Returns an error if a folder or file cannot be read.
 pub(super) fn foreign_entry(dir: &Path) -> io::Result<Option<PathBuf>> {
     let files = listed_files(&dir.join(MANIFEST))?.unwrap_or_default();
     let patterns: Vec<Vec<&str>> = files.iter().map(|file| file.split('/').collect()).collect();

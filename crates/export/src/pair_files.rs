@@ -11,7 +11,7 @@ use mocban_core::domain::{
     DepthScale, LengthUnit, MetricOutcome, PairName, Stage, ThresholdMetric,
 };
 use mocban_core::raster::{compact_rgb8, png_grey16, png_mask};
-use mocban_report::pair_artifacts::same_alignment;
+use mocban_results::pair_artifacts::same_alignment;
 
 /// Folder of the files of a pair; `*` stands for its id.
 const PAIR: &str = "pairs/*";
@@ -204,7 +204,7 @@ fn sidecar(scale: &DepthScale) -> String {
     let sidecar = DepthSidecar {
         no_data: 0,
         scale,
-        curvature: scale.bow.map_or([0.0; 6], |bow| bow.0),
+        curvature: scale.curvature.map_or([0.0; 6], |curvature| curvature.0),
         mm_per_mesh_unit: scale.unit.map(LengthUnit::mm),
     };
     let text = serde_json::to_string_pretty(&sidecar)

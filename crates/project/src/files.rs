@@ -4,13 +4,11 @@ use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, WithContext as _};
 
 use super::exit::Refusal;
 use mocban_catalog::Catalog;
-use mocban_config::Config;
-use mocban_core::domain::sanitize;
-use mocban_export::InputFileLimits;
+use mocban_core::domain::{ErrorCode, sanitize};
 use mocban_store::{
     CATALOG_FILE, Project, SETTINGS_FILE, open_regular, read_file_or_pipe, write_atomic,
 };
@@ -19,18 +17,12 @@ use mocban_store::{
 const MAX_LIST_BYTES: u64 = 512 << 20;
 
 /// Reads a list that is named on the command line, from a file or a pipe.
-///
-/// # Errors
-/// Returns an error if there is no such file, it cannot be read, or it is too long.
 pub fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     read_file_or_pipe(path, MAX_LIST_BYTES)
         .map_err(|error| refusal(path, &error, "there is no file", "cannot read"))
 }
 
 /// Returns the metadata of a file or folder, or `None` if it does not exist.
-///
-/// # Errors
-/// Returns the error of the system, unless the file does not exist.
 pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
     match std::fs::metadata(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -42,10 +34,7 @@ pub fn metadata(path: &Path) -> std::io::Result<Option<std::fs::Metadata>> {
 const MAX_SMALL: u64 = 1 << 20;
 
 /// Reads a small file, such as settings. Returns `None` if it does not exist.
-///
-/// # Errors
-/// Returns an error if the file cannot be read or is longer than 1 MiB.
-pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
+pub fn small(path: &Path) -> ProjectResult<Option<Vec<u8>>> {
     let shown = path.display();
     let failed = || format!("cannot read {shown}");
     // A link to a missing file exists, and cannot be read.
@@ -60,15 +49,14 @@ pub fn small(path: &Path) -> anyhow::Result<Option<Vec<u8>>> {
         .read_to_end(&mut bytes)
         .with_context(failed)?;
     if bytes.len() as u64 > MAX_SMALL {
-        anyhow::bail!("{shown} is longer than 1 MiB");
+        return Err(ProjectError::unexpected(format!(
+            "{shown} is longer than 1 MiB"
+        )));
     }
     Ok(Some(bytes))
 }
 
 /// Refuses to write into a folder that does not exist.
-///
-/// # Errors
-/// Returns an error if the folder does not exist.
 pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
     let folder = path
         .parent()
@@ -84,9 +72,6 @@ pub fn refuse_missing_folder(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a catalog, a backup, or another file that a project needs, or into a missing folder.
-///
-/// # Errors
-/// Returns an error if the path is one of these files.
 pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
     refuse_missing_folder(path)?;
     let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -109,14 +94,11 @@ pub fn refuse_project_file(path: &Path) -> Result<(), Refusal> {
 }
 
 /// Refuses to write over a file of a project, or over a mesh, a print or a true mask of its pairs.
-///
-/// # Errors
-/// Returns an error if the path is one of these files, or the catalog cannot be read.
 pub async fn refuse_used_file(
     path: &Path,
     project: &Project,
     catalog: &Catalog,
-) -> anyhow::Result<()> {
+) -> ProjectResult<()> {
     refuse_project_file(path)?;
     // A file that does not exist is not an input.
     let Ok(real) = path.canonicalize() else {
@@ -144,9 +126,6 @@ fn file_name(path: &Path) -> String {
 }
 
 /// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
-///
-/// # Errors
-/// Returns an error if the file cannot be read.
 pub fn is_backup(file: &Path) -> std::io::Result<bool> {
     if !std::fs::metadata(file)?.is_file() {
         return Ok(false);
@@ -162,10 +141,7 @@ pub fn is_backup(file: &Path) -> std::io::Result<bool> {
 
 /// Writes an output that may be incomplete. An incomplete output does not replace an earlier file, which may be
 /// complete.
-///
-/// # Errors
-/// Returns an error if an incomplete output would replace a file, or the file cannot be written.
-pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Result<()> {
+pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> ProjectResult<()> {
     let shown = path.display();
     let failed = || format!("cannot write {shown}");
     if !is_complete && metadata(path).with_context(failed)?.is_some() {
@@ -178,12 +154,9 @@ pub fn write_output(path: &Path, bytes: &[u8], is_complete: bool) -> anyhow::Res
 }
 
 /// Adds what to do if an output could not be written to its place in the project because no other was named.
-///
-/// # Errors
-/// Returns the error of the write.
-pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow::Result<()> {
+pub fn or_elsewhere(written: ProjectResult<()>, named: Option<&Path>) -> ProjectResult<()> {
     match written {
-        Err(error) if named.is_none() && !error.is::<Refusal>() => {
+        Err(error) if named.is_none() && error.code() != ErrorCode::Incomplete => {
             Err(error.context("name a file elsewhere with -o"))
         }
         written => written,
@@ -191,9 +164,6 @@ pub fn or_elsewhere(written: anyhow::Result<()>, named: Option<&Path>) -> anyhow
 }
 
 /// Lists the files of a directory, without its subdirectories and links to directories.
-///
-/// # Errors
-/// Returns an error if there is no such directory, or it cannot be listed.
 pub fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| match error.kind() {
         ErrorKind::NotADirectory => Refusal::Usage(format!("{} is not a directory", dir.display())),
@@ -258,14 +228,6 @@ fn refusal(path: &Path, error: &std::io::Error, missing: &str, failed: &str) -> 
         ErrorKind::NotFound => format!("{missing} {shown}"),
         _ => format!("{failed} {shown}: {error}"),
     })
-}
-
-/// Returns the limits of input files in the settings.
-pub const fn input_file_limits(config: &Config) -> InputFileLimits {
-    InputFileLimits {
-        mesh: config.limits.mesh,
-        image: config.limits.image,
-    }
 }
 
 #[cfg(test)]

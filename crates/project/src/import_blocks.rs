@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::ProjectResult;
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::import_pairs::PairSource;
@@ -72,10 +74,7 @@ pub enum ListedItems {
 
 impl ListedItems {
     /// Reads a list and decides from its header what it names.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read.
-    pub fn of(file: &Path) -> anyhow::Result<Self> {
+    pub fn of(file: &Path) -> ProjectResult<Self> {
         let pairs = |bytes| PairSource::List {
             file: file.to_owned(),
             bytes,
@@ -97,14 +96,13 @@ impl ListedItems {
 }
 
 /// Imports blocks. If the import fails, no block is imported.
-///
-/// # Errors
-/// Returns an error if the list is refused, files are missing, or the catalog or the disk fails.
 pub async fn import_blocks(
     source: &BlockSource,
     allow_missing: bool,
     location: &Location,
-) -> anyhow::Result<BlockImportOutcome> {
+    listener: &dyn Listener,
+) -> ProjectResult<BlockImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(source)?;
     let (storage, url) = location.data_locations()?;
     let project = Project::at(&location.dir).with_storage(storage);
@@ -127,7 +125,7 @@ pub async fn import_blocks(
     })
 }
 
-fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
+fn listing(source: &BlockSource) -> ProjectResult<BlockListing> {
     let (file, bytes) = match source {
         BlockSource::List { file, bytes } => (file, bytes),
         BlockSource::One(files) => {
@@ -160,7 +158,7 @@ fn listing(source: &BlockSource) -> anyhow::Result<BlockListing> {
 }
 
 /// Returns the given name, or the name of the mesh file without its extension.
-fn name(given: Option<&str>, mesh: &Path) -> anyhow::Result<BlockName> {
+fn name(given: Option<&str>, mesh: &Path) -> ProjectResult<BlockName> {
     let stem = mesh.file_stem().unwrap_or_default().to_string_lossy();
     BlockName::new(given.unwrap_or(&stem)).map_err(|error| {
         let text = format!("{}: {error}; give another one with --name", mesh.display());
@@ -179,7 +177,7 @@ fn locate(row: &mut BlockRow, label: &str, project: &Project, missing: &mut Miss
     }
 }
 
-fn stored_row(row: &BlockRow, project: &Project) -> anyhow::Result<BlockAttributes> {
+fn stored_row(row: &BlockRow, project: &Project) -> ProjectResult<BlockAttributes> {
     let stored = |path: &PathBuf| project.stored_path(path);
     Ok(BlockAttributes {
         name: row.name.clone(),

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::Context as _;
+use crate::error::{ProjectError, ProjectResult, TaskStopped};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
+use crate::events::{Listener, LongWork};
 use crate::exit::Refusal;
 use crate::files;
 use crate::location::{Location, now};
@@ -74,13 +75,12 @@ pub struct ImportOutcome {
 }
 
 /// Imports pairs. If the import fails, no pair is imported.
-///
-/// # Errors
-/// Returns an error if a list is refused, or the catalog or the disk fails.
 pub async fn import_pairs(
     import: PairImport,
     location: &Location,
-) -> anyhow::Result<ImportOutcome> {
+    listener: &dyn Listener,
+) -> ProjectResult<ImportOutcome> {
+    let _work = LongWork::begin(listener, "importing");
     let mut listing = listing(import.source)?;
     let warnings = std::mem::take(&mut listing.warnings);
     let truths = match &import.truth {
@@ -122,26 +122,26 @@ async fn store_in(
     catalog: &Catalog,
     project: &Project,
     list: &Arc<ImportList>,
-) -> anyhow::Result<StoredList> {
+) -> ProjectResult<StoredList> {
     let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
     let (project, shared) = (project.clone(), Arc::clone(list));
     let sent = tokio::task::spawn_blocking(move || send_rows(&shared, &project, &sender));
     let stored = catalog.import_all(rows, list.truths.clone(), now()).await;
     // Return a row's error first, because the catalog then only reports that the list ended early.
-    let missing = sent
-        .await
-        .context("the task that reads the list stopped")??;
+    let missing = sent.await.map_err(|error| {
+        ProjectError::from(TaskStopped(error)).context("the task that reads the list stopped")
+    })??;
     let (summary, truths) = stored?;
     Ok((summary, truths, missing))
 }
 
 /// Refuses a list that [`store_in`] would refuse because of a file.
-async fn check_rows(project: &Project, list: &Arc<ImportList>) -> anyhow::Result<()> {
+async fn check_rows(project: &Project, list: &Arc<ImportList>) -> ProjectResult<()> {
     // Nobody receives the rows.
     let (sender, _) = mpsc::channel(1);
     let (project, list) = (project.clone(), Arc::clone(list));
     let checked = tokio::task::spawn_blocking(move || send_rows(&list, &project, &sender));
-    checked.await?.map(|_| ())
+    checked.await.map_err(TaskStopped)?.map(|_| ())
 }
 
 /// Sends the rows to the catalog in chunks. Returns the missing files.
@@ -153,7 +153,7 @@ fn send_rows(
     list: &ImportList,
     project: &Project,
     sender: &mpsc::Sender<ImportChunk>,
-) -> anyhow::Result<MissingFiles> {
+) -> ProjectResult<MissingFiles> {
     let (mut missing, mut chunk, mut bytes) = (MissingFiles::default(), Vec::new(), 0);
     let mut outcome = Ok(());
     list.listing.rows(project, |row, lines| {
@@ -184,7 +184,7 @@ fn send_rows(
     Ok(missing)
 }
 
-fn listing(source: PairSource) -> anyhow::Result<Listing> {
+fn listing(source: PairSource) -> ProjectResult<Listing> {
     match source {
         PairSource::List {
             file,
@@ -204,7 +204,7 @@ async fn read_truths(
     file: &Path,
     listed: &RowIds,
     location: &Location,
-) -> anyhow::Result<Vec<TruthRow>> {
+) -> ProjectResult<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths =
@@ -235,7 +235,7 @@ async fn read_truths(
 fn stored_truths(
     truths: Vec<TruthRow>,
     project: &Project,
-) -> anyhow::Result<Vec<(PairName, Value)>> {
+) -> ProjectResult<Vec<(PairName, Value)>> {
     truths
         .into_iter()
         .map(|mut truth| {
@@ -247,7 +247,7 @@ fn stored_truths(
         .collect()
 }
 
-fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow> {
+fn stored_row(row: &ManifestRow, project: &Project) -> ProjectResult<ImportRow> {
     Ok(ImportRow {
         name: row.name.clone(),
         mesh_path: project.stored_path(&row.mesh)?,

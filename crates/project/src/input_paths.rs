@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use mocban_core::domain::spelling::plain_form;
 use unicode_normalization::UnicodeNormalization as _;
-use unicode_normalization::char::is_combining_mark;
 
 /// Replaces the path of a file whose name is written differently in a list by its path on disk: with the other Unicode
 /// form of accented letters (macOS writes some names decomposed, Windows and Linux composed), or without the
@@ -50,26 +50,16 @@ fn in_any_form(path: &Path) -> Option<PathBuf> {
 /// Largest number of entries of a folder that are compared with the name of a missing file.
 const MAX_ENTRIES: usize = 10_000;
 
-/// Returns the name of a file in the folder of a missing file that differs from it only in accents or in upper and lower
-/// case.
+/// Returns the name of a file in the folder of a missing file that differs from it only in accents, in upper and lower case,
+/// or in zeros before a number.
 pub fn similar_file(missing: &Path) -> Option<String> {
-    let wanted = plain_letters(missing.file_name()?.to_str()?);
+    let wanted = plain_form(missing.file_name()?.to_str()?);
     // The parent of a bare file name is empty.
     let folder = Path::new(".").join(missing.parent()?);
     let entries = std::fs::read_dir(folder).ok()?;
     let names = entries.take(MAX_ENTRIES).flatten();
     let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
-    names.find(|name| plain_letters(name) == wanted)
-}
-
-/// Returns a name in lower case and without accents, so that `Khoi-4` is similar to `khối-4`.
-pub fn plain_letters(name: &str) -> String {
-    let letters = name.nfd().filter(|c| !is_combining_mark(*c));
-    let letters = letters.map(|c| match c {
-        'đ' | 'Đ' => 'd',
-        c => c,
-    });
-    letters.collect::<String>().to_lowercase()
+    names.find(|name| plain_form(name) == wanted)
 }
 
 /// Returns whether a part of a path begins like an absolute path of Windows, such as `C:\scans\1.stl`, on another system.
@@ -115,12 +105,13 @@ mod tests {
     }
 
     #[test]
-    fn a_file_with_other_accents_is_similar() {
+    fn a_file_with_other_accents_or_zeros_is_similar() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         fs::write(dir.path().join("chữ số 1.stl"), "").expect("written");
         let similar = |name: &str| similar_file(&dir.path().join(name));
         assert_eq!(similar("Chu so 1.stl").as_deref(), Some("chữ số 1.stl"));
         assert_eq!(similar_file(Path::new("SRC")).as_deref(), Some("src"));
+        assert_eq!(similar("Chu so 001.stl").as_deref(), Some("chữ số 1.stl"));
         assert_eq!(similar("chu so 2.stl"), None);
         assert_eq!(similar("missing/chu so 1.stl"), None);
     }

@@ -2,18 +2,40 @@
 //!
 //! - [`location`]: a project folder with the settings that say where its catalog and its files are; opens both
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
-//! - [`backup`], [`restore`]: copy a project to one file, and make a project of it
+//! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
+//! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
+//!   files and rows are sound
+//! - [`verdicts`]: records, imports, lists and undoes what people say about results
+//! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
+//! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`]: what a demo may replace
-//! - [`exit`], [`error_text`]: the code of an error, and one sentence that says what was seen and what to do
+//! - [`events`]: what a function tells its caller while it works
+//! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
+//!
+//! A function that needs the catalog, the disk or the settings fails if they do. `# Errors` says what else it refuses.
 //!
 //! **Invariant:** a function checks everything that can refuse it before it writes, and prints nothing.
 
+#![expect(
+    clippy::missing_errors_doc,
+    reason = "the page of the crate says what can fail in all functions"
+)]
+
 pub mod backup;
+pub mod block_status;
+pub mod check;
+pub mod closing;
+pub mod copy;
 pub mod demo_folder;
-pub mod error_text;
+pub mod details;
+pub mod error;
+pub mod events;
 pub mod exit;
+pub mod export;
+pub mod failures;
 pub mod files;
+pub mod hosts;
 pub mod import_blocks;
 pub mod import_pairs;
 pub mod input_paths;
@@ -21,9 +43,19 @@ pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
+pub mod report;
 pub mod restore;
+pub mod retry;
+pub mod run;
+pub mod selection;
+pub mod sheets;
 pub mod shell;
-pub mod time_text;
+pub mod status;
 pub mod truth_file;
-mod unread_meshes;
+mod unread_files;
 pub mod verdict_file;
+pub mod verdicts;
+pub mod worker_totals;
+
+pub use error::{ProjectError, ProjectResult};
+pub use exit::{ExitCode, Refusal};

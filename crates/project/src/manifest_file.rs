@@ -1,6 +1,5 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::HashSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -8,8 +7,9 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{find_on_disk, is_windows_path, similar_file};
 use super::missing_files::WINDOWS_HINT;
-use super::unread_meshes::{mesh_kind, unread_meshes};
-use mocban_core::domain::{ContentHash, LengthUnit, PairName, sanitize};
+use super::unread_files::UnreadFiles;
+use crate::error::ProjectResult;
+use mocban_core::domain::{FileKind, LengthUnit, sanitize};
 use mocban_lists::manifest::{
     ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
 };
@@ -54,10 +54,7 @@ pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
 
 impl Listing {
     /// Reads a CSV or JSON Lines file. If its extension is unknown, the first character decides the format.
-    ///
-    /// # Errors
-    /// Returns an error if the list cannot be read or is refused.
-    pub fn from_file(file: &Path) -> anyhow::Result<Self> {
+    pub fn from_file(file: &Path) -> ProjectResult<Self> {
         let shown = file.display();
         if file.is_dir() {
             let text =
@@ -68,25 +65,17 @@ impl Listing {
     }
 
     /// Parses the content of a CSV or JSON Lines file, like [`Listing::from_file`].
-    ///
-    /// # Errors
-    /// Returns an error if the list is refused.
-    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> anyhow::Result<Self> {
+    pub fn from_bytes(file: &Path, bytes: Vec<u8>) -> ProjectResult<Self> {
         let shown = file.display();
         let parse: RowParser = if files::is_jsonl(file, &bytes) {
             read_jsonl
         } else {
             read_csv
         };
-        let mut similar = SimilarIds::default();
         let mut misspelt = MisspeltColumns::default();
-        let mut each = |row: ManifestRow| {
-            similar.add(&row.name);
-            misspelt.add(&row);
-        };
+        let mut each = |row: ManifestRow| misspelt.add(&row);
         let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let mut warnings = misspelt.warnings();
-        warnings.extend(similar.warning());
+        let warnings = misspelt.warnings();
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -108,31 +97,30 @@ impl Listing {
         meshes: &Path,
         prints: &Path,
         unit: Option<LengthUnit>,
-    ) -> anyhow::Result<Self> {
-        let mesh_files = files::list(meshes)?;
-        let unread = unread_meshes(&mesh_files);
-        let found = pair_folders(&mesh_files, &files::list(prints)?).map_err(|problems| {
-            let lines = [&[problems.to_string()][..], &unread].concat();
+    ) -> ProjectResult<Self> {
+        let (mesh_files, print_files) = (files::list(meshes)?, files::list(prints)?);
+        let mut unread = UnreadFiles::of(&mesh_files, FileKind::mesh_advice);
+        unread.append(UnreadFiles::of(&print_files, FileKind::image_advice));
+        let found = pair_folders(&mesh_files, &print_files).map_err(|problems| {
+            let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))
         })?;
-        let mut ignored = found.ignored;
-        ignored.retain(|path| mesh_kind(path).is_none());
+        let mut others = found.ignored;
+        others.retain(|path| !unread.paths.contains(path));
         let mut rows = found.rows;
-        let mut similar = SimilarIds::default();
         for row in &mut rows {
             row.unit = unit;
-            similar.add(&row.name);
         }
         let warnings = [
             ignored_files("mesh without print", &found.meshes_alone),
             ignored_files("print without mesh", &found.prints_alone),
-            ignored_files("neither mesh nor print", &ignored),
-            similar.warning(),
+            ignored_files("neither mesh nor print", &others),
         ];
+        let warnings = warnings.into_iter().flatten().chain(unread.sentences);
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.into_iter().flatten().chain(unread).collect(),
+            warnings: warnings.collect(),
             row_label: "pair".to_owned(),
         })
     }
@@ -184,40 +172,6 @@ impl Listing {
     }
 }
 
-/// Finds ids that differ only in upper and lower case.
-#[derive(Debug, Default)]
-struct SimilarIds {
-    /// Hash prefixes of the lower-case ids: a list may have millions of rows.
-    seen: HashSet<[u8; 8]>,
-    first: Option<PairName>,
-    more: usize,
-}
-
-impl SimilarIds {
-    fn add(&mut self, name: &PairName) {
-        let hash = ContentHash::of(name.as_str().to_lowercase().as_bytes());
-        let prefix = std::array::from_fn(|at| hash.as_bytes()[at]);
-        let is_new = self.seen.insert(prefix);
-        match (is_new, &self.first) {
-            (true, _) => {}
-            (false, None) => self.first = Some(name.clone()),
-            (false, Some(_)) => self.more += 1,
-        }
-    }
-
-    fn warning(self) -> Option<String> {
-        let name = self.first?;
-        let more = match self.more {
-            0 => String::new(),
-            more => format!(", and so do {more} more ids"),
-        };
-        Some(format!(
-            "id {name} differs from another id only in case{more}; an export to a file system that ignores case \
-             (Windows, macOS, memory sticks) would mix their directories"
-        ))
-    }
-}
-
 /// Maximum number of missing files for which a similar name is searched.
 const MAX_SEARCHES: usize = 10;
 
@@ -262,20 +216,6 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::{Listing, Project};
-
-    #[test]
-    fn ids_that_differ_only_in_case_are_reported() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let file = dir.path().join("pairs.csv");
-        std::fs::write(&file, "id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\nB,m,p\n").expect("written");
-        let warnings = Listing::from_file(&file).expect("valid").warnings;
-        assert_eq!(warnings.len(), 1);
-        assert!(
-            warnings[0]
-                .starts_with("id a1 differs from another id only in case, and so do 1 more ids"),
-            "{warnings:?}"
-        );
-    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {

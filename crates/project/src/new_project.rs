@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::error::ProjectResult;
 use mocban_catalog::{Catalog, CatalogError, NewCatalog};
 use mocban_store::Project;
 
@@ -16,15 +17,12 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
 
 /// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded. A new catalog on a
 /// server is created when `check` has succeeded, which refuses what `import` would refuse.
-///
-/// # Errors
-/// Returns the error of `check` or `import`, or an error if the catalog or the disk fails.
 pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> anyhow::Result<()>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
+    check: impl AsyncFnOnce() -> ProjectResult<()>,
+    import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
+) -> ProjectResult<T> {
     let missing_dirs = missing_dirs(project.dir());
     let stored = store(project, url, check, import).await;
     if stored.is_err() {
@@ -37,9 +35,9 @@ pub async fn import_with<T>(
 async fn store<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> anyhow::Result<()>,
-    import: impl AsyncFn(&Catalog) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
+    check: impl AsyncFnOnce() -> ProjectResult<()>,
+    import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
+) -> ProjectResult<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
         let catalog = match Catalog::connect(url, false).await {
@@ -71,7 +69,7 @@ async fn store<T>(
 }
 
 /// Begins a catalog if the project has none. Tries again if a failing import removes the project directory meanwhile.
-async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+async fn begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
     const ATTEMPTS: usize = 20;
     for _ in 1..ATTEMPTS {
         let begun = try_begin(project).await;
@@ -82,7 +80,7 @@ async fn begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
     try_begin(project).await
 }
 
-async fn try_begin(project: &Project) -> anyhow::Result<Option<NewCatalog>> {
+async fn try_begin(project: &Project) -> ProjectResult<Option<NewCatalog>> {
     Project::create(project.dir())?;
     Ok(NewCatalog::begin(&project.catalog_path()).await?)
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::files::RefusedLine;
 use mocban_core::domain::{PairName, UniqueKeys};
-use mocban_report::ground_truth::TruthRecord;
+use mocban_results::ground_truth::TruthRecord;
 
 /// Longest line in bytes. The values of a line take about ten times as much memory.
 const MAX_LINE_BYTES: usize = 16 << 20;

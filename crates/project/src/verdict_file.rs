@@ -10,12 +10,12 @@ use csv::StringRecord;
 use serde::Deserialize;
 
 use super::files::RefusedLine;
-use super::time_text::parse_utc;
 use mocban_catalog::{ListedVerdict, NewVerdict, ReviewContext};
 use mocban_core::domain::spelling::hint;
 use mocban_core::domain::{ContentHash, PairName, UnixMillis};
 use mocban_lists::manifest::{LineCounter, as_utf8, delimiter};
 use mocban_lists::quotes::check_quotes;
+use mocban_system::time_text::parse_utc;
 
 const COLUMNS: [&str; 7] = [
     "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
@@ -85,9 +85,6 @@ impl VerdictList {
 }
 
 /// Parses a CSV file.
-///
-/// # Errors
-/// Returns an error if the header is invalid.
 fn csv_rows(
     text: ListText,
 ) -> Result<impl Iterator<Item = Result<VerdictRow, RefusedLine>> + Send, RefusedLine> {
@@ -106,18 +103,12 @@ fn csv_rows(
 }
 
 /// Refuses a row with values that no verdict has.
-///
-/// # Errors
-/// Returns an error with the line and the reason.
 pub fn check_values(row: &VerdictRow, now: UnixMillis) -> Result<(), RefusedLine> {
     let checked = row.listed.verdict.check(now);
     checked.map_err(|error| RefusedLine::new(row.line, &error.to_string()))
 }
 
 /// Refuses a list with unknown pairs. `first_lines` has the first line of each pair.
-///
-/// # Errors
-/// Returns an error for the first line with such a pair.
 pub fn refuse_unknown(
     first_lines: &BTreeMap<PairName, usize>,
     unknown: &[PairName],
@@ -173,7 +164,7 @@ fn row(
         metric: cell(3).map(|text| value(text, line)).transpose()?,
         reason: cell(4).map(|text| value(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     let judged = None;

@@ -58,7 +58,7 @@ impl StoredStages {
             (CheckpointOutcome::Lease(lease), Some(Unwritten::Blocked(stage, error))) => {
                 let failed = PairFailure {
                     name: self.pair,
-                    attributes: stage.made_with.attributes,
+                    attributes: stage.provenance.attributes,
                     stage: stage.stage,
                     failure: Failure::new(FailureClass::Io, error.to_string()),
                     is_transient: false,

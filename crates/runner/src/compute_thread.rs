@@ -196,7 +196,7 @@ fn run_stage(
     pair.stored.insert(stage, stored);
     let checkpoint = StageCheckpoint {
         stage,
-        made_with: PairProvenance {
+        provenance: PairProvenance {
             fingerprint: context.fingerprints.of(stage),
             mesh_hash: Some(mesh_hash),
             print_hash,

@@ -158,7 +158,7 @@ pub struct BlockSummary {
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RunSummary {
     /// Pairs that this run finished.
     pub done: u64,
@@ -177,6 +177,7 @@ pub struct RunSummary {
     /// Whether the run ended early because of [`RunOptions::max_failures`](super::RunOptions::max_failures).
     pub too_many_failures: bool,
     /// Time that stages were computed, all threads together.
+    #[serde(skip)]
     pub compute_time: Duration,
     /// Wall-clock time in milliseconds.
     pub elapsed_ms: u64,

@@ -41,8 +41,7 @@ pub(super) async fn check_folders<const N: usize>(
         project: context.project.clone(),
         stored,
     });
-    let checked = read_each(items.into(), &limits).await;
-    for outcome in checked.into_iter().flatten() {
+    for outcome in read_each(items.into(), &limits).await.into_iter().flatten() {
         outcome?;
     }
     Ok(())

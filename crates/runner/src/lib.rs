@@ -6,6 +6,8 @@
 //! Whole blocks run before pairs, one at a time: `block/slot.rs` leases a block, `block/task.rs` runs its stages, and
 //! `block/pipeline` reads their files. [`check`] compares a project with its catalog and repairs it.
 //!
+//! Every call fails if the catalog, an input or an artifact cannot be read or written. `# Errors` names other reasons.
+//!
 //! **Invariant:** a kill at any moment costs at most the stages in progress, and a worker whose lease was lost stores
 //! nothing.
 //!
@@ -65,6 +67,7 @@ mod pair_failure;
 mod pair_task;
 mod policy;
 mod prefetch;
+mod retry;
 mod run;
 mod run_context;
 mod run_end;

@@ -23,9 +23,6 @@ pub(super) struct PairFailure {
 
 impl PairFailure {
     /// Stores the failure under the lease. Returns how the pair ended.
-    ///
-    /// # Errors
-    /// Returns an error if the catalog returns one.
     pub(super) async fn store(
         self,
         context: &RunContext,
@@ -45,7 +42,7 @@ impl PairFailure {
             stage,
             failure: failure.clone(),
             action,
-            made_with: PairProvenance::new(
+            provenance: PairProvenance::new(
                 context.fingerprints.of(stage),
                 &self.inputs,
                 self.attributes,

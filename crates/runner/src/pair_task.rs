@@ -249,8 +249,8 @@ impl PairSummary {
         if read.mesh.is_some() && read.print.is_some() {
             return read;
         }
-        let paths = [&self.attributes.mesh_path, &self.attributes.print_path];
-        let paths = paths.map(|path| context.project.input(path));
+        let paths = [&self.attributes.mesh_path, &self.attributes.print_path]
+            .map(|path| context.project.input(path));
         let limits = ReadLimits {
             timeout: context.stage_timeout.min(MAX_REREAD),
             stop: context.stop.clone(),

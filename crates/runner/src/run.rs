@@ -19,6 +19,7 @@ use super::input_changes;
 use super::input_reads::read_limits;
 use super::options::{RunOptions, RunPart};
 use super::policy::{self, Clock, Timing};
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
@@ -188,18 +189,11 @@ impl RunStart<'_> {
         let limits = read_limits(options, self.stop);
         input_changes::store_changes(self.project, catalog, self.pairs(), &limits).await?;
         let (fingerprints, selection) = (self.fingerprints, self.pairs());
-        let requeued = async || {
-            catalog
-                .requeue_stale(fingerprints, selection, options.rerun)
-                .await
-        };
-        catalog.retry_while_unavailable(requeued).await?;
+        retried!(catalog.requeue_stale(fingerprints, selection, options.rerun))?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
-        let ended = catalog
-            .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await);
-        ended.await?;
-        let among = self.selection.map(|selection| &selection.blocks);
-        let what = (options.rerun, among);
+        retried!(catalog.release_due_backoffs(now, longest))?;
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let what = (options.rerun, blocks);
         plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
     }
 

@@ -16,6 +16,7 @@ use super::options::RunOptions;
 use super::pair_task::{PairOutcome, process_pair};
 use super::policy;
 use super::prefetch::{Prefetch, SlotId};
+use super::retry::retried;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::run_selection::RunSelection;
 use super::stop::StopLevel;
@@ -240,9 +241,7 @@ impl Scheduler {
         let until = self.context.until;
         let catalog = &self.context.catalog;
         let selection = self.selection.as_ref().map(|selection| &selection.pairs);
-        let left =
-            catalog.retry_while_unavailable(async || catalog.outstanding(until, selection).await);
-        Ok(left.await?)
+        Ok(retried!(catalog.outstanding(until, selection))?)
     }
 
     fn finish_computing(&mut self, (slot, outcome): (SlotId, PairOutcome)) {
@@ -334,9 +333,7 @@ impl Scheduler {
         if left.next_due.is_some_and(|due| due <= now) {
             let longest = policy::longest_backoff_ms();
             let catalog = &self.context.catalog;
-            catalog
-                .retry_while_unavailable(async || catalog.release_due_backoffs(now, longest).await)
-                .await?;
+            retried!(catalog.release_due_backoffs(now, longest))?;
         }
         self.block.poll().await?;
         self.prefetch.expect_more();

@@ -10,16 +10,15 @@ use mocban_core::domain::artifact_role::{DEPTH, print_mask};
 use mocban_core::domain::{
     DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage, WaitReason,
 };
-use mocban_core::mesh;
 use mocban_core::raster::{self, DepthMap};
+use mocban_core::{InputLimits, mesh};
 use mocban_store::{ArtifactError, InputError, Project, open_input, read_input};
 
 /// Where the stages of a project read from, and how large files may be.
 #[derive(Debug)]
 pub(super) struct StageInputs {
     project: Project,
-    mesh_limits: mesh::MeshLimits,
-    image_limits: raster::ImageLimits,
+    limits: InputLimits,
     metrics: RunMetrics,
 }
 
@@ -27,8 +26,7 @@ impl StageInputs {
     pub(super) fn new(project: &Project, options: &RunOptions) -> Self {
         Self {
             project: project.clone(),
-            mesh_limits: options.mesh_limits,
-            image_limits: options.image_limits,
+            limits: options.limits,
             metrics: options.metrics.clone(),
         }
     }
@@ -139,14 +137,14 @@ impl StageInputs {
     pub(super) fn read_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         let stored = &pair.attributes.mesh_path;
         let input = self.project.input(stored);
-        let limit = self.mesh_limits.max_bytes;
+        let limit = self.limits.mesh.max_bytes;
         pair.file_in_use.set(Some(input.path()));
         let open = || open_input(&input, limit, "limits.mesh.max_bytes");
         let opened = self.metrics.waiting(WaitReason::Inputs, open);
         let mut file = opened.map_err(unreadable)?;
         let size = file.size();
         let mut timed = TimedRead::new(&mut file);
-        let mesh = mesh::read_from(&mut timed, size, stored, &self.mesh_limits);
+        let mesh = mesh::read_from(&mut timed, size, stored, &self.limits.mesh);
         self.metrics.add_wait(WaitReason::Inputs, timed.elapsed);
         let mesh = match mesh {
             Err(mesh::MeshReadError::Io(error)) => return Err(unreadable(file.error(error))),
@@ -166,17 +164,20 @@ impl StageInputs {
     pub(super) fn read_print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         let stored = &pair.attributes.print_path;
         let input = self.project.input(stored);
-        let limit = self.image_limits.max_bytes;
+        let limit = self.limits.image.max_bytes;
         pair.file_in_use.set(Some(input.path()));
         let read = || read_input(&input, limit, "limits.image.max_bytes");
         let read = self.metrics.waiting(WaitReason::Inputs, read);
         let file = read.map_err(unreadable)?;
         pair.inputs.print = Some(file.version);
         pair.file_in_use.set(None);
-        let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
+        let image = raster::decode(&file.bytes, &self.limits.image).map_err(|error| {
             let message = format!("{stored}: {error}");
             ExecutionError::failed(error.class(), message)
         })?;
+        if let Some(warning) = image.profile_warning() {
+            tracing::warn!("{stored}: {warning}");
+        }
         Ok(Print::from(image))
     }
 }

@@ -6,6 +6,7 @@ use super::error::RunError;
 use super::input_changes;
 use super::input_reads::ReadLimits;
 use super::liveness::Liveness;
+use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::{CatalogError, DeadWorker, WorkerInfo};
@@ -79,23 +80,13 @@ impl WorkerSession {
     pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let expired = self.worker;
-        catalog
-            // The counts go on in the row of the new worker.
-            .retry_while_unavailable(async || catalog.end_worker(expired, now, None).await)
-            .await?;
+        // The counts go on in the row of the new worker.
+        retried!(catalog.end_worker(expired, now, None))?;
         let settings = context.worker_settings();
-        self.worker = catalog
-            .retry_while_unavailable(async || {
-                catalog
-                    .register_worker(this_process(), settings.clone(), now)
-                    .await
-            })
-            .await?;
+        self.worker = retried!(catalog.register_worker(this_process(), settings.clone(), now))?;
         self.last_heartbeat = now;
         let dead = DeadWorker::Known(expired);
-        catalog
-            .retry_while_unavailable(async || catalog.recover(dead.clone(), now).await)
-            .await?;
+        retried!(catalog.recover(dead.clone(), now))?;
         Ok(())
     }
 
@@ -107,8 +98,7 @@ impl WorkerSession {
             // The lock is only a hint for others. Whether the run can go on is decided by the heartbeat.
             tracing::debug!(%error, "the worker's lock is not held");
         }
-        let holders = catalog.retry_while_unavailable(async || catalog.lease_holders().await);
-        let holders = holders.await?;
+        let holders = retried!(catalog.lease_holders())?;
         // The time after the reply, which may have been waited for.
         let (now, replied) = (context.clock.now(), Instant::now());
         let dead = self.liveness.observe(&holders, me, now);
@@ -118,9 +108,7 @@ impl WorkerSession {
                 workers: dead,
                 valid_until: replied + context.timing.recover_every,
             };
-            let recovered =
-                catalog.retry_while_unavailable(async || catalog.recover(dead.clone(), now).await);
-            let recovered = recovered.await?;
+            let recovered = retried!(catalog.recover(dead.clone(), now))?;
             ready += recovered.ready;
             poisoned.extend(recovered.poisoned);
         }
@@ -133,9 +121,7 @@ impl WorkerSession {
         if is_due && is_steady && holders.iter().any(|holder| holder.worker != me) {
             self.overdue_checked = now;
             let margin = context.timing.deadline_margin.as_millis() as i64;
-            let overdue = catalog
-                .retry_while_unavailable(async || catalog.recover_overdue(me, margin, now).await);
-            let overdue = overdue.await?;
+            let overdue = retried!(catalog.recover_overdue(me, margin, now))?;
             ready += overdue.ready;
             poisoned.extend(overdue.poisoned);
         }

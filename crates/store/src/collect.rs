@@ -25,9 +25,6 @@ impl ReferencedArtifacts {
     /// Removes unreferenced files and packs that are older than `age` by the clock of their file system or store. Calls
     /// `each` for every unreferenced one, with whether it was removed. With `is_idle`, does the same with objects that
     /// are named by their content; otherwise, these are not listed.
-    ///
-    /// # Errors
-    /// Returns an error if a folder cannot be listed or a request fails.
     pub fn collect(
         mut self,
         project: &Project,

@@ -9,6 +9,8 @@
 //! - `remote/`: `client.rs`, `request.rs` and `bucket.rs` send requests, `cache.rs` keeps copies of inputs, `listing.rs`
 //!   notices changes
 //!
+//! Every call fails if the disk or the object store fails. `# Errors` names other reasons, and what an error leaves behind.
+//!
 //! **Invariant:** a file gets its name when it is whole and on the disk, and nothing that another project may use is
 //! removed. "Cannot be read" is an error, not an absent file.
 
@@ -42,9 +44,10 @@ pub use input_error::InputError;
 pub use input_place::Input;
 pub use inputs::{InputFile, InputReader, hash_input, open_input, read_input, stat_input};
 pub use lock::{LockError, RunLock};
+pub use mocban_core::domain::CATALOG_FILE;
 pub use open_file::{open_regular, read_file_or_pipe};
 pub use place_owner::PlaceError;
-pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
+pub use project::{Project, SETTINGS_FILE, StoreError};
 pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 pub use remote::{BucketError, ProjectStorage, StorageError, StorageOptions};
 pub use replacement_folder::{Leftover, ReplaceError, ReplacementFolder};

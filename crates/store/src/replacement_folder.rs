@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use super::parent_folder::{parent_folder, sync_folder};
 use super::staging::StagingFolder;
 use super::target_lock::{TargetLock, TargetLockError};
+use mocban_core::domain::explained_by_cause;
 use mocban_system::platform::{canonicalize, exchange, rename, sync_tree};
 
 /// The new content in the staging folder.
@@ -62,6 +63,8 @@ pub enum ReplaceError {
         earlier: PathBuf,
     },
 }
+
+explained_by_cause! { ReplaceError: Lock }
 
 /// A staging folder that `ReplacementFolder::finish` could not remove, with the reason.
 pub type Leftover = Option<(PathBuf, io::Error)>;

@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::Args;
 
 use crate::cli::output::context::Context;
 use crate::documentation::web_files;
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::error::WithContext as _;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::ReplacementFolder;
 
 /// The first page.
@@ -22,7 +22,7 @@ pub(crate) struct DocsArgs {
     pub(crate) dir: PathBuf,
 }
 
-pub(crate) fn docs(args: &DocsArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) fn docs(args: &DocsArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (dir, shown) = (&args.dir, args.dir.display());
     let failed = || format!("cannot write the documentation to {shown}");
     let files = web_files();
@@ -48,7 +48,7 @@ pub(crate) fn docs(args: &DocsArgs, context: &Context) -> anyhow::Result<ExitCod
 }
 
 /// Refuses a directory that holds anything but files of the documentation.
-fn refuse_foreign(dir: &Path, files: &[(String, Vec<u8>)]) -> anyhow::Result<()> {
+fn refuse_foreign(dir: &Path, files: &[(String, Vec<u8>)]) -> ProjectResult<()> {
     let shown = dir.display();
     if !dir
         .try_exists()
@@ -74,7 +74,7 @@ fn foreign_file(
     dir: &Path,
     inner: &Path,
     files: &[(String, Vec<u8>)],
-) -> anyhow::Result<Option<PathBuf>> {
+) -> ProjectResult<Option<PathBuf>> {
     let folder = dir.join(inner);
     let failed = || format!("cannot read {}", folder.display());
     for entry in fs::read_dir(&folder).with_context(failed)? {

@@ -7,13 +7,13 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::import_blocks::{self, BlockArgs};
-use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
+use crate::cli::output::terminal::Terminal;
 use mocban_core::domain::LengthUnit;
-use mocban_project::exit::{ExitCode, Refusal};
 use mocban_project::import_blocks::{ListedItems, import_blocks};
 use mocban_project::import_pairs::{ImportOutcome, PairImport, PairSource, import_pairs};
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 
 /// The three ways to name what is imported.
 const USAGE: &str = "mocban import [OPTIONS] FILE
@@ -48,17 +48,15 @@ pub(crate) struct ImportArgs {
     pub(crate) allow_missing: bool,
 }
 
-pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) async fn import(args: ImportArgs, context: &Context) -> ProjectResult<ExitCode> {
     let items = items(&args)?;
     if matches!(items, ListedItems::Blocks(_)) {
         refuse_truths(&args)?;
     }
-    let busy = Busy::start(context, "importing");
+    let (location, terminal) = (&context.location, Terminal::new(context));
     match items {
         ListedItems::Blocks(source) => {
-            let outcome = import_blocks(&source, args.allow_missing, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_blocks(&source, args.allow_missing, location, &terminal).await?;
             context.print_json(&import_blocks::as_json(&outcome))?;
             import_blocks::print_outcome(&outcome, context);
         }
@@ -68,9 +66,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
                 truth: args.truth,
                 allow_missing: args.allow_missing,
             };
-            let outcome = import_pairs(import, &context.location).await;
-            drop(busy);
-            let outcome = outcome?;
+            let outcome = import_pairs(import, location, &terminal).await?;
             context.print_json(&as_json(&outcome))?;
             print_outcome(&outcome, context);
         }
@@ -80,7 +76,7 @@ pub(crate) async fn import(args: ImportArgs, context: &Context) -> anyhow::Resul
 }
 
 /// Returns what the arguments name.
-fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
+fn items(args: &ImportArgs) -> ProjectResult<ListedItems> {
     if let Some(source) = args.block.source(args.unit) {
         return Ok(ListedItems::Blocks(source));
     }
@@ -91,12 +87,15 @@ fn items(args: &ImportArgs) -> anyhow::Result<ListedItems> {
             prints: prints.clone(),
             unit: args.unit,
         })),
-        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+        (None, ..) => {
+            let text = "give a manifest, or --meshes and --prints";
+            Err(Refusal::Usage(text.to_owned()).into())
+        }
     }
 }
 
 /// Refuses true alignments of pairs in an import of blocks.
-fn refuse_truths(args: &ImportArgs) -> anyhow::Result<()> {
+fn refuse_truths(args: &ImportArgs) -> ProjectResult<()> {
     if args.truth.is_none() {
         return Ok(());
     }

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
 use clap::{Args, Command};
 
 use crate::cli::output::context::Context;
-use mocban_project::exit::{ExitCode, Refusal};
+use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::shell::shell_quoted;
+use mocban_project::{ExitCode, ProjectResult, Refusal};
 use mocban_store::{StagingFolder, rename_into_place};
 
 /// Arguments of `man`.
@@ -18,7 +18,7 @@ pub(crate) struct ManArgs {
     pub(crate) dir: PathBuf,
 }
 
-pub(crate) fn man(args: &ManArgs, command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+pub(crate) fn man(args: &ManArgs, command: Command, context: &Context) -> ProjectResult<ExitCode> {
     let dir = args.dir.display();
     std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot create {dir}"))?;
     let failed = || format!("cannot write manual pages to {dir}");
@@ -40,7 +40,7 @@ pub(crate) fn man(args: &ManArgs, command: Command, context: &Context) -> anyhow
 }
 
 /// Writes the pages to a staging folder first, so that each page is replaced as a whole. Returns their paths.
-fn write_pages(command: Command, staging: &Path) -> anyhow::Result<Vec<PathBuf>> {
+fn write_pages(command: Command, staging: &Path) -> ProjectResult<Vec<PathBuf>> {
     let folder = staging.join("pages");
     std::fs::create_dir(&folder)?;
     clap_mangen::generate_to(command, &folder)?;
@@ -50,7 +50,7 @@ fn write_pages(command: Command, staging: &Path) -> anyhow::Result<Vec<PathBuf>>
 }
 
 /// Refuses to replace a file that is not an earlier version of a page.
-fn refuse_foreign(page: &Path, dir: &Path) -> anyhow::Result<()> {
+fn refuse_foreign(page: &Path, dir: &Path) -> ProjectResult<()> {
     let there = dir.join(page.file_name().unwrap_or_default());
     let Some(earlier) = files::small(&there)? else {
         return Ok(());

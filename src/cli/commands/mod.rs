@@ -3,9 +3,7 @@
 pub(crate) mod agreement;
 pub(crate) mod backup;
 pub(crate) mod block_points;
-pub(crate) mod block_sheet;
 pub(crate) mod check;
-pub(crate) mod closing;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod config;

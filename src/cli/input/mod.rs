@@ -4,5 +4,4 @@ pub(crate) mod browser;
 pub(crate) mod examples;
 pub(crate) mod global;
 pub(crate) mod nearby_projects;
-pub(crate) mod select;
 pub(crate) mod signals;

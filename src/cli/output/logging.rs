@@ -4,18 +4,18 @@ use std::fs::OpenOptions;
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
 
-use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
 use super::screen::{Palette, Screen};
 use crate::cli::input::global::{Global, LogFormat};
 use mocban_lists::manifest::is_named_like_input;
-use mocban_project::exit::Refusal;
+use mocban_project::error::WithContext as _;
 use mocban_project::files::refuse_project_file;
+use mocban_project::{ProjectResult, Refusal};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
-pub(crate) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
+pub(crate) fn start(global: &Global, screen: &Screen) -> ProjectResult<()> {
     let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
     let (writer, to_file) = writer(global, screen, colours)?;
     let level = level(global.verbose, global.quiet, to_file);
@@ -36,7 +36,7 @@ fn writer(
     global: &Global,
     screen: &Screen,
     colours: Palette,
-) -> anyhow::Result<(BoxMakeWriter, bool)> {
+) -> ProjectResult<(BoxMakeWriter, bool)> {
     let Some(path) = &global.log_file else {
         let writer = LogWriter {
             screen: screen.clone(),

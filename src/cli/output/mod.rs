@@ -13,4 +13,4 @@ pub(crate) mod screen;
 pub(crate) mod show_text;
 pub(crate) mod streams;
 pub(crate) mod table;
-pub(crate) mod worker_totals;
+pub(crate) mod terminal;

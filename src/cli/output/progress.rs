@@ -11,8 +11,8 @@ use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
 use super::table::count;
 use crate::cli::input::global::ProgressMode;
 use mocban_core::domain::one_line;
-use mocban_project::time_text::duration;
 use mocban_runner::{RunEvent, StopLevel};
+use mocban_system::time_text::duration;
 
 /// Shows one run.
 #[derive(Debug)]

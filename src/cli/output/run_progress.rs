@@ -102,7 +102,7 @@ impl RunProgress {
         match self.rate(elapsed_ms) {
             Some(rate) => {
                 let left_ms = self.stages.saturating_sub(self.finished) as f64 / rate * 1000.0;
-                let left = mocban_project::time_text::rough_duration(left_ms as u64);
+                let left = mocban_system::time_text::rough_duration(left_ms as u64);
                 format!("{counts} · {rate:.1} stages/s · about {left} left")
             }
             None => counts,

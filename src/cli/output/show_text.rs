@@ -1,18 +1,17 @@
 //! The text that `show` prints about one pair.
 
-use serde::Serialize;
-
 use super::screen::{Palette, Tone};
 use super::table::columns;
-use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
+use mocban_catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
-    ThresholdMetric, Verdict, one_line,
+    Verdict, one_line,
 };
 use mocban_core::mesh::missing_sentence;
-use mocban_project::time_text::{duration, local};
-use mocban_report::ManualCorrection;
+use mocban_project::details::{Adjustment, ManualResult};
+use mocban_results::ManualCorrection;
 use mocban_store::Project;
+use mocban_system::time_text::{duration, local};
 
 /// One pair, its project and the colours.
 pub(crate) struct PairPage<'a> {
@@ -199,8 +198,8 @@ fn numbers(record: &StageRecord, unit: &str) -> String {
 }
 
 fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
-    let bow = match fit.bow {
-        Some(_) => format!(", curvature {:.3} {unit}", fit.bow_height),
+    let curvature = match fit.curvature {
+        Some(_) => format!(", curvature {:.3} {unit}", fit.curvature_height),
         None => String::new(),
     };
     let missing = match fit.missing_vertices {
@@ -208,7 +207,7 @@ fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
         missing => format!("; {}", missing_sentence(missing)),
     };
     format!(
-        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles{missing}",
+        "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{missing}",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }
@@ -226,9 +225,11 @@ fn ink_numbers(found: &NormalizeOutcome) -> String {
         format!("print threshold {threshold:.0} of 65535, {polarity}")
     };
     let texts: Vec<String> = found.inks.iter().map(text).collect();
-    let turned = found.print_turned.map_or_else(String::new, |orientation| {
-        format!("; turned upright by its EXIF orientation {orientation}")
-    });
+    let turned = found
+        .print_orientation
+        .map_or_else(String::new, |orientation| {
+            format!("; turned upright by its EXIF orientation {orientation}")
+        });
     format!("{}{turned}", texts.join("; or "))
 }
 
@@ -277,25 +278,6 @@ fn verdicts(record: &MetricRecord) -> String {
         parts.push(format!("{} for an older result", record.older_verdicts));
     }
     parts.join(", ")
-}
-
-/// A manual alignment beside the automatic result.
-#[derive(Debug, Serialize)]
-pub(crate) struct ManualResult {
-    #[serde(flatten)]
-    pub(crate) stored: StoredAlignment,
-    /// Difference from the automatic result. `None` if there is no automatic result, or if the depth map has changed.
-    pub(crate) adjustment: Option<Adjustment>,
-}
-
-/// How a manual alignment differs from the result of a metric.
-#[derive(Debug, Serialize)]
-pub(crate) struct Adjustment {
-    pub(crate) from: ThresholdMetric,
-    #[serde(flatten)]
-    pub(crate) by: ManualCorrection,
-    /// Intersection over union of the automatic result.
-    pub(crate) from_iou: f64,
 }
 
 /// Formats manual alignments, one line each. Returns an empty text if there are none.

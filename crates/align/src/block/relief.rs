@@ -23,7 +23,7 @@ const MAX_LOCAL_MM: f64 = 0.6;
 /// Depth below the surface at which the soft relief is 0.5, and its softness, mm.
 const EDGE_MM: f32 = 0.30;
 const SOFTNESS_MM: f32 = 0.08;
-/// Cells need heights in at least this share of their pixels.
+/// Cells need heights in at least this fraction of their pixels.
 const MIN_CELL_SHARE: f64 = 0.3;
 
 /// One side of a block as an image of its strokes.
@@ -200,7 +200,7 @@ fn soften(map: &HeightMap, face: &Mask, surface: &Grid<f32>) -> Grid<u8> {
     soft
 }
 
-/// Returns the cell whose middle lies before a pixel, and the pixel's share of the way to the next middle.
+/// Returns the cell whose middle lies before a pixel, and the pixel's fraction of the way to the next middle.
 fn cell_at(pixel: usize, cells: usize) -> (usize, f32) {
     let at = ((pixel as f32 + 0.5) / CELL as f32 - 0.5).clamp(0.0, cells as f32 - 1.0);
     (at as usize, at.fract())

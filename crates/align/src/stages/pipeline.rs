@@ -7,7 +7,7 @@
 //! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, both images scaled by bounding box and centred by centroid, density and structure thresholds (III-C) |
 //! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations in equal steps, shifts by hill climbing on the IoU, scores (III-D) |
 //!
-//! The fit stage reads the print to decide the carved side. The code map in `src/lib.rs` gives the reason.
+//! The fit stage reads the print to decide the carved side. The page of the crate gives the reason.
 
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
@@ -91,7 +91,7 @@ pub fn normalize(
             paper_method::normalize::normalize(depth, print, &settings.normalize)
         }
     }?;
-    normalized.outcome.print_turned = print.image().turned;
+    normalized.outcome.print_orientation = print.image().turned;
     Ok(normalized)
 }
 

@@ -56,8 +56,7 @@ impl From<Mesh> for Scan {
 /// Returns the faces with only corners that `keeps` accepts. For a mesh without faces, returns the accepted points.
 pub(super) fn part_of(mesh: &Mesh, keeps: impl Fn([f64; 3]) -> bool) -> Mesh {
     let kept: Vec<bool> = polled(mesh.vertices.iter()).map(keeps).collect();
-    let faces = polled(mesh.triangles.iter().copied());
-    let faces: Vec<[u32; 3]> = faces
+    let faces: Vec<[u32; 3]> = polled(mesh.triangles.iter().copied())
         .filter(|face| face.iter().all(|corner| kept[*corner as usize]))
         .collect();
     if mesh.triangles.is_empty() {

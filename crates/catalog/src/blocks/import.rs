@@ -4,8 +4,10 @@ use crate::blocks::model::BlockAttributes;
 use crate::db::conn::Conn;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
+use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
+use crate::records::similar_names;
 use crate::{Catalog, Result};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
@@ -36,7 +38,7 @@ ON CONFLICT (name) DO UPDATE SET
     labels_path = excluded.labels_path, unit = excluded.unit, side = excluded.side, attributes = excluded.attributes
 RETURNING id";
 
-pub(crate) const NEW_JOB: &str =
+const NEW_JOB: &str =
     "INSERT INTO block_job (block, stage, status) VALUES (?1, 0, 0) ON CONFLICT (block) DO NOTHING";
 
 const NAMES: &str = concat!(
@@ -50,22 +52,23 @@ impl Catalog {
     /// stages of a changed block are stale.
     ///
     /// # Errors
-    /// Returns an error if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the names of two blocks differ only in case, or if a database operation fails. In that case
+    /// nothing is imported.
     pub async fn import_blocks(
         &self,
         rows: Vec<BlockAttributes>,
         now: UnixMillis,
     ) -> Result<BlockImportSummary> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = BlockImportSummary::default();
-                for row in &rows {
-                    import_block(conn, row, now, &mut summary).await?;
-                }
-                Ok(summary)
-            })
+        in_transaction!(self, |conn| {
+            let mut summary = BlockImportSummary::default();
+            for row in &rows {
+                import_block(conn, row, now, &mut summary).await?;
+            }
+            if summary.added > 0 {
+                similar_names::refuse_blocks(conn).await?;
+            }
+            Ok(summary)
         })
-        .await
     }
 
     /// Changes a block by a statement with its name as `?1` and a value as `?2`, which returns its id, and stores the
@@ -77,22 +80,16 @@ impl Catalog {
         value: Option<String>,
     ) -> Result<bool> {
         let name = block.to_string();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let update = query_scalar(statement).bind(&name).bind(&value);
-                let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
-                let Some(id) = id else { return Ok(false) };
-                checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
-                Ok(true)
-            })
+        in_transaction!(self, |conn| {
+            let update = query_scalar(statement).bind(&name).bind(&value);
+            let id: Option<i64> = update.fetch_optional(&mut *conn).await?;
+            let Some(id) = id else { return Ok(false) };
+            checksums::store(conn, ChecksummedTable::Block, &[id]).await?;
+            Ok(true)
         })
-        .await
     }
 
     /// Returns the names of all blocks, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn block_names(&self) -> Result<Vec<BlockName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));

@@ -175,6 +175,28 @@ pub enum CatalogError {
     /// The rows of an import ended early.
     #[error("the list was not read to its end, so nothing was imported")]
     CutShort,
+    /// A new pair or block whose name differs from a known one only in upper and lower case.
+    #[error(
+        "{kind} {new} differs from {kind} {known} only in upper and lower case, so their files would be one on Windows and macOS; nothing was imported, rename one of them"
+    )]
+    SimilarName {
+        /// `pair` or `block`.
+        kind: &'static str,
+        /// The new name.
+        new: String,
+        /// The known name.
+        known: String,
+    },
+    /// A new pair with the files of a known one, whose name differs only in leading zeros.
+    #[error(
+        "pair {new} has the mesh and the print of pair {known}, so a spreadsheet may have dropped the zeros of its id; nothing was imported, write the id as {known}"
+    )]
+    SameFiles {
+        /// The new name.
+        new: PairName,
+        /// The known name.
+        known: PairName,
+    },
     /// A pragma did not take effect.
     #[error("the database set {name} to {found}, not {wanted}")]
     Pragma {

@@ -39,11 +39,11 @@ RETURNING {unit} AS unit, token",
 /// Items: [`ResultItem`].
 static RESULT: Template = Template::new(
     "
-INSERT INTO {result} ({unit}, stage, worker, {made_with}, outcome, files, result_hash, ms, at)
-SELECT [unit], [stage], [worker], {made_with_values}, item.value ->> 'outcome', CAST(item.value -> 'files' AS text),
+INSERT INTO {result} ({unit}, stage, worker, {provenance}, outcome, files, result_hash, ms, at)
+SELECT [unit], [stage], [worker], {provenance_values}, item.value ->> 'outcome', CAST(item.value -> 'files' AS text),
     unhex(item.value ->> 'result_hash'), [ms], [at]
 FROM jsonb_each(?) AS item WHERE true
-ON CONFLICT ({unit}, stage) DO UPDATE SET {made_with_updates}, outcome = excluded.outcome, files = excluded.files,
+ON CONFLICT ({unit}, stage) DO UPDATE SET {provenance_updates}, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at",
 );
 
@@ -91,8 +91,7 @@ pub(crate) async fn store<K: StoredKind>(
     }
     let mut script = Script::default();
     let statement = add_advance(&mut script, [checkpoint].into_iter())?;
-    let rows = script.run(conn).await?;
-    let advanced = rows.read_if_any(statement.as_ref())?;
+    let advanced = script.run(conn).await?.read_if_any(statement.as_ref())?;
     if !checkpoint.0.is_in(&advanced) {
         return Ok(false);
     }
@@ -162,7 +161,7 @@ struct ResultItem<'i, P> {
     stage: usize,
     worker: WorkerId,
     #[serde(flatten)]
-    made_with: P,
+    provenance: P,
     outcome: &'i str,
     files: &'i ArtifactSet,
     result_hash: ContentHash,
@@ -179,7 +178,7 @@ impl<'i> ResultItem<'i, ()> {
             unit: lease.id(),
             stage: K::index(result.stage),
             worker: lease.worker,
-            made_with: K::provenance(&result.made_with)?,
+            provenance: K::provenance(&result.provenance)?,
             outcome: &result.outcome,
             files: &result.files,
             result_hash: result.result_hash,
@@ -195,7 +194,7 @@ fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
         Some(next) => (position::<K>(next), JobStatus::Leased),
         None => (DONE, JobStatus::Done),
     };
-    let fingerprint = K::fingerprint(&stage.made_with);
+    let fingerprint = K::fingerprint(&stage.provenance);
     CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))
 }
 
@@ -261,7 +260,7 @@ fn chain<K: JobKind>(stages: &[StageCheckpoint<K>]) -> (Option<FingerprintId>, b
     let follow = |two: &[StageCheckpoint<K>]| K::next(two[0].stage) == Some(two[1].stage);
     let first = restart.is_none().then(|| chain.first()).flatten();
     (
-        first.and_then(|one| K::fingerprint(&one.made_with)),
+        first.and_then(|one| K::fingerprint(&one.provenance)),
         chain.windows(2).all(follow),
     )
 }

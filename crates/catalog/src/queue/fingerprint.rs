@@ -8,8 +8,9 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::query::{query, query_as, query_scalar};
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::db::value::Json;
-use crate::queue::plan::FieldChange;
+use crate::queue::plan::{FieldChange, METHOD};
 use crate::queue::provenance::FingerprintId;
 use crate::{Catalog, Result};
 use mocban_core::domain::{ContentHash, Stage};
@@ -90,43 +91,34 @@ ON CONFLICT DO NOTHING",
 
 impl Catalog {
     /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
     ) -> Result<FingerprintIds> {
         let fingerprints = fingerprints.clone();
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut upstream: Option<FingerprintId> = None;
-                let mut ids = [FingerprintId(0); 4];
-                for stage in Stage::ALL {
-                    let fingerprint = fingerprints.of(stage);
-                    let id = query_scalar(INSERT)
-                        .bind(stage.index() as i64)
-                        .bind(&fingerprint.hash.as_bytes()[..])
-                        .bind(fingerprint.fields.to_string())
-                        .bind(upstream)
-                        .fetch_one(&mut *conn)
-                        .await?;
-                    let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
-                    counters.bind(id).execute(&mut *conn).await?;
-                    ids[stage.index()] = id;
-                    upstream = Some(id);
-                }
-                Ok(FingerprintIds(ids))
-            })
+        in_transaction!(self, |conn| {
+            let mut upstream: Option<FingerprintId> = None;
+            let mut ids = [FingerprintId(0); 4];
+            for stage in Stage::ALL {
+                let fingerprint = fingerprints.of(stage);
+                let id = query_scalar(INSERT)
+                    .bind(stage.index() as i64)
+                    .bind(&fingerprint.hash.as_bytes()[..])
+                    .bind(fingerprint.fields.to_string())
+                    .bind(upstream)
+                    .fetch_one(&mut *conn)
+                    .await?;
+                let counters = query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
+                counters.bind(id).execute(&mut *conn).await?;
+                ids[stage.index()] = id;
+                upstream = Some(id);
+            }
+            Ok(FingerprintIds(ids))
         })
-        .await
     }
 
     /// Returns the settings in which `fingerprints` differ from those of another process, which is described by its
     /// [`Fingerprints::hash_line`]. Skips a stage if the catalog does not know the other process's hash.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn changes_from(
         &self,
         hash_line: &str,
@@ -156,8 +148,8 @@ pub(crate) async fn known(
 ) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
-        let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
+        let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
+            .bind(&fingerprints.of(stage).hash.as_bytes()[..]);
         *id = query.fetch_optional(&mut *conn).await?;
     }
     Ok(ids)
@@ -231,7 +223,8 @@ pub(crate) fn differences(stage: &str, old: &Value, new: &Value) -> Vec<FieldCha
     changes.collect()
 }
 
-/// Flattens nested objects. The key `settings` is left out of the names.
+/// Flattens nested objects, with the names of the settings: the key `settings` is left out. The method, which every stage has,
+/// is returned for the first stage only.
 fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.to_owned(), fields)];
@@ -243,6 +236,8 @@ fn leaves(stage: &str, fields: &Value) -> Map<String, Value> {
         for (key, value) in inner {
             let path = match key.as_str() {
                 "settings" => path.clone(),
+                "method" if path == Stage::Fit.name() => METHOD.to_owned(),
+                "method" if path == stage => continue,
                 key => format!("{path}.{key}"),
             };
             open.push((path, value));
@@ -257,6 +252,19 @@ mod tests {
 
     use super::{Fingerprints, differences};
     use mocban_core::domain::Stage;
+
+    #[test]
+    fn the_method_is_a_setting_of_the_pipeline_and_named_once() {
+        let fields = |method| json!({ "method": method, "settings": { "seed": 1 } });
+        let of = |stage| differences(stage, &fields("default"), &fields("paper"));
+        let found = of("fit");
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            found[0].to_string(),
+            "pipeline.method: \"default\" -> \"paper\""
+        );
+        assert_eq!(of("register"), []);
+    }
 
     #[test]
     fn a_changed_setting_changes_its_stage_and_those_after_it() {

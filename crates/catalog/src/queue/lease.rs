@@ -96,7 +96,7 @@ impl<K: JobKind> Lease<K> {
     pub(crate) fn after(&self, last: &StageCheckpoint<K>) -> Option<Self> {
         Some(Self {
             cursor: K::next(last.stage)?,
-            fingerprint: K::fingerprint(&last.made_with),
+            fingerprint: K::fingerprint(&last.provenance),
             attempt: 1,
             cleared: true,
             ..*self
@@ -172,7 +172,7 @@ pub struct StageCheckpoint<K: JobKind = PairJob> {
     /// Which stage.
     pub stage: K::Stage,
     /// Settings, inputs and attributes that it was computed from.
-    pub made_with: K::Provenance,
+    pub provenance: K::Provenance,
     /// The outcome as JSON.
     pub outcome: String,
     /// Artifacts by role.
@@ -238,7 +238,7 @@ pub struct StageFailure<K: JobKind = PairJob> {
     /// What happens to the job.
     pub action: FailureAction,
     /// Settings, inputs and attributes of the attempt.
-    pub made_with: K::Provenance,
+    pub provenance: K::Provenance,
     /// Versions of the input files that were read.
     pub inputs: K::Inputs,
     /// Computing time in milliseconds, if anything was computed.

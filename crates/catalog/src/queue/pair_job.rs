@@ -89,8 +89,8 @@ impl JobKind for PairJob {
         stage.index()
     }
 
-    fn fingerprint(made_with: &PairProvenance) -> Option<FingerprintId> {
-        Some(made_with.fingerprint)
+    fn fingerprint(provenance: &PairProvenance) -> Option<FingerprintId> {
+        Some(provenance.fingerprint)
     }
 }
 
@@ -133,6 +133,13 @@ impl StoredKind for PairJob {
             "and_requeue",
             concat!(", prio = 0, exclusive = 0", go_back_to!("([1])")),
         ),
+        (
+            "and_send_back",
+            concat!(
+                ", prio = 0, exclusive = 0",
+                go_back_to!("min(job.stage, [1])")
+            ),
+        ),
         ("and_recover", ", exclusive = max(exclusive, [1])"),
         ("and_overdue", ", exclusive = 1"),
         ("and_count_claimed", COUNT_CLAIMED),
@@ -144,8 +151,8 @@ impl StoredKind for PairJob {
         ("attributes", "item.value ->> 'attributes'"),
     ];
 
-    fn provenance(made_with: &PairProvenance) -> Result<impl Serialize + use<'_>> {
-        Ok(made_with)
+    fn provenance(provenance: &PairProvenance) -> Result<impl Serialize + use<'_>> {
+        Ok(provenance)
     }
 
     /// Returns the settings of the worker and the inputs as last read.

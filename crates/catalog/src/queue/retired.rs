@@ -51,24 +51,6 @@ const RESTORE: Sql = Sql::pair(
 const CLEAR: &str = "
 DELETE FROM retired_pair WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
 
-/// Selects jobs with their keys. In PostgreSQL, locks them in the order of pairs.
-const LOCK: Sql = Sql::pair(
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT atom FROM json_each(?1)) ORDER BY pair",
-    "SELECT pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint FROM job
-    WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1)) ORDER BY pair FOR UPDATE",
-);
-
-/// Sends jobs back to the first stage and ends their leases.
-const RESET: &str = "
-UPDATE job SET stage = 0, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0, exclusive = 0, worker = NULL,
-    deadline = NULL, token = token + 1, fingerprint = NULL
-WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))
-RETURNING pair AS unit, stage, status, coalesce(fingerprint, 0) AS fingerprint";
-
-const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
-
 const NAMES: &str =
     "SELECT p.name FROM retired_pair AS r JOIN pair AS p ON p.id = r.pair ORDER BY p.name";
 
@@ -83,13 +65,9 @@ from_row! { RemovedJob { job in row, token, low_confidence } }
 
 impl Catalog {
     /// Returns the names of the retired pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn retired_pairs(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let names = query_scalar(NAMES);
-        names.fetch_all(&mut conn).await
+        query_scalar(NAMES).fetch_all(&mut conn).await
     }
 }
 
@@ -102,8 +80,7 @@ pub(crate) async fn retire(
     deltas: &mut Deltas,
 ) -> Result<u64> {
     let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let removed = query_as(REMOVE).bind(ids);
-    let removed: Vec<RemovedJob> = removed.fetch_all(&mut *conn).await?;
+    let removed: Vec<RemovedJob> = query_as(REMOVE).bind(ids).fetch_all(&mut *conn).await?;
     let mut items = Vec::new();
     for one in &removed {
         let KeyedJob { unit: pair, key } = one.job;
@@ -130,8 +107,7 @@ pub(crate) async fn retire(
 
 /// Gives the retired pairs among these names, a JSON array, their jobs back. Returns how many there were.
 pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -> Result<u64> {
-    let restored = query_as(RESTORE).bind(names);
-    let restored: Vec<KeyedJob> = restored.fetch_all(&mut *conn).await?;
+    let restored: Vec<KeyedJob> = query_as(RESTORE).bind(names).fetch_all(&mut *conn).await?;
     for job in &restored {
         deltas.add(job.key, 1);
     }
@@ -140,19 +116,4 @@ pub(crate) async fn restore(conn: &mut Conn, names: &str, deltas: &mut Deltas) -
         query(CLEAR).bind(ids).execute(conn).await?;
     }
     Ok(restored.len() as u64)
-}
-
-/// Sends pairs whose files or attributes changed back to the first stage. Ends their leases, because the workers that
-/// hold them read the old files.
-pub(crate) async fn reset(conn: &mut Conn, pairs: &[PairId], deltas: &mut Deltas) -> Result<()> {
-    let ids = json_array(pairs.iter().map(|pair| pair.0));
-    let before: Vec<KeyedJob> = query_as(LOCK).bind(&ids).fetch_all(&mut *conn).await?;
-    let after: Vec<KeyedJob> = query_as(RESET).bind(&ids).fetch_all(&mut *conn).await?;
-    for job in before {
-        deltas.add(job.key, -1);
-    }
-    for job in after {
-        deltas.add(job.key, 1);
-    }
-    query(CLEAR_FAILURES).bind(&ids).execute(conn).await
 }

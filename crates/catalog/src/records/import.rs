@@ -10,12 +10,14 @@ use crate::db::dialect::Sql;
 use crate::db::query::{query, query_scalar};
 use crate::db::row::FromRow as _;
 use crate::db::rows::json_array;
+use crate::db::transaction::in_transaction;
 use crate::queue::counters::{CounterKey, Deltas};
 use crate::queue::retired;
 use crate::queue::selection::{PairSelection, select, unknown_names};
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::ground_truth;
 use crate::records::model::PairAttributes;
+use crate::records::similar_names;
 use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{PairName, UnixMillis};
 
@@ -114,45 +116,41 @@ impl Catalog {
     /// name occurs twice, the later row is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// Returns an error if the channel closes before `ImportChunk::End`, if a true alignment names an unknown pair, or
-    /// if a database operation fails. In that case nothing is imported.
+    /// Returns an error if the channel closes before `ImportChunk::End`, if a new pair is similar to a known one, if a true
+    /// alignment names an unknown pair, or if a database operation fails. In that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
         truths: Vec<(PairName, Value)>,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
-        self.in_transaction(move |conn| {
-            Box::pin(async move {
-                let mut summary = ImportSummary::default();
-                let mut deltas = Deltas::default();
-                loop {
-                    match chunks.recv().await {
-                        Some(ImportChunk::Rows(rows)) => {
-                            for chunk in rows.chunks(CHUNK) {
-                                import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
-                            }
+        in_transaction!(self, |conn| {
+            let mut summary = ImportSummary::default();
+            let mut deltas = Deltas::default();
+            let last = similar_names::last_pair(conn).await?;
+            loop {
+                match chunks.recv().await {
+                    Some(ImportChunk::Rows(rows)) => {
+                        for chunk in rows.chunks(CHUNK) {
+                            import_chunk(conn, chunk, now, &mut summary, &mut deltas).await?;
                         }
-                        Some(ImportChunk::End) => break,
-                        None => return Err(CatalogError::CutShort),
                     }
+                    Some(ImportChunk::End) => break,
+                    None => return Err(CatalogError::CutShort),
                 }
-                deltas.apply(conn).await?;
-                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                let stored = ground_truth::set(conn, &truths).await?;
-                if let Conn::Postgres(_) = conn {
-                    query(ANALYZE).execute(conn).await?;
-                }
-                Ok((summary, stored))
-            })
+            }
+            similar_names::refuse_pairs(conn, last).await?;
+            deltas.apply(conn).await?;
+            summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+            let stored = ground_truth::set(conn, &truths).await?;
+            if let Conn::Postgres(_) = conn {
+                query(ANALYZE).execute(conn).await?;
+            }
+            Ok((summary, stored))
         })
-        .await
     }
 
     /// Returns the names of all pairs, sorted.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = query_scalar("SELECT name FROM pair ORDER BY name");
@@ -160,18 +158,12 @@ impl Catalog {
     }
 
     /// Returns the unknown names among `names`, in the given order.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
     }
 
     /// Returns the pairs with the given names. Unknown names are left out.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await

@@ -46,9 +46,6 @@ SELECT name, path FROM (
 impl Catalog {
     /// Returns the meshes, prints and true masks whose stored paths end with one of two file names, each with the name
     /// of its pair.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn inputs_named(&self, file_names: [String; 2]) -> Result<Vec<(String, String)>> {
         let [one, other] = file_names;
         let query = query_as(NAMED).bind(one).bind(other);

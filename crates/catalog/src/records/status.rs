@@ -31,9 +31,6 @@ pub(crate) const LOW_CONFIDENCE: &str =
 impl Catalog {
     /// Returns the counts of the `status` command. Results count as stale if their fingerprint is not among
     /// `fingerprints`, or if their inputs have changed.
-    ///
-    /// # Errors
-    /// Returns an error if a database operation fails.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
         let counted = by_status(counters(&mut conn).await?);

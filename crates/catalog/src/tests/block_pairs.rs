@@ -268,7 +268,7 @@ async fn judge(world: &World, pair: &str) {
         reviewer: "lan".to_owned(),
         reason: None,
         note: None,
-        look: ReviewContext::default(),
+        context: ReviewContext::default(),
         at: None,
     };
     let stored = world.catalog.verdict_set(vec![verdict], 5).await;

@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::{World, register};
 use crate::{
-    BlockAttributes, BlockInputVersions, BlockJob, BlockReason, BlockSettings, BlockWork,
-    CatalogError, CheckpointOutcome, CutPair, CutReply, CutSummary, DeadWorker, FailureAction,
-    InputVersion, Lease, MadeWith, NewCharacter, RerunPolicy, RetrySelection, StageCheckpoint,
+    BlockAttributes, BlockInputVersions, BlockJob, BlockProvenance, BlockReason, BlockSettings,
+    BlockWork, CatalogError, CheckpointOutcome, CutPair, CutReply, CutSummary, DeadWorker,
+    FailureAction, InputVersion, Lease, NewCharacter, RerunPolicy, RetrySelection, StageCheckpoint,
     StageFailure,
 };
 use mocban_core::domain::{
@@ -57,7 +57,7 @@ pub(super) fn done(work: &BlockWork, stage: BlockStage) -> StageCheckpoint<Block
         files: ArtifactSet::new(),
         result_hash: ContentHash::of(stage.name().as_bytes()),
         metrics: Vec::new(),
-        made_with: MadeWith::new(
+        provenance: BlockProvenance::new(
             stage,
             settings.of(stage),
             &work.attributes,
@@ -267,7 +267,7 @@ fn failed(work: &BlockWork, stage: BlockStage, action: FailureAction) -> StageFa
             "b.png: the page is of another block",
         ),
         action,
-        made_with: done.made_with,
+        provenance: done.provenance,
         inputs: done.inputs,
         ms: Some(3),
         at: 100,

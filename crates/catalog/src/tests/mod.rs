@@ -164,9 +164,9 @@ impl World {
         for revision in [[1; 4], [1, 1, 2, 1]] {
             let fingerprints = fingerprints(revision);
             let selected = self.catalog.select(&names).await.expect("a read");
-            let plan = |among| {
+            let plan = |selection| {
                 self.catalog
-                    .plan(&fingerprints, among, RerunPolicy::Changed)
+                    .plan(&fingerprints, selection, RerunPolicy::Changed)
             };
             let all = plan(None).await.expect("a plan");
             let each = plan(Some(&selected)).await.expect("a plan");
@@ -232,7 +232,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     });
     StageCheckpoint {
         stage,
-        made_with: PairProvenance::new(
+        provenance: PairProvenance::new(
             fingerprints.of(stage),
             &inputs(stage),
             json!({ "scanned_face_down": null, "unit": null }).to_string(),

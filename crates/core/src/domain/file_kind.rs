@@ -43,6 +43,11 @@ const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"BM", FileKind::OtherImage("a BMP image")),
     (b"8BPS", FileKind::OtherImage("a Photoshop image")),
     (b"\0\0\0\x0cjP  ", FileKind::OtherImage("a JPEG 2000 image")),
+    (
+        b"\xff\x4f\xff\x51",
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (b"\0\0\0\x0cJXL ", FileKind::OtherImage("a JPEG XL image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
     (b"glTF", GLTF),
@@ -93,6 +98,22 @@ const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
     (&["e57"], FileKind::OtherMesh("an E57 point cloud")),
 ];
 
+/// Extensions of unsupported images and documents.
+const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
+    (&["bmp", "dib"], FileKind::OtherImage("a BMP image")),
+    (&["webp"], FileKind::OtherImage("a WebP image")),
+    (&["gif"], FileKind::OtherImage("a GIF image")),
+    (
+        &["jp2", "j2k", "jpf", "jpx"],
+        FileKind::OtherImage("a JPEG 2000 image"),
+    ),
+    (&["jxl"], FileKind::OtherImage("a JPEG XL image")),
+    (&["heic", "heif"], FileKind::OtherImage("a HEIC image")),
+    (&["avif"], FileKind::OtherImage("an AVIF image")),
+    (&["psd"], FileKind::OtherImage("a Photoshop image")),
+    (&["pdf"], FileKind::Other("a PDF document")),
+];
+
 const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
 /// Bytes at the beginning and the end of a container that are searched for the name of its content.
 const SEARCHED_BYTES: usize = 1 << 16;
@@ -103,14 +124,13 @@ impl FileKind {
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
             return Self::OtherImage("a WebP image");
         }
-        if let Some(brand @ (b"avif" | b"heic" | b"mif1" | b"heix")) =
-            bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp")
-        {
-            return Self::OtherImage(if brand == b"avif" {
-                "an AVIF image"
-            } else {
-                "a HEIC image"
-            });
+        let brand = bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp");
+        match brand {
+            Some(b"avif" | b"avis") => return Self::OtherImage("an AVIF image"),
+            Some(b"heic" | b"heim" | b"heis" | b"heix" | b"hevc" | b"mif1" | b"msf1") => {
+                return Self::OtherImage("a HEIC image");
+            }
+            _ => {}
         }
         let found = SIGNATURES
             .iter()
@@ -164,12 +184,48 @@ impl FileKind {
         }
     }
 
-    /// Returns the 3D format that files with an extension usually have, if it is not read.
-    pub fn of_unread_mesh_extension(extension: &str) -> Option<Self> {
+    /// Returns the type that files with an extension usually are, if it is not read.
+    pub fn of_unread_extension(extension: &str) -> Option<Self> {
         let extension = extension.to_ascii_lowercase();
-        let mut meshes = UNREAD_MESHES.into_iter();
-        let found = meshes.find(|(extensions, _)| extensions.contains(&extension.as_str()));
+        let mut types = UNREAD_MESHES.into_iter().chain(UNREAD_IMAGES);
+        let found = types.find(|(extensions, _)| extensions.contains(&extension.as_str()));
         found.map(|(_, kind)| kind)
+    }
+
+    /// Returns what to do with files of this type where images are needed, if that does not depend on the file.
+    pub fn image_advice(self) -> Option<String> {
+        let mut images = UNREAD_IMAGES.into_iter();
+        let (extensions, _) = images.find(|(_, kind)| *kind == self)?;
+        let extension = extensions[0];
+        Some(if extension == "pdf" {
+            "save their pages as images, such as with `pdftoppm -r 600 -png FILE.pdf page`"
+                .to_owned()
+        } else {
+            format!(
+                "convert them, such as with ImageMagick: `magick mogrify -format png *.{extension}`"
+            )
+        })
+    }
+
+    /// Returns what to do with files of this type where meshes are needed, if that does not depend on the file.
+    pub fn mesh_advice(self) -> Option<String> {
+        let programs = match self {
+            Self::OtherMesh("a STEP model") => "FreeCAD",
+            Self::OtherMesh(_) => "MeshLab, Blender or CloudCompare",
+            _ => return None,
+        };
+        Some(format!("open them in {programs} and export them as PLY"))
+    }
+
+    /// Says that a file of this type is not what is `needed`, which files of the `formats` that are read hold.
+    pub(crate) fn refusal(self, needed: &str, formats: &str, advice: Option<String>) -> String {
+        if self == Self::LfsPointer {
+            return format!(
+                "the file is {self} and does not hold the {needed}; fetch the {needed} with `git lfs pull`"
+            );
+        }
+        let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
+        format!("the file is {self}; {formats} are read{advice}")
     }
 
     /// Returns the description without the article.
@@ -203,7 +259,30 @@ impl std::fmt::Display for FileKind {
 
 #[cfg(test)]
 mod tests {
-    use super::FileKind;
+    use super::{FileKind, UNREAD_IMAGES, UNREAD_MESHES};
+
+    #[test]
+    fn unread_types_are_known_by_extension_and_have_advice() {
+        for (extensions, kind) in UNREAD_IMAGES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            let advice = kind.image_advice().expect("advice");
+            assert!(advice.contains(extensions[0]), "{advice}");
+        }
+        assert_eq!(
+            FileKind::of_unread_extension("PDF"),
+            Some(FileKind::Other("a PDF document"))
+        );
+        for (extensions, kind) in UNREAD_MESHES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            assert!(kind.mesh_advice().is_some() && kind.image_advice().is_none());
+        }
+        assert_eq!(FileKind::of_unread_extension("png"), None);
+        assert_eq!(FileKind::Text.image_advice(), None);
+    }
 
     #[test]
     fn types_are_detected_by_content() {

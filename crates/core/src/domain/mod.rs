@@ -12,6 +12,7 @@ pub mod cancel;
 mod catalog_identity;
 mod control_points;
 mod enum_names;
+mod explained;
 mod failure;
 mod file_kind;
 mod hash;
@@ -45,10 +46,11 @@ pub use block::{
 };
 pub use box_iou::box_iou;
 pub use box_name::{BoxName, NotePart};
-pub use catalog_identity::{CatalogIdentity, UNKNOWN_SERVER};
+pub use catalog_identity::{CATALOG_FILE, CatalogIdentity, UNKNOWN_SERVER};
 pub use control_points::{ControlPoint, ControlPoints};
 pub use enum_names::enum_names;
 use enum_names::stage_order;
+pub use explained::{ErrorCode, Explained, FREE_SPACE, explained_by_cause};
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
@@ -58,7 +60,7 @@ pub use input_version::InputVersion;
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
-    Bow, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
+    Curvature, DepthOutcome, DepthScale, Disagreement, FitOutcome, InkHypothesis, MetricOutcome,
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };

@@ -8,7 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use unicode_normalization::UnicodeNormalization as _;
 
-use super::{is_hidden, sanitize};
+use super::spelling::fold_case;
+use super::{ErrorCode, Explained, is_hidden, sanitize};
 
 /// Characters of an id that a file name on Windows may not have, and the escape character itself. All are ASCII.
 const ESCAPED: &str = "%\"*:<>?|";
@@ -51,6 +52,12 @@ pub enum PairNameError {
     /// The id is too long for file names derived from it.
     #[error("an id of {0} bytes is too long; the limit is {limit}", limit = PairName::MAX_BYTES)]
     TooLong(usize),
+}
+
+impl Explained for PairNameError {
+    fn code(&self) -> ErrorCode {
+        ErrorCode::Usage
+    }
 }
 
 impl PairName {
@@ -117,6 +124,20 @@ impl PairName {
             }
         }
         Cow::Owned(name)
+    }
+
+    /// Returns the id as file systems compare names that ignore case, such as those of Windows and macOS. Files of two
+    /// pairs fall together there if these forms are equal.
+    ///
+    /// ```
+    /// use mocban_core::domain::PairName;
+    ///
+    /// let folded = |id| PairName::new(id).map(|name| name.folded());
+    /// assert_eq!(folded("Đĩa A1"), folded("đĩa a1"));
+    /// assert_ne!(folded("đĩa"), folded("dia"));
+    /// ```
+    pub fn folded(&self) -> String {
+        fold_case(&self.0)
     }
 
     /// Returns the id with this file name. `None` if no id has it.

@@ -22,7 +22,7 @@ pub enum MeshError {
     #[error("the file is empty (0 bytes)")]
     Empty,
     /// The content is of an unsupported format.
-    #[error("the file is {kind}; {way}", kind = .0, way = way_out(*.0))]
+    #[error("{}", not_a_mesh(*.0))]
     NotAMesh(FileKind),
     /// More than the settings allow.
     #[error("the file has {count} {what}; limits.mesh.max_{what} is {limit}")]
@@ -148,15 +148,9 @@ impl MeshError {
     }
 }
 
-/// Returns what to do with a file of another format.
-const fn way_out(kind: FileKind) -> &'static str {
-    match kind {
-        FileKind::LfsPointer => "it does not hold the mesh, which `git lfs pull` fetches",
-        FileKind::OtherMesh(_) => {
-            "open it in MeshLab, Blender or CloudCompare and export it as PLY"
-        }
-        _ => "OBJ, PLY and STL meshes and XYZ points are read",
-    }
+fn not_a_mesh(kind: FileKind) -> String {
+    let formats = "OBJ, PLY and STL meshes and XYZ points";
+    kind.refusal("mesh", formats, kind.mesh_advice())
 }
 
 /// Limits on meshes, checked before memory is reserved.

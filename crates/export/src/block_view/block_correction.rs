@@ -59,7 +59,7 @@ pub struct PicturePoint {
 pub struct TriedAlignment {
     /// The points as they are stored.
     pub points: ControlPoints,
-    /// Share of the places of the face that agree with the page, 0..=1.
+    /// Fraction of the places of the face that agree with the page, 0..=1.
     pub agreement: f64,
     /// Relief and ink over each other, as JPEG.
     pub overlay: Vec<u8>,
@@ -125,7 +125,7 @@ impl BlockCorrection {
         let invalid = |why: serde_json::Error| unusable(BlockStage::Face, &why.to_string());
         let files = serde_json::from_value::<ArtifactSet>(stored.files.clone());
         let files = files.map_err(invalid)?;
-        let mesh = serde_json::from_value(stored.made_with["mesh"].clone());
+        let mesh = serde_json::from_value(stored.provenance["mesh"].clone());
         let aligned = match stage(BlockStage::Align) {
             Some(align) => Some(outcome::<AlignOutcome>(align)?.side),
             None => None,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::column_names::{missing_column, similar_column};
 use super::draft::MAX_PATH_BYTES;
 use super::error::{ManifestError, at_line, of_list};
+use super::row::RowIds;
 use super::text::{LineCounter, as_utf8, delimiter, encoding_hint};
 use crate::quotes::check_quotes;
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit};
@@ -75,7 +76,7 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         problems.add(of_list(&format!("the list is not UTF-8{hint}")));
     }
     let mut header: Option<Vec<&'static str>> = None;
-    let (mut rows, mut seen) = (Vec::new(), BTreeMap::new());
+    let (mut rows, mut ids) = (Vec::new(), RowIds::default());
     loop {
         let start = reader.position().clone();
         let is_read = match reader.read_byte_record(&mut record) {
@@ -99,8 +100,9 @@ pub fn parse_blocks(bytes: &[u8]) -> Result<Vec<BlockRow>, ManifestError> {
         }
         let mut reasons = Vec::new();
         if let Some(row) = row(line, columns, &record, &mut reasons) {
-            if let Some(first) = seen.insert(row.name.clone(), line) {
-                reasons.push(format!("block \"{}\" is already on line {first}", row.name));
+            let name = row.name.as_pair();
+            if let Some(first) = ids.insert(name, line) {
+                reasons.push(first.reason("block", name.as_str()));
             }
             rows.push(row);
         }
@@ -269,6 +271,10 @@ mod tests {
             (
                 "block,mesh,page\nb,m,p\nb,m,p\n",
                 "line 3: block \"b\" is already on line 2",
+            ),
+            (
+                "block,mesh,page\nB1,m,p\nb1,m,p\n",
+                "line 3: block \"b1\" differs from that on line 2 only in upper and lower case",
             ),
             (
                 "block,mesh,page,side\nb,m,p,top\n",

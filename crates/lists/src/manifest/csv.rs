@@ -255,6 +255,26 @@ mod tests {
     }
 
     #[test]
+    fn ids_that_differ_in_case_or_unicode_form_only_are_refused() {
+        assert_eq!(
+            refusal("id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\n"),
+            "line 4: id \"a1\" differs from that on line 2 only in upper and lower case, so their files would be one on \
+             Windows and macOS; rename one of them"
+        );
+        let [composed, decomposed] = ["chữ", "chu\u{31b}\u{303}"];
+        assert_eq!(
+            refusal(&format!(
+                "id,mesh,print\n{composed},m,p\n{decomposed},m,p\n"
+            )),
+            format!("line 3: id {decomposed:?} is already on line 2")
+        );
+        assert!(
+            refusal("id,mesh,print\nĐĩa,m,p\nđĩa,m,p\n").contains("only in upper and lower case")
+        );
+        assert!(parse("id,mesh,print\ndia,m,p\nđĩa,m,p\n").is_ok());
+    }
+
+    #[test]
     fn missing_and_repeated_columns_are_reported() {
         assert_eq!(
             refusal("id,model,print\na,b,c\n"),

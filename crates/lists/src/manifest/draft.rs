@@ -87,7 +87,7 @@ impl<'e> RowCollector<'e> {
         };
         let name = record(PairName::new(text).map_err(reason), reasons)?;
         if let Some(first) = self.ids.insert(&name, draft.line) {
-            reasons.push(format!("id {text:?} is already on line {first}"));
+            reasons.push(first.reason("id", text));
             return None;
         }
         Some(name)

@@ -41,20 +41,59 @@ pub(super) fn known_column(name: &str) -> Option<&'static str> {
     columns.find(|known| known.eq_ignore_ascii_case(name))
 }
 
+/// Why ids that differ only in case are refused.
+const ONE_FILE: &str = "so their files would be one on Windows and macOS; rename one of them";
+
 /// Number of hash bytes stored for each id. Among ten million ids, the probability of any collision is below 10^-24.
 const HASH_BYTES: usize = 16;
 
-/// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows.
+/// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows. No two ids
+/// differ only in upper and lower case: the files of both pairs would fall together on Windows and macOS.
 #[derive(Debug, Default)]
-pub struct RowIds(BTreeMap<[u8; HASH_BYTES], u32>);
+pub struct RowIds(BTreeMap<[u8; HASH_BYTES], FirstRow>);
+
+/// The first row with an id in upper or lower case.
+#[derive(Debug, Clone, Copy)]
+struct FirstRow {
+    line: u32,
+    /// Hash of the id as written.
+    exact: [u8; HASH_BYTES],
+}
+
+/// An earlier id that is equal to a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct EqualId {
+    pub(super) line: u32,
+    /// Whether they differ in upper and lower case.
+    pub(super) differs_in_case: bool,
+}
+
+impl EqualId {
+    /// Returns why a row with this id is refused. `kind` is the name of the column.
+    pub(super) fn reason(self, kind: &str, text: &str) -> String {
+        let line = self.line;
+        if self.differs_in_case {
+            format!(
+                "{kind} {text:?} differs from that on line {line} only in upper and lower case, {ONE_FILE}"
+            )
+        } else {
+            format!("{kind} {text:?} is already on line {line}")
+        }
+    }
+}
 
 impl RowIds {
-    /// Adds an id; returns its first line if it was added before.
-    pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<u32> {
-        match self.0.entry(key(name)) {
-            Entry::Occupied(first) => Some(*first.get()),
+    /// Adds an id; returns the earlier one if an equal id was added before.
+    pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<EqualId> {
+        let exact = key(name.as_str());
+        match self.0.entry(key(&name.folded())) {
+            Entry::Occupied(first) => Some(EqualId {
+                line: first.get().line,
+                differs_in_case: first.get().exact != exact,
+            }),
             Entry::Vacant(free) => {
-                free.insert(u32::try_from(line).unwrap_or(u32::MAX));
+                let line = u32::try_from(line).unwrap_or(u32::MAX);
+                free.insert(FirstRow { line, exact });
                 None
             }
         }
@@ -62,7 +101,8 @@ impl RowIds {
 
     /// Returns whether the list contains the id.
     pub fn contains(&self, name: &PairName) -> bool {
-        self.0.contains_key(&key(name))
+        let first = self.0.get(&key(&name.folded()));
+        first.is_some_and(|first| first.exact == key(name.as_str()))
     }
 
     /// Returns whether the list has no rows.
@@ -81,7 +121,7 @@ impl<'n> FromIterator<&'n PairName> for RowIds {
     }
 }
 
-fn key(name: &PairName) -> [u8; HASH_BYTES] {
-    let hash = ContentHash::of(name.as_str().as_bytes());
+fn key(text: &str) -> [u8; HASH_BYTES] {
+    let hash = ContentHash::of(text.as_bytes());
     std::array::from_fn(|at| hash.as_bytes()[at])
 }

@@ -13,6 +13,7 @@ use tokio::net::TcpListener;
 
 use super::page;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use mocban_core::domain::Explained;
 use mocban_export::scan_view::{ScanView, assets};
 
 /// The script of the page.
@@ -33,6 +34,8 @@ pub enum ViewError {
     #[error("cannot make a token: {0}")]
     Token(std::io::Error),
 }
+
+impl Explained for ViewError {}
 
 /// A server that is bound and ready to serve.
 #[derive(Debug)]

@@ -5,32 +5,25 @@ use crate::block_stages::{BlockStages, block_settings};
 use crate::error::RunError;
 use crate::input_reads::ReadLimits;
 use crate::policy;
+use crate::retry::retried;
 use mocban_catalog::{BlockSelection, Catalog, RerunPolicy};
 use mocban_core::domain::UnixMillis;
 use mocban_store::Project;
 
-/// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `among`, and ends
+/// Stores which input files of blocks changed, requeues blocks to run again, of all or of those in `selection`, and ends
 /// back-offs that are due.
-///
-/// # Errors
-/// Returns an error if a database operation fails.
 pub(crate) async fn requeue(
     project: &Project,
     catalog: &Catalog,
     stages: &dyn BlockStages,
-    (policy, among): (RerunPolicy, Option<&BlockSelection>),
+    (policy, selection): (RerunPolicy, Option<&BlockSelection>),
     limits: &ReadLimits,
     now: UnixMillis,
 ) -> Result<(), RunError> {
-    inputs::store_changes(project, catalog, among, limits).await?;
+    inputs::store_changes(project, catalog, selection, limits).await?;
     let settings = block_settings(stages);
-    let requeued = catalog.retry_while_unavailable(async || {
-        catalog.requeue_stale_blocks(&settings, policy, among).await
-    });
-    requeued.await?;
+    retried!(catalog.requeue_stale_blocks(&settings, policy, selection))?;
     let longest = policy::longest_backoff_ms();
-    let ended =
-        catalog.retry_while_unavailable(async || catalog.release_due_blocks(now, longest).await);
-    ended.await?;
+    retried!(catalog.release_due_blocks(now, longest))?;
     Ok(())
 }

@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use tokio::sync::oneshot;
 
 use super::artifacts::StageArtifacts;
-use super::checkpoint::{store_failure, store_stage, while_unavailable};
+use super::checkpoint::{store_failure, store_stage};
 use super::inputs::{BlockSources, outdated};
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::BlockStageError;
 use crate::compute_thread::panic_text;
 use crate::error::RunError;
 use crate::events::RunEvent;
+use crate::retry::stored;
 use crate::run_context::RunContext;
 use crate::stop::StopLevel;
 use mocban_catalog::{BlockInputVersions, BlockJob, BlockWork, Lease};
@@ -154,7 +155,7 @@ async fn run_stage(
         // Before the computation, so that a later run knows which files it failed on if the process dies.
         let item = vec![(block.lease.block(), seen.clone())];
         let catalog = &context.catalog;
-        let stored = while_unavailable!(catalog, catalog.store_block_inputs(item.clone()));
+        let stored = stored!(catalog.store_block_inputs(item.clone()));
         stored.map_err(|error| Interruption::Run(error.into()))?;
         block.work.inputs = seen.clone();
     }
@@ -188,8 +189,8 @@ async fn compute(
         sources.check_unchanged(&read)?;
         failpoint::hit(stage, Point::Computed, Some(&inputs.name));
         Ok((output, artifacts.finish()?))
-    });
-    let outcome = outcome.await?;
+    })
+    .await?;
     let ms = begun.elapsed().as_millis() as u64;
     match outcome {
         Ok((output, files)) => Ok(ComputedBlockStage { output, files, ms }),

@@ -145,8 +145,8 @@ impl ObjectCache {
             return Err(local(io::Error::new(ErrorKind::NotFound, text)));
         }
         std::fs::create_dir_all(&self.folder).map_err(local)?;
-        let temporary = tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder);
-        let temporary = temporary.map_err(local)?;
+        let temporary =
+            tempfile::NamedTempFile::with_prefix_in("tmp-", &self.folder).map_err(local)?;
         let target = HashingFile {
             file: temporary.reopen().map_err(local)?,
             hasher: blake3::Hasher::new(),

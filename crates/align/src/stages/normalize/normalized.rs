@@ -96,7 +96,7 @@ impl Normalized {
                 inks: hypotheses,
                 relief,
                 thresholds: Vec::new(),
-                print_turned: None,
+                print_orientation: None,
             },
             prints,
         })

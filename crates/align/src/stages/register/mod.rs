@@ -45,12 +45,12 @@ const MIRROR_WINS: f64 = 1.06;
 const MIRROR_LIKELY: f64 = 1.04;
 
 /// A pair is refused if the probability of the pose, multiplied by the probability of the same character, is below this
-/// share of `min_confidence`. The share is small because damaged blocks and dry prints of the right character have
-/// strokes without a partner too.
+/// fraction of `min_confidence`. The fraction is small because damaged blocks and dry prints of the right character
+/// have strokes without a partner too.
 const UNLIKELY: f64 = 0.05;
 
-/// A light print is refused if the tops cover more than this share of the rim of the depth map. Strokes do not surround
-/// a character, so these tops are the carved ground, seen from the back of the scanned surface.
+/// A light print is refused if the tops cover more than this fraction of the rim of the depth map. Strokes do not
+/// surround a character, so these tops are the carved ground, seen from the back of the scanned surface.
 const TOPS_AT_RIM: f64 = 0.6;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
@@ -202,8 +202,8 @@ fn with_unmatched(
     let range = [levels().max(), levels().min()].map(|level| level.unwrap_or(1));
     let unmatched = Unmatched::of(canvas, range);
     PoseFeatures {
-        tops_alone: unmatched.tops_alone,
-        ink_alone: unmatched.ink_alone,
+        unmatched_tops: unmatched.tops,
+        unmatched_ink: unmatched.ink,
         edge_scatter: unmatched.edge_scatter,
         ink_area: unmatched.ink_area,
         ..features

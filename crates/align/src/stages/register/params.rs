@@ -19,9 +19,9 @@ pub struct RegisterParams {
     /// Whether the pose may have different scales along two perpendicular axes, because a sheet shrinks across its
     /// grain.
     pub anisotropic_scale: bool,
-    /// Smallest depth below the tops that is tried as a threshold, as a share of the relief's depth.
+    /// Smallest depth below the tops that is tried as a threshold, as a fraction of the relief's depth.
     pub threshold_min: f64,
-    /// Largest depth below the tops that is tried as a threshold, as a share of the relief's depth.
+    /// Largest depth below the tops that is tried as a threshold, as a fraction of the relief's depth.
     pub threshold_max: f64,
     /// Smallest confidence in the pose, 0..=1, with which a pair is accepted.
     pub min_confidence: f64,

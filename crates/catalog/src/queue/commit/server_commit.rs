@@ -41,7 +41,7 @@ async fn commit_parts(
     if batch.has_shared_transaction() {
         reply = batch.apply(conn, state.leases.is_searching()).await?;
         if !batch.heartbeats.is_empty() {
-            state.claim_start.begin_again();
+            state.claim_tracker.begin_again();
             // The reply does not depend on it. A broken connection shows at the next statement.
             match counters::fold(conn, !state.has_folded_all).await {
                 Ok(()) => state.has_folded_all = true,
@@ -53,7 +53,7 @@ async fn commit_parts(
             state.leases.remove(lease);
         }
         for lease in batch.releases.items() {
-            state.claim_start.note_release(lease);
+            state.claim_tracker.note_release(lease);
         }
         note_exclusive(failed(), state);
     }
@@ -126,10 +126,10 @@ async fn claim(
     // Before the claim, because nothing may fail between its commit and its reply.
     let unknown = state.leases.unknown(conn, request.worker).await?;
     let began = Instant::now();
-    let start = state.claim_start.of(request, began);
+    let start = state.claim_tracker.of(request, began);
     let mut claimed = server_claim::claim(conn, request, start).await?;
     let times = [began, Instant::now()];
-    state.claim_start.note(request, start, &claimed, times);
+    state.claim_tracker.note(request, start, &claimed, times);
     claimed.extend(without_pairs_of(unknown, &claimed));
     state.leases.add(&claimed);
     Ok(claimed)
@@ -144,6 +144,6 @@ fn without_pairs_of(mut leases: Vec<Lease>, later: &[Lease]) -> Vec<Lease> {
 /// Lets claims search from the beginning after an exclusive lease, which prevented claims.
 fn note_exclusive<'l>(leases: impl Iterator<Item = &'l Lease>, state: &mut CatalogServerState) {
     for lease in leases.filter(|lease| lease.exclusive) {
-        state.claim_start.note_release(lease);
+        state.claim_tracker.note_release(lease);
     }
 }

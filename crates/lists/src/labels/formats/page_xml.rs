@@ -5,14 +5,13 @@ use quick_xml::escape::resolve_predefined_entity;
 use quick_xml::events::{BytesRef, BytesStart, Event};
 use quick_xml::reader::Reader;
 
+use super::page_levels::{LEVELS, PageElement, characters};
 use crate::labels::error::LabelsProblem;
 use crate::labels::message::{line_at, quoted};
 use crate::labels::page_fit::{MAX_CORNERS, check_count};
 use crate::labels::region::{Corners, LabelRegion, PageRegions, checked, filled, polygon};
 use mocban_core::domain::cancel::{PollCounter, polled};
 
-/// Elements that may stand for characters, the smallest first.
-const LEVELS: [&str; 4] = ["Glyph", "Word", "TextLine", "TextRegion"];
 /// Deepest nesting of elements.
 const MAX_DEPTH: usize = 64;
 
@@ -26,18 +25,20 @@ struct OpenElement {
     text: Option<(u32, String)>,
     /// Index of a `TextEquiv`. Of a `Unicode`: 1 once its text was taken.
     index: u32,
+    /// Whether an element inside it may stand for a character and has an outline.
+    is_divided: bool,
 }
 
 /// Regions of a page while its file is read.
 #[derive(Debug, Default)]
 struct PageParser {
     open: Vec<OpenElement>,
-    /// Regions of each of [`LEVELS`].
-    found: [Vec<LabelRegion>; LEVELS.len()],
+    /// The elements that are not divided further.
+    found: Vec<PageElement>,
     page: Option<PageRegions>,
 }
 
-/// Reads the glyphs of a page, or its words if there are no glyphs, else its lines, else its regions.
+/// Reads the smallest elements of a page: glyphs, words that are not divided into glyphs, and so on. See [`characters`].
 pub(in crate::labels) fn read(text: &str) -> Result<PageRegions, LabelsProblem> {
     let mut reader = Reader::from_str(text);
     let mut parser = PageParser::default();
@@ -77,11 +78,7 @@ pub(in crate::labels) fn read(text: &str) -> Result<PageRegions, LabelsProblem> 
     }
     let no_page = || LabelsProblem::at("the element PcGts", "it has no element Page");
     let mut page = parser.page.ok_or_else(no_page)?;
-    page.regions = parser
-        .found
-        .into_iter()
-        .find(|all| !all.is_empty())
-        .unwrap_or_default();
+    (page.regions, page.warnings) = characters(parser.found);
     Ok(page)
 }
 
@@ -281,14 +278,22 @@ impl PageParser {
             return Err("an element ends that did not begin".to_owned().into());
         };
         if let Some(level) = LEVELS.iter().position(|level| **level == element.name) {
-            let found = &mut self.found[level];
-            check_count(found.len() + 1).map_err(XmlProblem::Content)?;
-            found.push(LabelRegion {
-                number: found.len() + 1,
+            let corners = element.corners.and_then(polygon);
+            if element.is_divided {
+                return Ok(());
+            }
+            for around in self.open.iter_mut().filter(|_| corners.is_some()) {
+                around.is_divided = true;
+            }
+            let number = self.found.len() + 1;
+            check_count(number).map_err(XmlProblem::Content)?;
+            let region = LabelRegion {
+                number,
                 name: element.id,
                 text: element.text.as_ref().and_then(|(_, text)| filled(text)),
-                corners: element.corners.and_then(polygon),
-            });
+                corners,
+            };
+            self.found.push(PageElement { level, region });
         }
         Ok(())
     }

@@ -18,7 +18,7 @@ const MIN_SIDE_MM: f64 = 60.0;
 pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, BlockStageError> {
     let scan = &context.inputs.mesh;
     let fail = |error: BlockError| failed(scan, error);
-    let mut mesh = ScanStream::open(scan, context.mesh_limits, context.stop)?;
+    let mut mesh = ScanStream::open(scan, &context.limits.mesh, context.stop)?;
     let (frame, part) = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
     let maps =
         draw_height_maps(&mut mesh, (&frame, &part), context.max_map_pixels).map_err(fail)?;
