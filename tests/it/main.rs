@@ -69,6 +69,7 @@ mod manners;
 mod many_reviewers;
 #[cfg(target_os = "linux")]
 mod memory;
+mod mesh_forms;
 mod names;
 mod object_store;
 mod object_store_blocks;

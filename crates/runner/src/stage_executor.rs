@@ -11,7 +11,6 @@ use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput, png};
 use crate::scan_size;
 use mocban_align::stages::normalize::{NormalizeError, Normalized, PrintMasks};
-use mocban_align::stages::register::RegisterError;
 use mocban_align::stages::{Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
@@ -143,11 +142,11 @@ impl PipelineExecutor {
         let registered = pipeline::register(&depth, &normalized, expected.as_ref(), &self.settings)
             .map_err(|error| {
                 // Name the print if the characters do not match. For other errors, the mesh is the likelier cause.
-                let path = match error {
-                    RegisterError::NoMatch { .. } | RegisterError::OtherCharacter { .. } => {
-                        &pair.attributes.print_path
-                    }
-                    _ => &pair.attributes.mesh_path,
+                let is_of_print = error.cause().is_some_and(|cause| !cause.is_of_scan());
+                let path = if is_of_print {
+                    &pair.attributes.print_path
+                } else {
+                    &pair.attributes.mesh_path
                 };
                 in_file(pair, path, &error.into(), scan_size::length_of_map(&depth))
             })?;

@@ -326,7 +326,7 @@ fn pointers_of_git_are_named_whatever_the_file_is_called() {
         ] {
             assert_eq!(
                 refused(text.as_bytes(), name),
-                "the file is a pointer of Git LFS; it does not hold the mesh, which `git lfs pull` fetches"
+                "the file is a pointer of Git LFS and does not hold the mesh; fetch the mesh with `git lfs pull`"
             );
         }
         let said = refused(b"/annex/objects/SHA256E-s12--ab.stl\n", name);
@@ -347,7 +347,8 @@ fn all_files_of_another_3d_format_get_one_sentence_with_the_conversion() {
             assert_eq!(
                 refused(file, name),
                 format!(
-                    "the file is {kind}; open it in MeshLab, Blender or CloudCompare and export it as PLY"
+                    "the file is {kind}; OBJ, PLY and STL meshes and XYZ points are read: open them in MeshLab, Blender or \
+                     CloudCompare and export them as PLY"
                 )
             );
         }

@@ -10,6 +10,7 @@ mod confidence;
 mod half_canvas;
 mod ink_edge;
 mod metric_thresholds;
+mod mismatch_cause;
 mod params;
 mod pose_search;
 mod refine;
@@ -20,6 +21,7 @@ mod tops_edge;
 mod unmatched;
 
 pub use confidence::ConfidenceInputs;
+pub use mismatch_cause::MismatchCause;
 pub use params::{RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
@@ -29,7 +31,7 @@ use super::normalize::{Normalized, relative_depths};
 use crate::stages::binarize::rim_share;
 use half_canvas::HalfCanvas;
 use metric_thresholds::ChosenThreshold;
-use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures};
+use mocban_core::domain::{Affine2, InkHypothesis, PoseFeatures, ReliefHeights};
 use mocban_core::raster::DepthMap;
 use unmatched::Unmatched;
 
@@ -93,7 +95,18 @@ pub fn register(
     params: &RegisterParams,
 ) -> Result<Registered, RegisterError> {
     let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
-    let depths = relative_depths(depth, &relief);
+    register_relief(depth, &relief, normalized, expected, params)
+        .map_err(|error| error.with_cause(|| MismatchCause::seen_in(depth, &relief)))
+}
+
+fn register_relief(
+    depth: &DepthMap,
+    relief: &ReliefHeights,
+    normalized: &Normalized,
+    expected: Option<&Affine2>,
+    params: &RegisterParams,
+) -> Result<Registered, RegisterError> {
+    let depths = relative_depths(depth, relief);
     let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
     let print = &normalized.prints[search.ink];
     let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
@@ -106,7 +119,7 @@ pub fn register(
         &refined.print_from_depth,
         normalized.outcome.canvas_px,
     );
-    let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    let thresholds = metric_thresholds::choose(depth, relief, &canvas, params)?;
     require_tops(
         depth,
         &normalized.outcome.inks,
@@ -162,7 +175,11 @@ fn require_character(
         });
     }
     if pose * character < UNLIKELY * params.min_confidence {
-        return Err(RegisterError::OtherCharacter { pose, character });
+        return Err(RegisterError::OtherCharacter {
+            pose,
+            character,
+            cause: MismatchCause::default(),
+        });
     }
     Ok(())
 }
@@ -223,6 +240,7 @@ fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(),
         Err(RegisterError::NoMatch {
             confidence,
             needs: params.min_confidence,
+            cause: MismatchCause::default(),
         })
     }
 }

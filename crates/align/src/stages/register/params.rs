@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::mismatch_cause::MismatchCause;
 use crate::stages::score::SsimWindow;
 use mocban_core::domain::{FailureClass, ThresholdMetric};
 
@@ -60,13 +61,15 @@ pub enum RegisterError {
     },
     /// Nothing correlates.
     #[error(
-        "no pose of the relief matches the print: the best correlation is {best:.3}, needs {needs}"
+        "no pose of the relief matches the print: the best correlation is {best:.3}, needs {needs}; {cause}"
     )]
     NoCorrelation {
         /// Best correlation.
         best: f64,
         /// Smallest that counts.
         needs: f64,
+        /// What the scan shows.
+        cause: MismatchCause,
     },
     /// The relief matches the print only if light areas are ink. The print shows dark ink, or the areas surround the
     /// character.
@@ -76,23 +79,27 @@ pub enum RegisterError {
     Inverted,
     /// Strokes of the relief or of the print have no partner in the other one.
     #[error(
-        "relief and print have strokes that the other one lacks (confidence in the pose {pose:.2}, in the same character {character:.3}); is it the print of another character?"
+        "relief and print have strokes that the other one lacks (confidence in the pose {pose:.2}, in the same character {character:.3}); {cause}"
     )]
     OtherCharacter {
         /// Probability that the best pose is right.
         pose: f64,
         /// Probability that relief and print show the same character.
         character: f64,
+        /// What the scan shows.
+        cause: MismatchCause,
     },
     /// Relief and print show different characters, or the evidence for the best pose is too weak.
     #[error(
-        "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
+        "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; {cause}"
     )]
     NoMatch {
         /// Probability that the best pose is right.
         confidence: f64,
         /// The setting.
         needs: f64,
+        /// What the scan shows.
+        cause: MismatchCause,
     },
 }
 
@@ -112,5 +119,26 @@ impl RegisterError {
     /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         FailureClass::NoSolution
+    }
+
+    /// Returns the cause of a mismatch, if this is one.
+    pub const fn cause(&self) -> Option<MismatchCause> {
+        match self {
+            Self::NoCorrelation { cause, .. }
+            | Self::OtherCharacter { cause, .. }
+            | Self::NoMatch { cause, .. } => Some(*cause),
+            _ => None,
+        }
+    }
+
+    /// Replaces the cause of a mismatch by what the scan shows.
+    pub(super) fn with_cause(mut self, seen: impl FnOnce() -> MismatchCause) -> Self {
+        if let Self::NoCorrelation { cause, .. }
+        | Self::OtherCharacter { cause, .. }
+        | Self::NoMatch { cause, .. } = &mut self
+        {
+            *cause = seen();
+        }
+        self
     }
 }

@@ -1,5 +1,6 @@
 //! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
+use super::mismatch_cause::MismatchCause;
 use super::params::{RegisterError, RegisterParams};
 use crate::stages::normalize::{PrintMasks, soft_stroke};
 use crate::stages::pose::{
@@ -202,6 +203,7 @@ fn require_upright(found: &[PoseCandidate]) -> Result<(), RegisterError> {
         return Err(RegisterError::NoCorrelation {
             best: upright,
             needs: LEAST_SCORE,
+            cause: MismatchCause::default(),
         });
     }
     Ok(())
