@@ -3,7 +3,8 @@
 use std::fmt::{Display, Formatter, Result as FormatResult};
 
 use mocban_core::domain::ReliefHeights;
-use mocban_core::raster::{ConnectedComponents, DepthMap};
+use mocban_core::raster::components::ConnectedComponents;
+use mocban_core::raster::{DepthMap, PixelBox};
 
 /// A piece has at least this fraction of the area of the largest piece.
 const LEAST_PIECE: f64 = 0.25;
@@ -41,7 +42,7 @@ impl MismatchCause {
             return Self::Pieces(pieces);
         }
         let bounds = parts.iter().map(|(bounds, _)| *bounds);
-        let length = bounds.reduce(|all, part| all.union(part));
+        let length = bounds.reduce(PixelBox::union);
         let length = length.map_or(0.0, |all| all.longest_side() as f64);
         let depth = relief.depth() / (length * map.scale.mesh_unit_per_px);
         if depth < SHALLOW {
