@@ -202,10 +202,9 @@ fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
         Some(_) => format!(", curvature {:.3} {unit}", fit.curvature_height),
         None => String::new(),
     };
-    let missing = match fit.missing_vertices {
-        0 => String::new(),
-        missing => format!("; {}", missing_sentence(missing)),
-    };
+    let missing = fit.missing_vertices.map_or(String::new(), |missing| {
+        format!("; {}", missing_sentence(missing.get()))
+    });
     format!(
         "relief {:.3} {unit}, rms {:.4} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{missing}",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles

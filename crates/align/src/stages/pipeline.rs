@@ -9,6 +9,8 @@
 //!
 //! The fit stage reads the print to decide the carved side. The page of the crate gives the reason.
 
+use std::num::NonZeroU64;
+
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
 use super::normalize::{self, NormalizeError, Normalized};
@@ -72,7 +74,7 @@ pub fn fit(
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
     }?;
-    outcome.missing_vertices = scan.missing();
+    outcome.missing_vertices = NonZeroU64::new(scan.missing());
     Ok(outcome)
 }
 

@@ -1,5 +1,7 @@
 //! The stage `face`: finds the faces of a scan.
 
+use std::num::NonZeroU64;
+
 use super::context::StageContext;
 use super::failure::{failed, output};
 use super::scan_stream::ScanStream;
@@ -22,10 +24,10 @@ pub(crate) fn face(context: &StageContext<'_>) -> Result<BlockStageOutput, Block
     let (frame, part) = Orientation::find(&mut mesh, context.inputs.unit).map_err(fail)?;
     let maps =
         draw_height_maps(&mut mesh, (&frame, &part), context.max_map_pixels).map_err(fail)?;
-    let missing_vertices = mesh.missing();
+    let missing_vertices = NonZeroU64::new(mesh.missing());
     drop(mesh);
-    if missing_vertices > 0 {
-        let said = missing_sentence(missing_vertices);
+    if let Some(missing) = missing_vertices {
+        let said = missing_sentence(missing.get());
         tracing::warn!(block = %context.inputs.name, "{}: {said}", scan.name());
     }
     let mut faces = Vec::new();
