@@ -119,8 +119,9 @@ pub fn pass_over_binary_stl(
 
 #[cfg(test)]
 mod tests {
-    use super::{STL_HEAD, binary_stl_triangles};
-    use crate::mesh::MeshError;
+    use super::{STL_HEAD, binary_stl_triangles, pass_over_binary_stl};
+    use crate::mesh::write::MeshFormat;
+    use crate::mesh::{Mesh, MeshError, MeshLimits};
 
     /// The first bytes of a binary STL with 300,000 triangles, whose header is a text.
     fn head() -> Vec<u8> {
@@ -159,5 +160,29 @@ mod tests {
             let head = &text.as_bytes()[..STL_HEAD];
             assert_eq!(binary_stl_triangles(head, 5_000, "b.stl"), Ok(None));
         }
+    }
+
+    #[test]
+    fn facets_with_a_corner_without_position_are_left_out() {
+        let corners = vec![
+            [0.0; 3],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.5],
+            [f64::NAN, f64::INFINITY, 0.0],
+        ];
+        let mesh = Mesh {
+            vertices: corners.into(),
+            triangles: vec![[0, 1, 3], [0, 1, 2], [3, 3, 2]].into(),
+        };
+        let bytes = MeshFormat::StlBinary.encode(&mesh);
+        let mut visited = Vec::new();
+        let mut visit = |batch: &[_]| {
+            visited.extend_from_slice(batch);
+            Ok(())
+        };
+        let mut facets = &bytes[STL_HEAD..];
+        let missing = pass_over_binary_stl(&mut facets, 3, &MeshLimits::SUGGESTED, &mut visit);
+        assert_eq!(missing.expect("reads"), 3);
+        assert_eq!(visited, [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]]]);
     }
 }
