@@ -32,7 +32,7 @@ pub enum Details {
 pub struct PairOverview {
     /// The pair.
     pub detail: PairDetail,
-    /// Its manual alignments, oldest first, without those that were undone.
+    /// Its manual alignments, oldest first, without the undone ones.
     pub manual: Vec<ManualResult>,
     /// What the next run would do.
     pub next_run: Option<PlanEntry>,

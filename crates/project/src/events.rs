@@ -1,4 +1,4 @@
-//! What a function tells its caller while it works, such as for the progress bar of a terminal or of a page.
+//! Events that a function reports while it works, such as for the progress bar of a terminal or of a page.
 
 use std::fmt;
 

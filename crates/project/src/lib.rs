@@ -10,7 +10,7 @@
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
 //! - [`verdict_file`], [`truth_file`], [`manifest_file`]: files that people write
 //! - [`demo_folder`]: what a demo may replace
-//! - [`events`]: what a function tells its caller while it works
+//! - [`events`]: what a function reports while it works
 //! - [`error`], [`exit`]: the code of an error, one sentence that says what was seen and what to do, and the exit code
 //!
 //! A function that needs the catalog, the disk or the settings fails if they do. `# Errors` says what else it refuses.

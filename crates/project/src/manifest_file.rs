@@ -98,7 +98,7 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> ProjectResult<Self> {
-        let (mesh_files, print_files) = (files::list(meshes)?, files::list(prints)?);
+        let [mesh_files, print_files] = [files::list(meshes)?, files::list(prints)?];
         let mut unread = UnreadFiles::of(&mesh_files, FileKind::mesh_advice);
         unread.append(UnreadFiles::of(&print_files, FileKind::image_advice));
         let found = pair_folders(&mesh_files, &print_files).map_err(|problems| {

@@ -118,14 +118,14 @@ pub(super) async fn run_with(
         clock,
         stop,
     };
+    // The task is aborted when this function returns.
+    let mut waiting = JoinSet::new();
+    waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     if let Err(error) = start.prepare(&mut guard, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
         let _ = catalog.end_worker(worker, clock.now(), None).await;
         return Err(error);
     }
-    // The task is aborted when this function returns.
-    let mut waiting = JoinSet::new();
-    waiting.spawn(stop_waiting_after_stop(catalog.clone(), stop.clone()));
     let counted = if options.part == RunPart::Plan {
         catalog.end_worker(worker, clock.now(), None).await?;
         (RunCounts::default(), Duration::ZERO)
@@ -170,7 +170,8 @@ impl RunStart<'_> {
             guard.unlock_planning(catalog).await?;
             planned?;
         }
-        let left = catalog.work_left(options.until, self.pairs()).await?;
+        let (until, pairs) = (options.until, self.pairs());
+        let left = retried!(catalog.work_left(until, pairs))?;
         on_event(RunEvent::Started {
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
@@ -235,8 +236,8 @@ impl RunStart<'_> {
         let Some(lock) = guard.exclusive() else {
             return Ok(0);
         };
-        let (dead, now) = (DeadWorker::AllExcept(worker), self.clock.now());
-        let recovered = self.catalog.recover(dead, now).await?;
+        let (catalog, now) = (self.catalog, self.clock.now());
+        let recovered = retried!(catalog.recover(DeadWorker::AllExcept(worker), now))?;
         let (project, poisoned) = (self.project, &recovered.poisoned);
         let limits = read_limits(self.options, self.stop);
         input_changes::store_inputs_of_quarantined(project, self.catalog, poisoned, &limits)
