@@ -49,23 +49,18 @@ impl PositionCheck {
     }
 
     /// Checks some more vertices that faces use.
-    #[inline]
-    pub(super) fn add_used<T: Copy + Into<f64>>(&mut self, positions: &[[T; 3]]) {
-        let values = positions.as_flattened().iter();
-        self.is_finite &= values.fold(true, |finite, value| finite & (*value).into().is_finite());
+    pub(super) fn add_used<T: Coordinate>(&mut self, positions: &[[T; 3]]) {
+        self.is_finite &= are_finite(positions);
     }
 
     /// Checks some more vertices.
     #[inline]
-    pub(super) fn add<T: Copy + Into<f64>>(&mut self, positions: &[[T; 3]]) {
+    pub(super) fn add<T: Coordinate>(&mut self, positions: &[[T; 3]]) {
         let values = positions.as_flattened().iter().map(|value| (*value).into());
         let is_usual = |value: f64| (value.abs() > 0.0) & (value.abs() < f64::INFINITY);
-        if values.fold(true, |usual, value| usual & is_usual(value)) {
-            return;
-        }
-        for position in positions.iter().map(|position| position.map(Into::into)) {
-            self.is_finite &= is_finite(position);
-            self.origins += u64::from(is_origin(position));
+        if !values.fold(true, |usual, value| usual & is_usual(value)) {
+            self.is_finite &= are_finite(positions);
+            self.origins += origins(positions);
         }
     }
 
@@ -124,6 +119,36 @@ impl PositionCheck {
         };
         Ok(MeshRead { mesh, missing })
     }
+}
+
+/// A coordinate of 32 or 64 bits, which is 0 by default.
+pub(super) trait Coordinate: Copy + Into<f64> + PartialEq + Default {}
+
+impl Coordinate for f32 {}
+impl Coordinate for f64 {}
+
+/// Returns whether no coordinate is NaN or infinite.
+#[inline(never)] // As a loop of its own, it is vectorized.
+fn are_finite<T: Coordinate>(positions: &[[T; 3]]) -> bool {
+    let values = positions.as_flattened().iter();
+    values.fold(true, |finite, value| finite & (*value).into().is_finite())
+}
+
+/// Returns the number of positions at the origin.
+fn origins<T: Coordinate>(positions: &[[T; 3]]) -> u64 {
+    if !has_adjacent_zeros(positions.as_flattened()) {
+        return 0;
+    }
+    let is_origin = |position: &&[T; 3]| **position == [T::default(); 3];
+    positions.iter().filter(is_origin).count() as u64
+}
+
+/// Returns whether a value and the next one are 0, as at every origin.
+#[inline(never)] // Like `are_finite`.
+fn has_adjacent_zeros<T: Coordinate>(values: &[T]) -> bool {
+    let zero = T::default();
+    let pairs = values.iter().zip(values.iter().skip(1));
+    pairs.fold(false, |found, (a, b)| found | ((*a == zero) & (*b == zero)))
 }
 
 /// Returns whether no coordinate is NaN or infinite.

@@ -88,9 +88,14 @@ pub(super) fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
+/// Bytes of a sign, a point and the digits that [`decimal::parse`] reads.
+const SHORT_NUMBER: usize = 18;
+
 /// Parses a coordinate. NaN and infinity stand for one that is missing.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
-    if let Some((value, [])) = decimal::parse(word) {
+    if word.len() <= SHORT_NUMBER
+        && let Some((value, [])) = decimal::parse(word)
+    {
         return Some(value);
     }
     parse(word).or_else(|| {

@@ -137,6 +137,7 @@ fn uncounted(body: &[u8], count: u32) -> MeshError {
 /// Vertices of the facets read so far.
 struct FacetBuffer {
     vertices: PageVec<[f32; 3]>,
+    /// Corners of up to [`CHECKED_FACETS`] facets.
     chunk: Vec<[f32; 3]>,
     check: PositionCheck,
 }
@@ -148,7 +149,7 @@ impl FacetBuffer {
         limits.check_vertices(3 * u64::from(count))?;
         Ok(Self {
             vertices: PageVec::with_capacity(3 * count as usize),
-            chunk: Vec::with_capacity(3 * CHECKED_FACETS),
+            chunk: vec![[0.0; 3]; 3 * CHECKED_FACETS],
             check: PositionCheck::NONE,
         })
     }
@@ -158,12 +159,13 @@ impl FacetBuffer {
             if part.is_multiple_of(PARTS_PER_POLL) {
                 poll();
             }
-            self.chunk.clear();
-            for facet in facets {
-                self.chunk.extend(corners(facet));
+            let (triangles, _) = self.chunk.as_chunks_mut::<3>();
+            for (triangle, facet) in triangles.iter_mut().zip(facets) {
+                *triangle = corners(facet);
             }
-            self.check.add_used(&self.chunk);
-            self.vertices.extend_from_slice(&self.chunk);
+            let chunk = &self.chunk[..3 * facets.len()];
+            self.check.add_used(chunk);
+            self.vertices.extend_from_slice(chunk);
         }
     }
 
