@@ -49,13 +49,13 @@ impl PositionCheck {
     }
 
     /// Checks some more vertices that faces use.
-    pub(super) fn add_used<T: Coordinate>(&mut self, positions: &[[T; 3]]) {
+    pub(super) fn add_used<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
         self.is_finite &= are_finite(positions);
     }
 
     /// Checks some more vertices.
     #[inline]
-    pub(super) fn add<T: Coordinate>(&mut self, positions: &[[T; 3]]) {
+    pub(super) fn add<T: CoordinateValue>(&mut self, positions: &[[T; 3]]) {
         let values = positions.as_flattened().iter().map(|value| (*value).into());
         let is_usual = |value: f64| (value.abs() > 0.0) & (value.abs() < f64::INFINITY);
         if !values.fold(true, |usual, value| usual & is_usual(value)) {
@@ -122,20 +122,20 @@ impl PositionCheck {
 }
 
 /// A coordinate of 32 or 64 bits, which is 0 by default.
-pub(super) trait Coordinate: Copy + Into<f64> + PartialEq + Default {}
+pub(super) trait CoordinateValue: Copy + Into<f64> + PartialEq + Default {}
 
-impl Coordinate for f32 {}
-impl Coordinate for f64 {}
+impl CoordinateValue for f32 {}
+impl CoordinateValue for f64 {}
 
 /// Returns whether no coordinate is NaN or infinite.
 #[inline(never)] // As a loop of its own, it is vectorized.
-fn are_finite<T: Coordinate>(positions: &[[T; 3]]) -> bool {
+fn are_finite<T: CoordinateValue>(positions: &[[T; 3]]) -> bool {
     let values = positions.as_flattened().iter();
     values.fold(true, |finite, value| finite & (*value).into().is_finite())
 }
 
 /// Returns the number of positions at the origin.
-fn origins<T: Coordinate>(positions: &[[T; 3]]) -> u64 {
+fn origins<T: CoordinateValue>(positions: &[[T; 3]]) -> u64 {
     if !has_adjacent_zeros(positions.as_flattened()) {
         return 0;
     }
@@ -145,7 +145,7 @@ fn origins<T: Coordinate>(positions: &[[T; 3]]) -> u64 {
 
 /// Returns whether a value and the next one are 0, as at every origin.
 #[inline(never)] // Like `are_finite`.
-fn has_adjacent_zeros<T: Coordinate>(values: &[T]) -> bool {
+fn has_adjacent_zeros<T: CoordinateValue>(values: &[T]) -> bool {
     let zero = T::default();
     let pairs = values.iter().zip(values.iter().skip(1));
     pairs.fold(false, |found, (a, b)| found | ((*a == zero) & (*b == zero)))

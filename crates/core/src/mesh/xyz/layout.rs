@@ -285,12 +285,10 @@ fn cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     };
     std::iter::from_fn(move || {
         let start = skip_space(at);
-        let mut end = start;
-        while let Some(byte) = line.get(end)
-            && !matches!(byte, b',' | b';' | b' ' | b'\t' | b'\r' | b'\n' | b'\x0c')
-        {
-            end += 1;
-        }
+        let rest = line.get(start..).unwrap_or_default();
+        let is_end =
+            |byte: &u8| matches!(byte, b',' | b';' | b' ' | b'\t' | b'\r' | b'\n' | b'\x0c');
+        let end = start + rest.iter().position(is_end).unwrap_or(rest.len());
         at = skip_space(end);
         if let Some(b',' | b';') = line.get(at) {
             at += 1;
