@@ -79,7 +79,7 @@ fn runtime(command: &Command) -> std::io::Result<Runtime> {
 
 async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode> {
     match command {
-        Command::Demo(args) => demo::demo(args, context).await,
+        Command::Demo(args) => Box::pin(demo::demo(args, context)).await,
         Command::Align(args) => align::align(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,

@@ -146,7 +146,7 @@ fn two_pieces(index: u64) -> DecoyPair {
         let [x, y, z] = second.vertices.at(place);
         wrong.mesh.vertices.push([x - start + end + 2.0, y, z]);
     }
-    for corners in second.triangles.iter() {
+    for corners in &second.triangles {
         wrong.mesh.triangles.push(corners.map(|at| at + first));
     }
     wrong

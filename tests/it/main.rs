@@ -71,6 +71,7 @@ mod manners;
 mod many_reviewers;
 #[cfg(target_os = "linux")]
 mod memory;
+mod mesh_forms;
 mod names;
 mod object_store;
 mod object_store_blocks;
@@ -139,5 +140,6 @@ mod tiff_kinds;
 #[cfg(unix)]
 mod tls_to_server;
 mod uninterrupted;
+mod unusual_scans;
 #[cfg(unix)]
 mod watch_workers;

@@ -59,6 +59,7 @@ pub mod sheets;
 pub mod shell;
 pub mod status;
 pub mod truth_file;
+mod unread_files;
 pub mod verdict_file;
 pub mod verdicts;
 pub mod worker_totals;

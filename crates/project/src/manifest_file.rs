@@ -1,6 +1,5 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +7,7 @@ use super::exit::Refusal;
 use super::files;
 use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::missing_files::WINDOWS_HINT;
+use super::unread_files::UnreadFiles;
 use crate::error::ProjectResult;
 use mocban_core::domain::{FileKind, LengthUnit, sanitize};
 use mocban_lists::manifest::{
@@ -105,13 +105,14 @@ impl Listing {
             files::list_below(&root).map(|files| ListedFolder { root, files })
         };
         let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
-        let unread = unread_images(&print_folder.files);
+        let mut unread = UnreadFiles::of(&mesh_folder.files, FileKind::mesh_advice);
+        unread.append(UnreadFiles::of(&print_folder.files, FileKind::image_advice));
         let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
-            let lines = [&[problems.to_string()][..], &unread].concat();
+            let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))
         })?;
-        let others = found.ignored.into_iter();
-        let others: Vec<_> = others.filter(|path| unread_kind(path).is_none()).collect();
+        let mut others = found.ignored;
+        others.retain(|path| !unread.paths.contains(path));
         let mut rows = found.rows;
         for row in &mut rows {
             row.unit = unit;
@@ -121,7 +122,7 @@ impl Listing {
             ignored_files("print without mesh", &found.prints_alone),
             ignored_files("neither mesh nor print", &others),
         ];
-        let warnings = warnings.into_iter().flatten().chain(unread);
+        let warnings = warnings.into_iter().flatten().chain(unread.sentences);
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
@@ -227,83 +228,9 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
     (!paths.is_empty()).then(|| format!("ignored, {reason}: {}{more}", names.join(", ")))
 }
 
-/// Returns the type of image that a path is named like, if that type is not read.
-fn unread_kind(path: &Path) -> Option<FileKind> {
-    FileKind::of_unread_extension(path.extension()?.to_str()?)
-}
-
-/// Returns one sentence for all files of each type of image that is not read.
-fn unread_images(paths: &[PathBuf]) -> Vec<String> {
-    let mut found: BTreeMap<&'static str, (FileKind, Vec<&PathBuf>)> = BTreeMap::new();
-    for path in paths {
-        if let Some(kind) = unread_kind(path) {
-            let (_, paths) = found.entry(kind.name()).or_insert((kind, Vec::new()));
-            paths.push(path);
-        }
-    }
-    let sentence = |(kind, paths): (FileKind, Vec<&PathBuf>)| {
-        let first = paths
-            .iter()
-            .min()
-            .map_or(String::new(), |path| path.display().to_string());
-        let more = match paths.len() - 1 {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let advice = kind.image_advice().unwrap_or_default();
-        format!("ignored, {kind} is not read: {first}{more}; {advice}")
-    };
-    found.into_values().map(sentence).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::{Listing, Project};
-
-    #[test]
-    fn images_that_are_not_read_get_one_sentence_per_format() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let [meshes, prints] = ["meshes", "prints"].map(|name| dir.path().join(name));
-        for folder in [&meshes, &prints] {
-            std::fs::create_dir(folder).expect("a folder");
-        }
-        let write = |path: PathBuf| std::fs::write(path, "").expect("written");
-        for name in ["a.bmp", "b.BMP", "c.bmp", "d.pdf", "notes.txt"] {
-            write(prints.join(name));
-        }
-        write(meshes.join("a.stl"));
-        let sentences = [
-            format!(
-                "ignored, a BMP image is not read: {} and 2 more; convert them, such as with ImageMagick: \
-                 `magick mogrify -format png *.bmp`",
-                prints.join("a.bmp").display()
-            ),
-            format!(
-                "ignored, a PDF document is not read: {}; save their pages as images, such as with \
-                 `pdftoppm -r 600 -png FILE.pdf page`",
-                prints.join("d.pdf").display()
-            ),
-        ];
-        let refused = Listing::from_folders(&meshes, &prints, None).expect_err("no pair");
-        let refused = refused.to_string();
-        for sentence in &sentences {
-            assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
-        }
-        write(prints.join("a.png"));
-        let warnings = Listing::from_folders(&meshes, &prints, None)
-            .expect("a pair")
-            .warnings;
-        let other = format!(
-            "neither mesh nor print: {}",
-            prints.join("notes.txt").display()
-        );
-        assert_eq!(
-            warnings,
-            [&[format!("ignored, {other}")][..], &sentences].concat()
-        );
-    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {

@@ -16,6 +16,7 @@ use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
 use mocban_core::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
+use mocban_core::mesh;
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use mocban_store::Project;
 
@@ -63,6 +64,10 @@ impl PairPipeline {
 
     fn fit(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let scan = self.inputs.read_scan(pair)?;
+        if scan.missing() > 0 {
+            let said = mesh::missing_sentence(scan.missing());
+            tracing::warn!(pair = %pair.attributes.name, "{}: {said}", pair.attributes.mesh_path);
+        }
         let length = scan_size::length_of(&scan.mesh().vertices);
         if let Some(reason) = scan_size::wrong_unit(length, pair.attributes.unit) {
             let text = format!("{}: {reason}", pair.attributes.mesh_path);

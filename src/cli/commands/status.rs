@@ -31,6 +31,7 @@ use mocban_store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(crate) struct StatusArgs {
     /// Refresh every two seconds until Ctrl-C
     #[arg(short, long)]

@@ -81,7 +81,7 @@ impl std::io::Write for LogWriter {
         let line = text.trim_end_matches('\n');
         match self.format {
             LogFormat::Text if self.counts_equal && line.contains("WARN") => {
-                self.screen.log_warning(line)
+                self.screen.log_warning(line);
             }
             LogFormat::Text if self.colours.is_on() => self.screen.log_line(line),
             LogFormat::Text => self.screen.line(line),

@@ -144,10 +144,7 @@ impl RunProgress {
     /// Returns the percentage of finished stages, rounded down. At 100, all stages are finished.
     pub(crate) fn percent(&self) -> u64 {
         let (finished, stages) = self.position();
-        match (finished * 100).checked_div(stages) {
-            Some(percent) => percent,
-            None => 100,
-        }
+        (finished * 100).checked_div(stages).unwrap_or(100)
     }
 
     /// Returns stages of pairs per second since all blocks are cut; `None` before the first stage.

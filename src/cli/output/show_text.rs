@@ -8,6 +8,7 @@ use mocban_core::domain::{
     DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
     Verdict, one_line,
 };
+use mocban_core::mesh::missing_sentence;
 use mocban_project::details::{Adjustment, ManualResult};
 use mocban_results::ManualCorrection;
 use mocban_store::Project;
@@ -212,9 +213,12 @@ fn fit_numbers(fit: &FitOutcome, unit: &str) -> String {
         ),
         None => String::new(),
     };
+    let missing = fit.missing_vertices.map_or(String::new(), |missing| {
+        format!("; {}", missing_sentence(missing.get()))
+    });
     let [relief, rms] = [fit.relief, fit.rms].map(|length| significant(length, DIGITS));
     format!(
-        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles",
+        "relief {relief} {unit}, rms {rms} {unit}, inliers {:.2}, side confidence {:.2}{curvature}; {} vertices, {} triangles{missing}",
         fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }

@@ -9,10 +9,15 @@ use mocban_core::raster::{DepthMap, Mask};
 
 /// A piece of a scan counts if it has at least this fraction of the area with data.
 const PIECE: f64 = 0.15;
+/// More pieces than this are strokes or gaps of one scan.
+const MOST_PIECES: usize = 3;
 /// A relief that is less deep than this fraction of the longer side of the scan is no carving. Carvings have several percent.
 const FLAT: f64 = 0.012;
 /// One half of the print agrees with the relief if its `IoU` is at least the first value, and not if it is below the second.
 const HALF_IOU: [f64; 2] = [0.6, 0.25];
+
+/// Whether a pixel is in a part of a canvas.
+type InPart<'a> = &'a dyn Fn(usize, usize) -> bool;
 
 /// Something unusual about a pair that does not match.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,7 +61,7 @@ impl Observation {
         let least = PIECE * known.count() as f64;
         let large = parts.iter().filter(|(_, area)| *area as f64 >= least);
         let pieces = large.count();
-        if pieces > 1 {
+        if (2..=MOST_PIECES).contains(&pieces) {
             return Self::Pieces(pieces);
         }
         let longest = depth.levels.width().max(depth.levels.height()) as f64;
@@ -71,7 +76,7 @@ impl Observation {
     pub(super) fn of_halves(canvas: &HalfCanvas, level: u16) -> Self {
         let strokes = canvas.mask(level);
         let (width, height) = (strokes.width(), strokes.height());
-        let halves: [(&str, &dyn Fn(usize, usize) -> bool); 4] = [
+        let halves: [(&str, InPart<'_>); 4] = [
             ("left", &|x, _| x < width / 2),
             ("right", &|x, _| x >= width / 2),
             ("upper", &|_, y| y < height / 2),
@@ -81,6 +86,11 @@ impl Observation {
         let [agrees, differs] = HALF_IOU;
         let found = (0..4).find(|half| iou[*half] >= agrees && iou[*half ^ 1] < differs);
         found.map_or(Self::Nothing, |half| Self::Half(halves[half].0))
+    }
+
+    /// Returns whether the scan, rather than the print, is the likelier cause.
+    pub const fn is_of_scan(self) -> bool {
+        matches!(self, Self::Pieces(_) | Self::Flat(_))
     }
 
     /// Returns the first observation that is not nothing.
@@ -151,6 +161,11 @@ mod tests {
         assert_eq!(
             Observation::of_scan(&two, &relief(0.8)),
             Observation::Pieces(2)
+        );
+        let strokes = scan(|x, _| x % 20 < 10);
+        assert_eq!(
+            Observation::of_scan(&strokes, &relief(0.8)),
+            Observation::Nothing
         );
         // A crumb beside the block is no piece.
         let crumb = scan(|x, y| x < 90 || (x > 95 && y < 5));
