@@ -118,8 +118,7 @@ pub async fn import_blocks(
     }
     let rows = listing.rows.iter().map(|row| stored_row(row, &project));
     let rows: Vec<BlockAttributes> = rows.collect::<Result<_, _>>()?;
-    let checked = async || Ok(());
-    let summary = import_with(&project, url.as_deref(), checked, async |catalog| {
+    let summary = import_with(&project, url.as_deref(), async |catalog| {
         Ok(catalog
             .import_blocks(rows.clone(), allowed.files, now())
             .await?)

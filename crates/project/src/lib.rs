@@ -52,6 +52,7 @@ pub mod report;
 pub mod restore;
 pub mod retire;
 pub mod retry;
+mod row_spool;
 pub mod run;
 pub mod selection;
 pub mod sheets;
