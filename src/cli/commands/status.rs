@@ -31,6 +31,10 @@ use mocban_store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a choice of its own, with a name"
+)]
 pub(crate) struct StatusArgs {
     /// Refresh every two seconds until Ctrl-C
     #[arg(short, long)]

@@ -57,14 +57,16 @@ impl Screen {
 
     /// Writes a warning, or counts it if equal ones were written before.
     pub(crate) fn warning(&self, label: &str, text: &str) {
-        let lines = self.warnings().add(label, text, Instant::now());
-        lines.iter().for_each(|line| self.line(line));
+        for line in self.warnings().add(label, text, Instant::now()) {
+            self.line(&line);
+        }
     }
 
     /// Writes the numbers of warnings that were only counted.
     pub(crate) fn count_warnings(&self) {
-        let lines = self.warnings().take();
-        lines.iter().for_each(|line| self.line(line));
+        for line in self.warnings().take() {
+            self.line(&line);
+        }
     }
 
     fn warnings(&self) -> MutexGuard<'_, EqualWarnings> {
