@@ -57,15 +57,17 @@ impl Screen {
 
     /// Writes a warning, or counts it if equal ones were written before.
     pub(crate) fn warning(&self, label: &str, text: &str) {
-        for line in self.warnings().add(label, text, Instant::now()) {
-            self.line(&line);
+        let lines = self.warnings().add(label, text, Instant::now());
+        for line in &lines {
+            self.line(line);
         }
     }
 
     /// Writes the numbers of warnings that were only counted.
     pub(crate) fn count_warnings(&self) {
-        for line in self.warnings().take() {
-            self.line(&line);
+        let lines = self.warnings().take();
+        for line in &lines {
+            self.line(line);
         }
     }
 
