@@ -29,7 +29,7 @@ pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
 }
 
 /// Returns where the script of a shell goes, as lines.
-pub(crate) fn place(shell: Shell) -> &'static str {
+const fn place(shell: Shell) -> &'static str {
     match shell {
         Shell::Bash => {
             "Write this script to a file where bash finds it, then open a new terminal:\n  \
