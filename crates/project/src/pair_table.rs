@@ -80,7 +80,7 @@ pub async fn read(catalog: &Catalog, choice: PairChoice) -> ProjectResult<Vec<Pa
     Ok(rows)
 }
 
-/// Returns the line of a pair, if it is chosen. Pairs of low confidence are those that `status` counts.
+/// Returns the line of a pair, if it is chosen. Low confidence means the same as in `status`.
 fn row(pair: &PairResults, choice: PairChoice) -> Option<PairRow> {
     let default = pair.metric(ThresholdMetric::DEFAULT);
     let record = match choice {

@@ -25,9 +25,9 @@ struct WarningKind {
     /// The first one.
     first: String,
     shown_at: Instant,
-    /// Number of those that were shown in full.
+    /// Number shown in full.
     shown: u64,
-    /// Number of those that were only counted since.
+    /// Number only counted since then.
     counted: u64,
 }
 
