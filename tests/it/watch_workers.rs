@@ -141,9 +141,10 @@ fn two_workers_are_shown_while_they_run_stop_and_end() {
         assert_eq!(worker.metric("mocban_pairs_failed_total"), 0.0);
         assert!(worker.metric("mocban_pairs_leased") >= 1.0);
         let count = "mocban_stage_duration_seconds_count";
-        assert_eq!(worker.metric(&format!("{count}{{stage=\"fit\"}}")), 2.0);
+        // A lease that ends on a slow machine lets a stage run again.
+        assert!(worker.metric(&format!("{count}{{stage=\"fit\"}}")) >= 2.0);
         let register = format!("{count}{{stage=\"register\"}}");
-        assert_eq!(worker.metric(&register), 1.0);
+        assert!(worker.metric(&register) >= 1.0);
         for reason in ["database", "inputs"] {
             let name = format!("mocban_wait_seconds_total{{for=\"{reason}\"}}");
             assert!(worker.metric(&name) > 0.0, "{reason}");
