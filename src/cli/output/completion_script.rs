@@ -17,7 +17,7 @@ pub(crate) fn completion_script(shell: Shell, command: &mut Command) -> String {
     let note = place.lines().map(|line| format!("# {line}\n"));
     let note: String = note.collect();
     match shell {
-        // The first line tells zsh for which command the file is.
+        // zsh reads the name of the command from the first line.
         Shell::Zsh => match script.split_once('\n') {
             Some((first, rest)) => format!("{first}\n{note}\n{ZSH_NAMES}{rest}"),
             None => script,
