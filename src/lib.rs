@@ -17,7 +17,7 @@ pub use mocban_config as config;
 pub use mocban_core::{domain, mesh, page_vec, raster, simd};
 pub use mocban_demo as demo;
 pub use mocban_export as export;
-pub use mocban_lists::{labels, manifest};
+pub use mocban_lists::{labels, manifest, workbook};
 pub use mocban_pages::{local_server, review, view};
 pub use mocban_project as project;
 pub use mocban_report as report;

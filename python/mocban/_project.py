@@ -269,7 +269,14 @@ class Project:
         """
         return self._writable().add_verdict(id, metric, verdict, reviewer, reason, note, expect)
 
-    def import_pairs(self, rows: Any, *, allow_missing: bool = False) -> dict[str, Any]:
+    def import_pairs(
+        self,
+        rows: Any,
+        *,
+        allow_missing: bool = False,
+        allow_changed_files: bool = False,
+        replace: bool = False,
+    ) -> dict[str, Any]:
         """Import pairs, as ``mocban import`` does. If a row is refused, nothing is imported.
 
         Parameters
@@ -279,15 +286,24 @@ class Project:
             ``scanned_face_down``; others are kept. Paths are relative to the working directory. None and NaN are left out.
         allow_missing : bool
             Whether files may be missing.
+        allow_changed_files : bool
+            Whether most of the pairs that the project has may get another mesh and another print.
+        replace : bool
+            Whether pairs that ``rows`` does not have are retired: they are in no count, and their results and verdicts
+            are kept.
 
         Returns
         -------
         dict
-            Numbers ``added`` and ``unchanged``, ids ``changed``, and ``missing_files``.
+            Numbers ``added``, ``unchanged``, ``retired`` and ``restored``, ids ``changed``, and ``missing_files``.
         """
         lines = "".join(json.dumps(_row(row), ensure_ascii=False) + "\n" for row in _records(rows))
         file = Path.cwd() / "rows.jsonl"
-        outcome = json.loads(self._writable().import_pairs(os.fspath(file), lines.encode(), allow_missing))
+        project = self._writable()
+        rows_json = lines.encode()
+        outcome = json.loads(
+            project.import_pairs(os.fspath(file), rows_json, allow_missing, allow_changed_files, replace)
+        )
         for warning in outcome.pop("warnings"):
             _warn(warning)
         return outcome

@@ -9,7 +9,7 @@ use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcom
 
 use super::commands::{
     align, backup, check, completions, config, contact_sheet, copy, db, demo, docs, export, import,
-    man, report, restore, retry, review, run, show, status, verdict, view, worker,
+    man, report, restore, retire, retry, review, run, show, status, verdict, view, worker,
 };
 use super::input::examples::{with_examples, without_global_options};
 use super::input::global::Global;
@@ -53,6 +53,8 @@ pub(super) enum Command {
     Show(show::ShowArgs),
     /// Let failed pairs run again
     Retry(retry::RetryArgs),
+    /// Take pairs out of every count, or bring them back; their results and verdicts are kept
+    Retire(retire::RetireArgs),
     /// Check files, rows and counters against each other
     Check(check::CheckArgs),
     /// Copy pairs, results, verdicts and settings to one file, also during a run

@@ -14,7 +14,8 @@ use tokio::runtime::{Builder, Runtime};
 use args::Command;
 use commands::{
     agreement, align, backup, check, completions, config, contact_sheet, copy, db, demo, docs,
-    export, import, man, report, restore, retry, review, run, show, status, verdict, view, worker,
+    export, import, man, report, restore, retire, retry, review, run, show, status, verdict, view,
+    worker,
 };
 use input::nearby_projects;
 pub use mocban_project::ExitCode;
@@ -53,7 +54,9 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => report_error(&error, &context),
     };
-    panics::catch(work, |text| context.error(text, ExitCode::Error))
+    let code = panics::catch(work, |text| context.error(text, ExitCode::Error));
+    context.screen.count_warnings();
+    code
 }
 
 fn start(command: Command, context: &Context) -> ProjectResult<ExitCode> {
@@ -76,7 +79,7 @@ fn runtime(command: &Command) -> std::io::Result<Runtime> {
 
 async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode> {
     match command {
-        Command::Demo(args) => demo::demo(args, context).await,
+        Command::Demo(args) => Box::pin(demo::demo(args, context)).await,
         Command::Align(args) => align::align(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
@@ -85,6 +88,7 @@ async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
+        Command::Retire(args) => retire::retire(args, context).await,
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Copy(args) => copy::copy(args, context).await,
@@ -98,9 +102,9 @@ async fn dispatch(command: Command, context: &Context) -> ProjectResult<ExitCode
         Command::Export(args) => export::export(args, context).await,
         Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
-        Command::Completions(args) => completions::completions(&args, args::command()),
-        Command::Docs(args) => docs::docs(&args, context),
-        Command::Man(args) => man::man(&args, args::command(), context),
+        Command::Completions(args) => completions::completions(&args, args::command()).await,
+        Command::Docs(args) => docs::docs(args, context),
+        Command::Man(args) => man::man(args, args::command(), context),
     }
 }
 

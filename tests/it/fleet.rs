@@ -84,18 +84,18 @@ impl Fleet {
     }
 
     /// Starts a worker, and waits until the server knows it. A crash of the server before that ends a worker.
-    fn registered_worker(&self, known: &mut i64) -> Child {
+    fn registered_worker(&self) -> Child {
         let mut worker = self.worker();
-        loop {
-            let count = self.on_server(async |conn| {
-                let count = "SELECT count(*) FROM mocban.worker";
-                sqlx::query_scalar(count).fetch_one(conn).await
-            });
-            if count > *known || worker.try_wait().expect("a state").is_some() {
-                *known = count;
-                return worker;
-            }
-        }
+        let pid = i64::from(worker.id());
+        let is_known = || {
+            self.on_server(async |conn| {
+                let exists = "SELECT EXISTS (SELECT 1 FROM mocban.worker WHERE pid = $1)";
+                let exists = sqlx::query_scalar::<_, bool>(exists).bind(pid);
+                exists.fetch_one(conn).await
+            })
+        };
+        while !is_known() && worker.try_wait().expect("a state").is_none() {}
+        worker
     }
 
     /// Calls a function with a connection to the server.
@@ -202,10 +202,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
     };
     fleet.shared(&["plan"]).expect(0);
     let mut dice = ChaCha8Rng::seed_from_u64(24);
-    let mut known = 1;
-    let mut workers: Vec<Child> = (0..3)
-        .map(|_| fleet.registered_worker(&mut known))
-        .collect();
+    let mut workers = [(); 3].map(|()| fleet.registered_worker());
     let mut crashes_at_work = 0;
     for kill in 0..kills {
         // The crash must come at a random moment, so the test waits for a time and not for an event.
@@ -220,7 +217,7 @@ fn crashes_of_the_server_and_of_workers_lose_nothing() {
             // It may have ended.
             let _ = workers[victim].kill();
             workers[victim].wait().expect("an exit code");
-            workers[victim] = fleet.registered_worker(&mut known);
+            workers[victim] = fleet.registered_worker();
         }
     }
     assert!(

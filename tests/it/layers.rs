@@ -7,11 +7,10 @@ use crate::source_text::{SourceFile, package_dir, paths_after, source_files};
 
 /// Dependencies that only these crates may have.
 const ONLY_IN: &[(&str, &[&str])] = &[
-    ("anyhow", &["mocban", "project"]),
     ("anyhow", &[]),
     ("clap", &["mocban"]),
     ("fax", &["core"]),
-    ("flate2", &["core"]),
+    ("flate2", &["core", "lists"]),
     ("indicatif", &["mocban"]),
     ("pulldown-cmark", &["mocban"]),
     ("toml", &["mocban", "config"]),

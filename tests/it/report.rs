@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban::catalog::{Catalog, ImportChunk, ImportRow, NewVerdict, ReviewContext};
+use mocban::catalog::{Catalog, ImportChunk, ImportRow, ImportTerms, NewVerdict, ReviewContext};
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
@@ -101,8 +101,11 @@ impl FinishedRun {
             value["tops_mask"] = stored(Path::new(tops)).into();
             (name(value["id"].as_str().expect("an id")), value)
         });
-        let truths = truths.collect();
-        let imported = self.catalog.import_all(chunks, truths, NOW).await;
+        let terms = ImportTerms {
+            truths: truths.collect(),
+            ..ImportTerms::default()
+        };
+        let imported = self.catalog.import_all(chunks, terms, NOW).await;
         imported.expect("imported");
     }
 

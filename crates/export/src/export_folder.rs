@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::manifest::{self, MANIFEST};
 use mocban_core::domain::{ErrorCode, Explained};
-use mocban_store::{Leftover, ReplaceError, ReplacementFolder};
+use mocban_store::{Leftover, ReplaceError, ReplacementFolder, create_folders};
 
 /// An export that is written next to its target and then replaces the target.
 #[derive(Debug)]
@@ -106,11 +106,9 @@ pub(super) fn at(path: &Path) -> impl Fn(io::Error) -> FolderError {
 /// Writes a file below a folder, and creates its parent folders.
 pub(super) fn write_below(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FolderError> {
     let path = root.join(below);
-    match path.parent().map_or(Ok(()), fs::create_dir_all) {
-        // `AlreadyExists` means that the folder exists but cannot be inspected. The write below reports the cause.
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(at(&path)(error)),
-        Ok(()) | Err(_) => {}
-    }
+    path.parent()
+        .map_or(Ok(()), create_folders)
+        .map_err(at(&path))?;
     fs::write(&path, bytes).map_err(at(&path))
 }
 

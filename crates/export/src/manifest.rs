@@ -16,7 +16,7 @@ use super::options::ExportOptions;
 use mocban_core::domain::PairName;
 
 /// Name of the manifest.
-pub(super) const MANIFEST: &str = "export.json";
+pub const MANIFEST: &str = "export.json";
 /// Version of the manifest.
 const VERSION: u32 = 1;
 /// Longest manifest that is read, in bytes.

@@ -253,7 +253,7 @@ impl<'a> PairPictures<'a> {
         let mesh = match mesh::read_from(&mut file, size, stored, limits) {
             Err(MeshReadError::Io(error)) => return Err(file.error(error).into()),
             Err(MeshReadError::Mesh(source)) => Err(source),
-            Ok(mesh) => Ok(mesh),
+            Ok(read) => Ok(read.mesh),
         };
         let digest = file.finish()?;
         let aligned = self.pair.stage(Stage::Fit).map(|record| record.mesh_hash);

@@ -17,7 +17,7 @@ use mocban_store::{Input, InputError, Leftover, open_input, read_input};
 
 /// One scan and one print.
 #[derive(Debug, Clone)]
-pub struct MeshAndPrint {
+pub struct AlignInput {
     /// The mesh.
     pub mesh: PathBuf,
     /// The image of the print.
@@ -45,16 +45,16 @@ pub enum FileAlignment {
 ///
 /// # Errors
 /// Returns an error if a file cannot be read.
-pub async fn align(files: MeshAndPrint, location: &Location) -> ProjectResult<FileAlignment> {
+pub async fn align(input: AlignInput, location: &Location) -> ProjectResult<FileAlignment> {
     let config = location.settings()?.config;
-    let work = move || align_files(&files, &config.stages, &config.limits);
+    let work = move || align_files(&input, &config.stages, &config.limits);
     Ok(tokio::task::spawn_blocking(work)
         .await
         .map_err(TaskStopped)??)
 }
 
 fn align_files(
-    files: &MeshAndPrint,
+    files: &AlignInput,
     settings: &Settings,
     limits: &InputLimits,
 ) -> Result<FileAlignment, Refusal> {
@@ -133,11 +133,11 @@ pub fn align_pair(
 pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let opened = open_input(&input, limits.mesh.max_bytes, "limits.mesh.max_bytes");
-    let mut file = opened.map_err(unreadable)?;
+    let mut file = opened.map_err(|error| unreadable(&error))?;
     let (size, name) = (file.size(), path.to_string_lossy());
     match mesh::read_from(&mut file, size, &name, &limits.mesh) {
         Ok(mesh) => Ok(Ok(mesh.into())),
-        Err(mesh::MeshReadError::Io(error)) => Err(unreadable(file.error(error))),
+        Err(mesh::MeshReadError::Io(error)) => Err(unreadable(&file.error(error))),
         Err(mesh::MeshReadError::Mesh(error)) => {
             Ok(Err(Failure::new(error.class(), format!("{name}: {error}"))))
         }
@@ -148,14 +148,14 @@ pub fn read_scan(path: &Path, limits: &InputLimits) -> Result<Result<Scan, Failu
 pub fn read_print(path: &Path, limits: &InputLimits) -> Result<Result<Print, Failure>, Refusal> {
     let input = Input::file(path.to_owned());
     let read = read_input(&input, limits.image.max_bytes, "limits.image.max_bytes");
-    let file = read.map_err(unreadable)?;
+    let file = read.map_err(|error| unreadable(&error))?;
     let decoded = raster::decode(&file.bytes, &limits.image);
     Ok(decoded
         .map(Print::from)
         .map_err(|error| Failure::new(error.class(), format!("{}: {error}", path.display()))))
 }
 
-fn unreadable(error: InputError) -> Refusal {
+fn unreadable(error: &InputError) -> Refusal {
     Refusal::Usage(error.to_string())
 }
 

@@ -38,7 +38,7 @@ pub async fn backup(
     let shown = file.display();
     let failed = || format!("cannot write the backup {shown}");
     check_target(file, &project)?;
-    files::refuse_missing_folder(file)?;
+    files::create_parent(file)?;
     let _lock = TargetLock::acquire(file).with_context(failed)?;
     let settings = files::small(&project.settings_path())?;
     let staging = StagingFolder::beside(file).with_context(failed)?;

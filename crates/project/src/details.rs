@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use crate::error::{ProjectError, ProjectResult};
-use crate::exit::Refusal;
 use crate::location::Location;
 use crate::selection;
 use mocban_catalog::{
@@ -81,12 +80,6 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
     let fingerprints = fingerprints(&location.settings()?.config.stages);
     let next_run = catalog.why(name, &fingerprints).await?;
     let Some(detail) = catalog.pair(name).await? else {
-        if catalog.retired_pairs().await?.contains(name) {
-            let text = format!(
-                "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
-            );
-            return Err(Refusal::NothingSelected(text).into());
-        }
         let text = format!("pair {name} was removed while it was read");
         return Err(ProjectError::unexpected(text));
     };
@@ -101,9 +94,30 @@ pub async fn read(id: &str, catalog: &Catalog, location: &Location) -> ProjectRe
 /// Returns the names of all blocks and of all pairs that are not retired.
 pub async fn names(catalog: &Catalog) -> ProjectResult<(Vec<BlockName>, Vec<PairName>)> {
     let (blocks, mut pairs) = (catalog.block_names().await?, catalog.pair_names().await?);
-    let retired: BTreeSet<PairName> = catalog.retired_pairs().await?.into_iter().collect();
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired: BTreeSet<PairName> = retired.map(|pair| pair.name).collect();
     pairs.retain(|pair| !retired.contains(pair));
     Ok((blocks, pairs))
+}
+
+/// Returns the first ids of blocks, and of pairs unless `only_blocks` is set, that begin with a text.
+pub async fn names_with_prefix(
+    location: &Location,
+    prefix: &str,
+    only_blocks: bool,
+    limit: usize,
+) -> ProjectResult<Vec<String>> {
+    let (_, catalog) = location.open_read_only().await?;
+    let blocks = catalog.block_names().await?.into_iter();
+    let blocks = blocks.map(|name| name.to_string());
+    let mut names: Vec<String> = blocks.filter(|name| name.starts_with(prefix)).collect();
+    if !only_blocks {
+        let pairs = catalog.pair_names_with_prefix(prefix, limit).await?;
+        names.extend(pairs.iter().map(PairName::to_string));
+    }
+    catalog.close().await;
+    names.truncate(limit);
+    Ok(names)
 }
 
 async fn manual_results(

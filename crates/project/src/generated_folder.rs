@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{ProjectResult, WithContext as _};
 use crate::exit::Refusal;
-use mocban_store::{Leftover, ReplacementFolder};
+use crate::files::refuse_project_file;
+use mocban_store::{Leftover, ReplacementFolder, create_folders};
 
 /// A folder and what it is for.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +37,7 @@ impl GeneratedFolder<'_> {
         for (path, bytes) in files {
             let path = folder.path().join(path);
             let parent = path.parent().unwrap_or(folder.path());
-            fs::create_dir_all(parent).with_context(failed)?;
+            create_folders(parent).with_context(failed)?;
             fs::write(path, bytes).with_context(failed)?;
         }
         // Somebody may have put files there in the meantime.
@@ -44,11 +45,12 @@ impl GeneratedFolder<'_> {
         folder.finish().with_context(failed)
     }
 
-    /// Refuses a folder that holds anything but files with these paths.
+    /// Refuses a folder that holds anything but files with these paths, or that belongs to a project.
     ///
     /// # Errors
     /// Returns an error that names a foreign file, or if the folder cannot be read.
     pub fn refuse_foreign(self, names: &[&Path]) -> ProjectResult<()> {
+        refuse_project_file(self.dir)?;
         let shown = self.dir.display();
         let exists = self.dir.try_exists();
         if !exists.with_context(|| format!("cannot read {shown}"))? {

@@ -4,8 +4,9 @@
 //! - [`align`]: one scan with one print, without a project
 //! - [`import_pairs`], [`import_blocks`]: add pairs and blocks from lists, folders or single files
 //! - [`run`]: prepares, plans and does a run; [`retry`] lets failed pairs run again
-//! - [`status`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or block, and whether
-//!   files and rows are sound
+//! - [`retire`]: takes pairs out of every count, and brings them back
+//! - [`status`], [`pair_table`], [`hosts`], [`details`], [`check`]: the state of all pairs, of workers and of one pair or
+//!   block, and whether files and rows are sound
 //! - [`verdicts`]: records, imports, lists and undoes what people say about results
 //! - [`report`], [`export`], [`sheets`]: results as a table, as files for other tools, and as pictures
 //! - [`backup`], [`restore`], [`copy`]: copy a project to one file, make a project of it, copy a catalog to another database
@@ -46,15 +47,19 @@ pub mod location;
 pub mod manifest_file;
 pub mod missing_files;
 pub mod new_project;
+pub mod pair_table;
 pub mod report;
 pub mod restore;
+pub mod retire;
 pub mod retry;
+mod row_spool;
 pub mod run;
 pub mod selection;
 pub mod sheets;
 pub mod shell;
 pub mod status;
 pub mod truth_file;
+mod unread_files;
 pub mod verdict_file;
 pub mod verdicts;
 pub mod worker_totals;

@@ -1,17 +1,18 @@
 //! Reads a manifest or lists two directories, and passes the content to the parsers in `manifest`.
 
-use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 use super::files;
-use super::input_paths::{find_on_disk, is_windows_path, similar_file};
+use super::input_paths::{SimilarFiles, find_on_disk, is_windows_path};
 use super::missing_files::WINDOWS_HINT;
+use super::unread_files::UnreadFiles;
 use crate::error::ProjectResult;
 use mocban_core::domain::{FileKind, LengthUnit, sanitize};
 use mocban_lists::manifest::{
-    ManifestError, ManifestRow, MisspeltColumns, RowIds, pair_folders, read_csv, read_jsonl,
+    ListedFolder, ManifestError, ManifestRow, MisspeltColumns, ReadRows, RowIds, pair_folders,
+    read_csv, read_jsonl,
 };
 use mocban_store::Project;
 
@@ -40,8 +41,8 @@ enum ListingSource {
     Folders(Vec<ManifestRow>),
 }
 
-/// Calls a function for each row; returns the ids of all rows.
-type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
+/// Calls a function for each row; returns the ids of all rows, and which columns have other names.
+type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<ReadRows, ManifestError>;
 
 /// Refuses a manifest as a whole.
 pub fn refuse(from: &Path, problems: &impl Display) -> Refusal {
@@ -74,8 +75,9 @@ impl Listing {
         };
         let mut misspelt = MisspeltColumns::default();
         let mut each = |row: ManifestRow| misspelt.add(&row);
-        let ids = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
-        let warnings = misspelt.warnings();
+        let read = parse(&bytes, &mut each).map_err(|problems| refuse(file, &problems))?;
+        let mut warnings = misspelt.warnings();
+        warnings.extend(renamed(&read));
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -83,13 +85,13 @@ impl Listing {
                 parse,
                 folder,
             },
-            ids,
+            ids: read.ids,
             warnings,
             row_label: format!("{shown}: line"),
         })
     }
 
-    /// Pairs each mesh of one directory with the print of the same file stem in the other directory.
+    /// Pairs each mesh of one directory with the print of the same folder and file stem in the other directory.
     ///
     /// # Errors
     /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
@@ -98,14 +100,19 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> ProjectResult<Self> {
-        let [mesh_files, print_files] = [files::list(meshes)?, files::list(prints)?];
-        let unread = unread_images(&print_files);
-        let found = pair_folders(&mesh_files, &print_files).map_err(|problems| {
-            let lines = [&[problems.to_string()][..], &unread].concat();
+        let listed = |root: &Path| {
+            let root = root.to_owned();
+            files::list_below(&root).map(|files| ListedFolder { root, files })
+        };
+        let (mesh_folder, print_folder) = (listed(meshes)?, listed(prints)?);
+        let mut unread = UnreadFiles::of(&mesh_folder.files, FileKind::mesh_advice);
+        unread.append(UnreadFiles::of(&print_folder.files, FileKind::image_advice));
+        let found = pair_folders(&mesh_folder, &print_folder).map_err(|problems| {
+            let lines = [&[problems.to_string()][..], &unread.sentences].concat();
             refuse(meshes, &lines.join("\n"))
         })?;
-        let others = found.ignored.into_iter();
-        let others: Vec<_> = others.filter(|path| unread_kind(path).is_none()).collect();
+        let mut others = found.ignored;
+        others.retain(|path| !unread.paths.contains(path));
         let mut rows = found.rows;
         for row in &mut rows {
             row.unit = unit;
@@ -115,11 +122,11 @@ impl Listing {
             ignored_files("print without mesh", &found.prints_alone),
             ignored_files("neither mesh nor print", &others),
         ];
-        let warnings = warnings.into_iter().flatten().chain(unread);
+        let warnings = warnings.into_iter().flatten().chain(unread.sentences);
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            warnings: warnings.collect(),
+            warnings: warnings.chain(found.similar).collect(),
             row_label: "pair".to_owned(),
         })
     }
@@ -131,21 +138,13 @@ impl Listing {
             path.to_str()
                 .is_some_and(|path| project.is_below_root(path))
         };
-        // A search for a similar name lists a folder, so only the first missing files get one.
-        let mut searches = MAX_SEARCHES;
+        let mut searches = SimilarFiles::default();
         let mut each = |mut row: ManifestRow| {
             let files = [("mesh", &mut row.mesh), ("print", &mut row.print)].into_iter();
             let place = (self.row_label.as_str(), row.line);
             let missing = files
                 .filter_map(|(kind, path)| {
-                    let text = locate_file(place, kind, path, &row.name, project)?;
-                    if searches == 0 || path.exists() {
-                        return Some(text);
-                    }
-                    searches -= 1;
-                    let similar = similar_file(path).map(|name| sanitize(&name, MAX_PATH_CHARS));
-                    let hint = similar.map(|name| format!("; there is {name}"));
-                    Some(text + &hint.unwrap_or_default())
+                    locate_file(place, kind, path, &row.name, project, &mut searches)
                 })
                 .collect();
             each(row, missing);
@@ -171,8 +170,18 @@ impl Listing {
     }
 }
 
-/// Maximum number of missing files for which a similar name is searched.
-const MAX_SEARCHES: usize = 10;
+/// Says which columns were read under other names.
+fn renamed(read: &ReadRows) -> Option<String> {
+    let columns = read.renamed.iter();
+    let columns =
+        columns.map(|(written, name)| format!("{:?} as {name}", sanitize(written, MAX_NAME_CHARS)));
+    let columns: Vec<String> = columns.collect();
+    (!columns.is_empty())
+        .then(|| format!("columns with other names were read: {}", columns.join(", ")))
+}
+
+/// Longest name of a column in a message, in characters.
+const MAX_NAME_CHARS: usize = 60;
 
 /// Longest path in a message, in characters.
 const MAX_PATH_CHARS: usize = 300;
@@ -185,6 +194,7 @@ pub fn locate_file(
     path: &mut PathBuf,
     name: &dyn std::fmt::Display,
     project: &Project,
+    searches: &mut SimilarFiles,
 ) -> Option<String> {
     let exists = match path.to_str() {
         Some(stored) if project.is_below_root(stored) => Ok(project.input(stored).exists()),
@@ -193,7 +203,13 @@ pub fn locate_file(
     let problem = match exists {
         Ok(true) => return None,
         Ok(false) if is_windows_path(path) => format!("does not exist{WINDOWS_HINT}"),
-        Ok(false) => "does not exist".to_owned(),
+        Ok(false) => {
+            let similar = searches
+                .find(path)
+                .map(|path| sanitize(&path, MAX_PATH_CHARS));
+            let hint = similar.map(|path| format!("; there is {path}"));
+            format!("does not exist{}", hint.unwrap_or_default())
+        }
         Err(error) => format!("cannot be read: {error}"),
     };
     let path = sanitize(&path.to_string_lossy(), MAX_PATH_CHARS);
@@ -212,83 +228,9 @@ fn ignored_files(reason: &str, paths: &[PathBuf]) -> Option<String> {
     (!paths.is_empty()).then(|| format!("ignored, {reason}: {}{more}", names.join(", ")))
 }
 
-/// Returns the type of image that a path is named like, if that type is not read.
-fn unread_kind(path: &Path) -> Option<FileKind> {
-    FileKind::of_unread_extension(path.extension()?.to_str()?)
-}
-
-/// Returns one sentence for all files of each type of image that is not read.
-fn unread_images(paths: &[PathBuf]) -> Vec<String> {
-    let mut found: BTreeMap<&'static str, (FileKind, Vec<&PathBuf>)> = BTreeMap::new();
-    for path in paths {
-        if let Some(kind) = unread_kind(path) {
-            let (_, paths) = found.entry(kind.name()).or_insert((kind, Vec::new()));
-            paths.push(path);
-        }
-    }
-    let sentence = |(kind, paths): (FileKind, Vec<&PathBuf>)| {
-        let first = paths
-            .iter()
-            .min()
-            .map_or(String::new(), |path| path.display().to_string());
-        let more = match paths.len() - 1 {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        let advice = kind.image_advice().unwrap_or_default();
-        format!("ignored, {kind} is not read: {first}{more}; {advice}")
-    };
-    found.into_values().map(sentence).collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use super::{Listing, Project};
-
-    #[test]
-    fn images_that_are_not_read_get_one_sentence_per_format() {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let [meshes, prints] = ["meshes", "prints"].map(|name| dir.path().join(name));
-        for folder in [&meshes, &prints] {
-            std::fs::create_dir(folder).expect("a folder");
-        }
-        let write = |path: PathBuf| std::fs::write(path, "").expect("written");
-        for name in ["a.bmp", "b.BMP", "c.bmp", "d.pdf", "notes.txt"] {
-            write(prints.join(name));
-        }
-        write(meshes.join("a.stl"));
-        let sentences = [
-            format!(
-                "ignored, a BMP image is not read: {} and 2 more; convert them, such as with ImageMagick: \
-                 `magick mogrify -format png *.bmp`",
-                prints.join("a.bmp").display()
-            ),
-            format!(
-                "ignored, a PDF document is not read: {}; save their pages as images, such as with \
-                 `pdftoppm -r 600 -png FILE.pdf page`",
-                prints.join("d.pdf").display()
-            ),
-        ];
-        let refused = Listing::from_folders(&meshes, &prints, None).expect_err("no pair");
-        let refused = refused.to_string();
-        for sentence in &sentences {
-            assert_eq!(refused.matches(sentence).count(), 1, "{refused}");
-        }
-        write(prints.join("a.png"));
-        let warnings = Listing::from_folders(&meshes, &prints, None)
-            .expect("a pair")
-            .warnings;
-        let other = format!(
-            "neither mesh nor print: {}",
-            prints.join("notes.txt").display()
-        );
-        assert_eq!(
-            warnings,
-            [&[format!("ignored, {other}")][..], &sentences].concat()
-        );
-    }
 
     #[test]
     fn a_long_path_is_cut_in_messages() {

@@ -15,16 +15,15 @@ fn missing_dirs(dir: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded. A new catalog on a
-/// server is created when `check` has succeeded, which refuses what `import` would refuse.
+/// Calls `import` with the catalog of a project. A new project appears only when `import` has succeeded; a new catalog on a
+/// server is created before.
 pub async fn import_with<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> ProjectResult<()>,
     import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
 ) -> ProjectResult<T> {
     let missing_dirs = missing_dirs(project.dir());
-    let stored = store(project, url, check, import).await;
+    let stored = store(project, url, import).await;
     if stored.is_err() {
         // Fails, as it should, if another process put something there.
         let _ = missing_dirs.iter().try_for_each(std::fs::remove_dir);
@@ -35,16 +34,12 @@ pub async fn import_with<T>(
 async fn store<T>(
     project: &Project,
     url: Option<&str>,
-    check: impl AsyncFnOnce() -> ProjectResult<()>,
     import: impl AsyncFn(&Catalog) -> ProjectResult<T>,
 ) -> ProjectResult<T> {
     if let Some(url) = url {
         Project::create(project.dir())?;
         let catalog = match Catalog::connect(url, false).await {
-            Err(CatalogError::NoSchema(_)) => {
-                check().await?;
-                Catalog::connect(url, true).await?
-            }
+            Err(CatalogError::NoSchema(_)) => Catalog::connect(url, true).await?,
             catalog => catalog?,
         };
         let stored = import(&catalog).await;

@@ -1,11 +1,14 @@
 //! Pairs and blocks that a user names by their ids. An id that does not exist is refused, with similar ids.
 
+use std::collections::BTreeSet;
+
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use mocban_catalog::Catalog;
+use mocban_catalog::{Catalog, RetiredPair};
 use mocban_core::domain::spelling::nearest;
-use mocban_core::domain::{BlockName, PairName};
+use mocban_core::domain::{BlockName, PairName, RetireCause};
 use mocban_runner::NamedWork;
+use mocban_system::time_text::local;
 
 /// Largest number of similar ids in a message.
 const MAX_SIMILAR: usize = 3;
@@ -13,7 +16,44 @@ const MAX_SIMILAR: usize = 3;
 const MIN_PART_CHARS: usize = 3;
 
 /// Looks up pairs by their ids.
+///
+/// # Errors
+/// Returns an error if a pair does not exist, or is retired.
 pub async fn pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
+    let names = known_pairs(catalog, typed).await?;
+    refuse_retired(catalog, &names).await?;
+    Ok(names)
+}
+
+/// Refuses pairs that are retired.
+async fn refuse_retired(catalog: &Catalog, names: &[PairName]) -> ProjectResult<()> {
+    let names: BTreeSet<&PairName> = names.iter().collect();
+    let retired = catalog.retired_pairs().await?;
+    let Some(pair) = retired.iter().find(|pair| names.contains(&pair.name)) else {
+        return Ok(());
+    };
+    Err(Refusal::NothingSelected(retired_text(pair)).into())
+}
+
+/// Says who retired a pair, and how it comes back.
+pub(crate) fn retired_text(pair: &RetiredPair) -> String {
+    let (name, date) = (&pair.name, local(pair.at));
+    match pair.cause {
+        RetireCause::Person => format!(
+            "pair {name} was retired on {date}; its results and verdicts are kept, and `retire --undo` brings it back"
+        ),
+        RetireCause::List => format!(
+            "pair {name} was retired on {date}, because a list that replaced the others does not have it; its results and \
+             verdicts are kept, and `retire --undo` or a list with it brings it back"
+        ),
+        RetireCause::Labels => format!(
+            "pair {name} is retired, because its box is gone from the labels of its block; its verdicts are kept"
+        ),
+    }
+}
+
+/// Looks up pairs by their ids, also retired ones.
+pub async fn known_pairs(catalog: &Catalog, typed: &[String]) -> ProjectResult<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     let is_known = |text: &&String| {
@@ -63,6 +103,9 @@ pub async fn block(catalog: &Catalog, typed: &str) -> ProjectResult<Option<Block
 }
 
 /// Looks up pairs and blocks by their ids. An id of both is that of the pair.
+///
+/// # Errors
+/// Returns an error if there is neither a pair nor a block with an id, or a pair is retired.
 pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectResult<NamedWork> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -89,6 +132,7 @@ pub async fn pairs_and_blocks(catalog: &Catalog, typed: &[String]) -> ProjectRes
         let all = pairs.iter().map(PairName::as_str).chain(blocks);
         return Err(no_such("pair or block", text, all).into());
     }
+    refuse_retired(catalog, &found.pairs).await?;
     Ok(found)
 }
 

@@ -15,9 +15,6 @@ use mocban_export::block_view::BlockView;
 use mocban_export::{ContactSheet, ContactSheetOptions, draw_contact_sheet};
 use mocban_store::Project;
 
-/// Maximum number of incomplete pairs that are named.
-const MAX_WARNINGS: usize = 5;
-
 /// Draws the pairs with these ids, or all, and writes the sheet. By default, it is `sheet.png` in the project. Returns its
 /// path too. A sheet that lacks images replaces an earlier one only if `allow_missing` is set.
 ///
@@ -50,13 +47,8 @@ pub async fn contact_sheet(
         let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
         return Err(Refusal::NothingSelected(text).into());
     }
-    for (pair, why) in sheet.problems.iter().take(MAX_WARNINGS) {
+    for (pair, why) in &sheet.problems {
         let text = format!("{pair} is not drawn completely: {why}");
-        warn(listener, text);
-    }
-    let more = sheet.problems.len().saturating_sub(MAX_WARNINGS);
-    if more > 0 {
-        let text = format!("{more} more are not drawn completely; `check` lists all missing files");
         warn(listener, text);
     }
     let is_complete = allow_missing || sheet.problems.is_empty();

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::ProjectResult;
 use crate::exit::Refusal;
-use crate::files::{self, RefusedLine};
+use crate::files::{self, ListFile, RefusedLine};
 use crate::location::{Location, now};
 use crate::selection;
 use crate::verdict_file::{self, VerdictList};
@@ -69,18 +69,28 @@ pub async fn record_on(
     Ok((verdict, recorded))
 }
 
-/// Records the verdicts of a file in CSV or JSON Lines. If a line is refused, no verdict is recorded.
-pub async fn import(file: &Path, location: &Location) -> ProjectResult<ImportedVerdicts> {
-    let bytes = files::read(file)?;
+/// Records the verdicts of a file in CSV or JSON Lines, or of a sheet of a workbook. If a line is refused, no verdict is
+/// recorded. Returns a warning about other sheets, too.
+pub async fn import(
+    file: &Path,
+    sheet: Option<&str>,
+    location: &Location,
+) -> ProjectResult<(ImportedVerdicts, Option<String>)> {
+    let ListFile { bytes, warning } = files::read_list(file, sheet)?;
     let (_project, catalog) = location.open().await?;
     let refused = |error: RefusedLine| error.in_file(file, "no verdict was recorded");
     let is_jsonl = files::is_jsonl(file, &bytes);
     let list = VerdictList::new(bytes, is_jsonl).map_err(refused)?;
     let (mut first_lines, mut reviewers) = (BTreeMap::new(), BTreeSet::new());
+    // Lines with verdicts on the current results, whatever these are.
+    let mut current_lines = BTreeMap::new();
     for row in list.rows() {
         let row = row.map_err(refused)?;
         verdict_file::check_values(&row, now()).map_err(refused)?;
         let NewVerdict { pair, reviewer, .. } = row.listed.verdict;
+        if row.listed.judged.is_none() {
+            current_lines.entry(pair.clone()).or_insert(row.line);
+        }
         first_lines.entry(pair).or_insert(row.line);
         reviewers.insert(reviewer);
     }
@@ -90,7 +100,16 @@ pub async fn import(file: &Path, location: &Location) -> ProjectResult<ImportedV
     }
     let names: Vec<_> = first_lines.keys().cloned().collect();
     let unknown = catalog.unknown_names(&names).await?;
-    verdict_file::refuse_unknown(&first_lines, &unknown).map_err(refused)?;
+    if !unknown.is_empty() {
+        let known = catalog.pair_names().await?;
+        verdict_file::refuse_unknown(&first_lines, &unknown, &known).map_err(refused)?;
+    }
+    let retired = catalog.retired_pairs().await?.into_iter();
+    let retired = retired.filter_map(|pair| Some((*current_lines.get(&pair.name)?, pair)));
+    if let Some((line, pair)) = retired.min_by_key(|(line, _)| *line) {
+        let reason = selection::retired_text(&pair);
+        return Err(refused(RefusedLine::new(line, &reason)).into());
+    }
     // All rows were valid in the first pass.
     let rows = list.rows().map(|row| match row {
         Ok(row) => Ok(row.listed),
@@ -98,7 +117,7 @@ pub async fn import(file: &Path, location: &Location) -> ProjectResult<ImportedV
     });
     let imported = catalog.import_verdicts(rows, now()).await?;
     catalog.close().await;
-    Ok(imported)
+    Ok((imported, warning))
 }
 
 /// The verdicts of a project or a pair.
@@ -110,11 +129,14 @@ pub struct VerdictLog {
     pub damaged: Vec<FaultyRow>,
 }
 
-/// Returns the verdicts on a pair, or on all pairs.
+/// Returns the verdicts on a pair, which may be retired, or on all pairs.
 pub async fn log(pair: Option<&str>, location: &Location) -> ProjectResult<VerdictLog> {
     let (_project, catalog) = location.open_read_only().await?;
     let pair = match pair {
-        Some(typed) => Some(selection::pair(&catalog, typed).await?),
+        Some(typed) => {
+            let pairs = selection::known_pairs(&catalog, &[typed.to_owned()]).await?;
+            pairs.into_iter().next()
+        }
         None => None,
     };
     let (sound, mut damaged) = catalog.without_faulty_rows().await?;

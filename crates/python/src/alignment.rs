@@ -182,7 +182,10 @@ impl NativeAlignment {
     }
 }
 
-/// Aligns a pair. Returns the alignment, or class, message and whether the print is the cause of a refusal.
+/// Class and message of a refusal, and whether the print is its cause.
+type RefusalParts = (&'static str, String, bool);
+
+/// Aligns a pair. Returns the alignment or why it is refused.
 #[pyfunction]
 pub(crate) fn align_pair(
     py: Python<'_>,
@@ -190,10 +193,7 @@ pub(crate) fn align_pair(
     print: &NativePrint,
     settings: &NativeSettings,
     scanned_face_down: Option<bool>,
-) -> PyResult<(
-    Option<NativeAlignment>,
-    Option<(&'static str, String, bool)>,
-)> {
+) -> PyResult<(Option<NativeAlignment>, Option<RefusalParts>)> {
     let hints = ScanHints {
         unit: mesh.unit,
         scanned_face_down,

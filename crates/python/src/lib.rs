@@ -13,6 +13,11 @@
 //! **Invariant:** while the GIL is held, arrays are copied, but nothing is computed and no file is read; no work begins after a
 //! fork.
 
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "PyO3 hands arguments over by value"
+)]
+
 mod alignment;
 mod compute;
 mod failure;

@@ -15,7 +15,7 @@ use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::ContentHash;
 use mocban_export::{ExportFormat, ExportOptions};
 use mocban_project::events::{Listener, ProjectEvent};
-use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
 use mocban_project::location::Location;
 use mocban_project::report::{ReportOptions, report};
 use mocban_project::run::{PreparedRun, options};
@@ -227,6 +227,8 @@ impl NativeProject {
         file: PathBuf,
         rows: Vec<u8>,
         allow_missing: bool,
+        allow_changed_files: bool,
+        replace: bool,
     ) -> PyResult<String> {
         self.simple(py, move |location, hearing| async move {
             let import = PairImport {
@@ -235,7 +237,11 @@ impl NativeProject {
                     bytes: Some(rows),
                 },
                 truth: None,
-                allow_missing,
+                allowed: AllowedChanges {
+                    missing: allow_missing,
+                    files: allow_changed_files,
+                    replace,
+                },
             };
             let outcome = import_pairs(import, &location, &hearing).await?;
             let summary = outcome.summary;
@@ -244,6 +250,8 @@ impl NativeProject {
                 "added": summary.added,
                 "changed": changed.collect::<Vec<_>>(),
                 "unchanged": summary.unchanged,
+                "retired": summary.retired,
+                "restored": summary.restored,
                 "missing_files": outcome.missing.lines,
                 "warnings": outcome.warnings,
             });

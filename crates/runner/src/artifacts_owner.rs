@@ -1,6 +1,6 @@
 //! Makes the catalog the owner of the places of its artifacts, before anything is written or removed there.
 
-use super::compute_thread::run_blocking;
+use super::blocking::run_blocking;
 use super::error::RunError;
 use super::retry::retried;
 use mocban_catalog::Catalog;

@@ -19,7 +19,9 @@ pub enum RunEvent {
         /// Total number of stages to run, over all pairs.
         stages: u64,
         /// Pairs that each stage has to run for.
-        by_stage: [u64; 4],
+        by_stage: [u64; Stage::COUNT],
+        /// Blocks with stages to run. Their pairs are counted when they are cut, not here.
+        blocks: u64,
         /// Pairs computed at the same time.
         workers: usize,
     },

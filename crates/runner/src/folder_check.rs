@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::compute_thread::run_blocking;
+use super::blocking::run_blocking;
 use super::error::RunError;
 use super::input_reads::{ReadItem, ReadLimits, read_each};
 use super::run_context::RunContext;

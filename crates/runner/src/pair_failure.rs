@@ -35,7 +35,7 @@ impl PairFailure {
             class: failure.class,
             is_transient: self.is_transient,
             attempt: lease.attempt(),
-            exclusive: lease.exclusive(),
+            ran_alone: lease.exclusive(),
         };
         let action = policy::failure_action(attempt, now);
         let record = StageFailure {

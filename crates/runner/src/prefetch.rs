@@ -319,7 +319,7 @@ impl Prefetch {
         };
         let estimates = estimates.into_iter().chain(std::iter::repeat(None));
         let leased = leased.into_iter().zip(estimates);
-        let map_bytes = self.context.executor.map_bytes();
+        let map_bytes = self.context.pairs.map_bytes();
         self.queue
             .extend(leased.map(|((lease, work), bytes)| LeasedPair {
                 lease,
@@ -340,7 +340,7 @@ impl Prefetch {
             attributes: work.attributes.clone(),
             from: lease.cursor(),
             limits: self.image_limits,
-            map_bytes: self.context.executor.map_bytes(),
+            map_bytes: self.context.pairs.map_bytes(),
         });
         let estimated: Vec<_> = estimated.take_while(|_| is_needed).collect();
         let others = vec![Some(0); leased.len() - estimated.len()];

@@ -5,28 +5,29 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
 
 use super::artifacts_owner::claim_artifacts;
+use super::block::inputs;
 use super::block::pipeline::BlockPipeline;
-use super::block::plan;
 use super::block_stages::{BlockStages, block_settings};
 use super::error::RunError;
 use super::event_log::{log_end, log_event};
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::input_reads::read_limits;
+use super::input_reads::{ReadLimits, read_limits};
 use super::options::{RunOptions, RunPart};
-use super::policy::{self, Clock, Timing};
+use super::pair_pipeline::{PairPipeline, PairStages};
+use super::policy;
 use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_end::{RunEnd, block_limits, compute, stop_waiting_after_stop};
 use super::run_guard::RunGuard;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
-use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
+use super::timing::{Clock, Timing};
 use super::worker_session::this_process;
 use mocban_align::stages::Settings;
 use mocban_catalog::{
@@ -42,8 +43,8 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
 }
 
 /// What computes the stages of a run.
-pub(super) struct Executors {
-    pub(super) pairs: Arc<dyn StageExecutor>,
+pub(super) struct RunStages {
+    pub(super) pairs: Arc<dyn PairStages>,
     pub(super) blocks: Arc<dyn BlockStages>,
 }
 
@@ -61,8 +62,8 @@ pub async fn run(
     mut on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
-    let executors = Executors {
-        pairs: Arc::new(PipelineExecutor::new(project, settings, options)),
+    let stages = RunStages {
+        pairs: Arc::new(PairPipeline::new(project, settings, options)),
         blocks: Arc::new(BlockPipeline::new(options)),
     };
     let fingerprints = fingerprints(settings);
@@ -70,7 +71,7 @@ pub async fn run(
         project,
         catalog,
         &fingerprints,
-        executors,
+        stages,
         options,
         stop,
         |event| {
@@ -83,12 +84,12 @@ pub async fn run(
     ended
 }
 
-/// Like [`run`], with any executors.
+/// Like [`run`], with any stages.
 pub(super) async fn run_with(
     project: &Project,
     catalog: &Catalog,
     fingerprints: &Fingerprints,
-    executors: Executors,
+    stages: RunStages,
     options: &RunOptions,
     stop: &Stop,
     mut on_event: impl FnMut(RunEvent) + Send,
@@ -100,7 +101,7 @@ pub(super) async fn run_with(
     claim_artifacts(project, catalog, false).await?;
     let settings = WorkerSettings {
         fingerprints: fingerprint_ids,
-        blocks: block_settings(&*executors.blocks),
+        blocks: block_settings(&*stages.blocks),
     };
     guard
         .require_same_settings(catalog, fingerprints, &settings, options.part)
@@ -112,7 +113,7 @@ pub(super) async fn run_with(
         project,
         catalog,
         fingerprints,
-        blocks: &executors.blocks,
+        blocks: &stages.blocks,
         options,
         selection: selection.as_ref(),
         clock,
@@ -131,8 +132,8 @@ pub(super) async fn run_with(
         (RunCounts::default(), Duration::ZERO)
     } else {
         let (events, received) = mpsc::unbounded_channel();
-        let context = Arc::new(start.context(executors.pairs, fingerprint_ids, events));
-        let scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+        let context = Arc::new(start.context(stages.pairs, fingerprint_ids, worker, events));
+        let scheduler = Scheduler::new(Arc::clone(&context), selection.clone(), options);
         compute(&context, scheduler, received, &mut on_event).await?
     };
     if let Some(selection) = &mut selection {
@@ -172,7 +173,10 @@ impl RunStart<'_> {
         }
         let (until, pairs) = (options.until, self.pairs());
         let left = retried!(catalog.work_left(until, pairs))?;
+        let blocks = self.selection.map(|selection| &selection.blocks);
+        let blocks = retried!(catalog.outstanding_blocks(blocks))?;
         on_event(RunEvent::Started {
+            blocks: blocks.left(),
             pairs: left.pairs,
             stages: left.by_stage.iter().sum(),
             by_stage: left.by_stage,
@@ -193,28 +197,40 @@ impl RunStart<'_> {
         retried!(catalog.requeue_stale(fingerprints, selection, options.rerun))?;
         let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
         retried!(catalog.release_due_backoffs(now, longest))?;
-        let blocks = self.selection.map(|selection| &selection.blocks);
-        let what = (options.rerun, blocks);
-        plan::requeue(self.project, catalog, &**self.blocks, what, &limits, now).await
+        self.plan_blocks(&limits).await
+    }
+
+    /// Looks at the inputs of blocks, requeues blocks to run again, and ends back-offs that are due.
+    async fn plan_blocks(&self, limits: &ReadLimits) -> Result<(), RunError> {
+        let (catalog, rerun) = (self.catalog, self.options.rerun);
+        let selection = self.selection.map(|selection| &selection.blocks);
+        inputs::store_changes(self.project, catalog, selection, limits).await?;
+        let settings = block_settings(&**self.blocks);
+        retried!(catalog.requeue_stale_blocks(&settings, rerun, selection))?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        retried!(catalog.release_due_blocks(now, longest))?;
+        Ok(())
     }
 
     /// Returns what the tasks of the run share.
     fn context(
         &self,
-        pairs: Arc<dyn StageExecutor>,
+        pairs: Arc<dyn PairStages>,
         fingerprints: FingerprintIds,
+        worker: WorkerId,
         events: mpsc::UnboundedSender<RunEvent>,
     ) -> RunContext {
         let options = self.options;
         RunContext {
             catalog: self.catalog.clone(),
             project: self.project.clone(),
-            executor: pairs,
+            pairs,
             blocks: Arc::clone(self.blocks),
             block_limits: block_limits(options),
             fingerprints,
             clock: self.clock,
             timing: Timing::of_this_build(),
+            worker: watch::Sender::new(worker),
             stop: self.stop.clone(),
             drain: Stop::new(),
             until: options.until,

@@ -8,12 +8,12 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::{BlockSummary, RunEvent, RunSummary};
 use super::options::RunOptions;
-use super::policy::Clock;
 use super::retry::retried;
 use super::run_context::RunContext;
 use super::run_selection::RunSelection;
 use super::scheduler::{RunCounts, Scheduler};
 use super::stop::{Stop, StopLevel};
+use super::timing::Clock;
 use mocban_catalog::{Catalog, Fingerprints, OutstandingBlocks, StatusCounts, WorkLeft};
 use mocban_core::domain::Stage;
 
@@ -38,7 +38,7 @@ pub(super) async fn compute(
     let catalog = &context.catalog;
     let counts = scheduler.run(&mut events, on_event).await;
     // End the worker in the catalog even after an error. Otherwise the next run would count a crash.
-    let (worker, now) = (scheduler.worker(), context.clock.now());
+    let (worker, now) = (context.worker_id(), context.clock.now());
     let metrics = context.worker_metrics();
     let ended = retried!(catalog.end_worker(worker, now, Some(&metrics)));
     // A lost log explains other errors.

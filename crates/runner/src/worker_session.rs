@@ -10,13 +10,12 @@ use super::retry::retried;
 use super::run_context::RunContext;
 use super::stop::StopLevel;
 use mocban_catalog::{CatalogError, DeadWorker, WorkerInfo};
-use mocban_core::domain::{UnixMillis, WorkerId};
+use mocban_core::domain::UnixMillis;
 use mocban_system::platform;
 
-/// The worker that this process is registered as.
+/// What this process has seen as a worker.
 #[derive(Debug)]
 pub(super) struct WorkerSession {
-    worker: WorkerId,
     /// When the last heartbeat was stored, by the run's clock.
     last_heartbeat: UnixMillis,
     /// When overdue leases were last searched for.
@@ -37,18 +36,12 @@ pub(super) enum HeartbeatOutcome {
 
 impl WorkerSession {
     /// A worker that has just been registered.
-    pub(super) const fn new(worker: WorkerId, now: UnixMillis, lease_ms: i64) -> Self {
+    pub(super) const fn new(now: UnixMillis, lease_ms: i64) -> Self {
         Self {
-            worker,
             last_heartbeat: now,
             overdue_checked: 0,
             liveness: Liveness::new(lease_ms),
         }
-    }
-
-    /// Returns the worker's current id.
-    pub(super) const fn worker(&self) -> WorkerId {
-        self.worker
     }
 
     /// Stores a heartbeat, with the counts and times of the run.
@@ -57,7 +50,7 @@ impl WorkerSession {
         let alive_since = context.alive_since();
         let catalog = &context.catalog;
         let metrics = context.worker_metrics();
-        let stored = catalog.heartbeat(self.worker, now, alive_since, Some(&metrics));
+        let stored = catalog.heartbeat(context.worker_id(), now, alive_since, Some(&metrics));
         match stored.await {
             Ok(true) => {
                 self.last_heartbeat = now;
@@ -76,14 +69,15 @@ impl WorkerSession {
     }
 
     /// Registers the process as a new worker after its leases expired. Pairs that the old worker still holds become
-    /// ready again. Stages that are being computed under the old leases cannot be stored.
+    /// ready again, and stages that are being computed under the old leases are cancelled.
     pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
-        let expired = self.worker;
+        let expired = context.worker_id();
         // The counts go on in the row of the new worker.
         retried!(catalog.end_worker(expired, now, None))?;
         let settings = context.worker_settings();
-        self.worker = retried!(catalog.register_worker(this_process(), settings.clone(), now))?;
+        let worker = retried!(catalog.register_worker(this_process(), settings.clone(), now))?;
+        context.worker.send_replace(worker);
         self.last_heartbeat = now;
         let dead = DeadWorker::Known(expired);
         retried!(catalog.recover(dead.clone(), now))?;
@@ -93,7 +87,7 @@ impl WorkerSession {
     /// Keeps the lock that shows that this process is connected. Recovers the leases of dead workers, and leases of other
     /// workers that are long past their deadline. Returns how many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
-        let (catalog, me) = (&context.catalog, self.worker);
+        let (catalog, me) = (&context.catalog, context.worker_id());
         if let Err(error) = catalog.keep_worker_lock(me).await {
             // The lock is only a hint for others. Whether the run can go on is decided by the heartbeat.
             tracing::debug!(%error, "the worker's lock is not held");

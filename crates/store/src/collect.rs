@@ -14,6 +14,7 @@ use std::time::{Duration, SystemTime};
 
 use super::Project;
 use super::artifact_error::ArtifactError;
+use super::create_folders::create_folders;
 use super::referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};
 use super::remote::{Bucket, PACKS, pack_key, pack_number};
 use mocban_core::domain::{ARTIFACTS, ArtifactRef};
@@ -46,7 +47,7 @@ impl ReferencedArtifacts {
             path: aside.clone(),
             source,
         };
-        std::fs::create_dir_all(&aside).map_err(failed)?;
+        create_folders(&aside).map_err(failed)?;
         let marker = tempfile::NamedTempFile::new_in(&aside).map_err(failed)?;
         let meta = marker.as_file().metadata().map_err(failed)?;
         let now = meta.modified().map_err(failed)?;

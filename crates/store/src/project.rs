@@ -3,6 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use super::create_folders::create_folders;
 use super::parent_folder::{parent_folder, sync_folder};
 use super::remote::ProjectStorage;
 use mocban_core::domain::{ARTIFACTS, CATALOG_FILE, ErrorCode, Explained};
@@ -119,7 +120,7 @@ impl Project {
     /// Creates the project directory durably if it is missing. `Catalog::create` creates the catalog.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
-        std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
+        create_folders(dir).map_err(StoreError::io(dir))?;
         for created in missing {
             let folder = parent_folder(created);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;

@@ -7,7 +7,7 @@ use crate::cli::output::table::columns;
 use clap::Args;
 use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_core::domain::LengthUnit;
-use mocban_project::align::{self, FileAlignment, MeshAndPrint, side};
+use mocban_project::align::{self, AlignInput, FileAlignment, side};
 use mocban_project::{ExitCode, ProjectResult};
 
 /// Arguments of `align`.
@@ -33,7 +33,7 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
     if let Some(dir) = &args.output {
         align::alignment_folder(dir)?;
     }
-    let files = MeshAndPrint {
+    let files = AlignInput {
         mesh: args.mesh,
         print: args.print,
         hints: ScanHints {

@@ -17,11 +17,15 @@ pub(crate) struct BackupArgs {
     /// The file to write, such as blocks.sqlite; an existing backup is replaced only when the new one is complete. The
     /// file holds pairs, results, verdicts and the project's settings, but neither scans and prints nor depth maps and
     /// masks; `restore` makes a project of it
-    pub(crate) file: PathBuf,
+    #[arg(required_unless_present = "output")]
+    pub(crate) file: Option<PathBuf>,
+    /// The same as FILE
+    #[arg(short, long, value_name = "FILE", conflicts_with = "file")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 pub(crate) async fn backup(args: BackupArgs, context: &Context) -> ProjectResult<ExitCode> {
-    let file = &args.file;
+    let file = &args.file.or(args.output).unwrap_or_default();
     let shown = file.display();
     let terminal = Terminal::new(context);
     let Backup {

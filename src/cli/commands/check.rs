@@ -87,7 +87,9 @@ fn text(summary: &CheckSummary, args: &CheckArgs, palette: Palette) -> String {
         };
         let head = format!("{}: {}", kind.heading(), found.found);
         lines.push(palette.paint(tone, head));
-        lines.push(listed(&found.first, found.found));
+        let is_one_reason = *kind == Kind::FileMissing && summary.lacks_most_files();
+        let limit = if is_one_reason { 1 } else { MAX_LISTED };
+        lines.push(listed(&found.first, found.found, limit));
     }
     lines.extend(missing_files(summary));
     if summary.damage.contains_key(&Kind::FileUnreadable) {
@@ -172,14 +174,14 @@ fn headline(summary: &CheckSummary, palette: Palette) -> String {
 }
 
 /// Formats the first findings of a kind, one line each.
-fn listed(first: &[Finding], found: u64) -> String {
+fn listed(first: &[Finding], found: u64, limit: usize) -> String {
     let row = |finding: &Finding| match (&finding.pair, finding.stage) {
         (Some(pair), Some(stage)) => {
             vec![format!("  {pair}"), stage.to_string(), finding.what.clone()]
         }
         _ => vec![format!("  {}", finding.what)],
     };
-    let mut rows: Vec<_> = first.iter().take(MAX_LISTED).map(row).collect();
+    let mut rows: Vec<_> = first.iter().take(limit).map(row).collect();
     let more = found.saturating_sub(rows.len() as u64);
     if more > 0 {
         rows.push(vec![format!("  and {more} more")]);

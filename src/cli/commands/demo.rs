@@ -27,12 +27,12 @@ use mocban_project::demo_folder::{DemoContent, STOPPED, check_directory};
 use mocban_project::error::WithContext as _;
 use mocban_project::files;
 use mocban_project::import_blocks::import_blocks;
-use mocban_project::import_pairs::{PairImport, PairSource, import_pairs};
+use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
 use mocban_project::run::{PreparedRun, options};
 use mocban_project::sheets::contact_sheet;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_runner::{Stop, StopLevel};
-use mocban_store::{SETTINGS_FILE, TargetLock, write_atomic};
+use mocban_store::{SETTINGS_FILE, TargetLock, create_folders, write_atomic};
 
 /// Smallest and largest distance of the vertices of a block. A mesh of the smallest has 60 million triangles.
 const SPACING_MM: RangeInclusive<f64> = 0.05..=2.0;
@@ -89,7 +89,7 @@ pub(crate) async fn demo(args: DemoArgs, context: &Context) -> ProjectResult<Exi
     let import = PairImport {
         source,
         truth: Some(files.truth),
-        allow_missing: false,
+        allowed: AllowedChanges::default(),
     };
     let outcome = import_pairs(import, &context.location, &()).await?;
     import::print_outcome(&outcome, context);
@@ -129,7 +129,8 @@ async fn block_demo(
         return Ok(ExitCode::Stopped);
     };
     let source = demo_block::import_source(&files, !args.no_labels);
-    let outcome = import_blocks(&source, false, &context.location, &()).await?;
+    let allowed = AllowedChanges::default();
+    let outcome = import_blocks(&source, allowed, &context.location, &()).await?;
     import_blocks::print_outcome(&outcome, context);
     if args.no_run {
         context.next("run");
@@ -251,7 +252,7 @@ fn save_settings(dir: &Path, context: &Context) -> ProjectResult<Context> {
     let text = changed_settings(&context.location.settings()?.tree);
     let file = dir.join(SETTINGS_FILE);
     let shown = file.display();
-    std::fs::create_dir_all(dir).with_context(|| format!("cannot create {}", dir.display()))?;
+    create_folders(dir).with_context(|| format!("cannot create {}", dir.display()))?;
     let _lock = TargetLock::acquire(&file)?;
     match files::small(&file)? {
         Some(there) if there == text.as_bytes() => {}

@@ -9,7 +9,7 @@ use super::demo_data::replace_data;
 use crate::cli::output::busy::Busy;
 use crate::cli::output::context::Context;
 use crate::cli::output::table::count;
-use mocban_catalog::{Catalog, ImportChunk, StoredCharacter};
+use mocban_catalog::{Catalog, ImportChunk, ImportTerms, StoredCharacter};
 use mocban_core::domain::{Affine2, BlockName, PairName};
 use mocban_demo::block::{BlockFiles, BlockOptions, BlockTruth, find_block, write_block};
 use mocban_project::ProjectResult;
@@ -54,7 +54,11 @@ pub(crate) async fn store_truths(file: &Path, catalog: &Catalog) -> ProjectResul
     let (sender, chunks) = mpsc::channel(1);
     // The receiver exists.
     let _ = sender.send(ImportChunk::End).await;
-    let (_, stored) = catalog.import_all(chunks, truths, now()).await?;
+    let terms = ImportTerms {
+        truths,
+        ..ImportTerms::default()
+    };
+    let (_, stored) = catalog.import_all(chunks, terms, now()).await?;
     Ok(stored)
 }
 

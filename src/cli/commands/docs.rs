@@ -11,18 +11,24 @@ use mocban_project::{ExitCode, ProjectResult};
 
 /// The first page.
 const INDEX: &str = "index.html";
+/// The directory that is written if none is named.
+const DEFAULT_DIR: &str = "mocban-docs";
 
 /// Arguments of `docs`.
 #[derive(Debug, Args)]
 pub(crate) struct DocsArgs {
-    /// The directory to write; pages that this command wrote there earlier are replaced
-    #[arg(default_value = "mocban-docs")]
-    pub(crate) dir: PathBuf,
+    /// The directory to write; pages that this command wrote there earlier are replaced [default: mocban-docs]
+    pub(crate) dir: Option<PathBuf>,
+    /// The same as DIR
+    #[arg(short, long, value_name = "DIR", conflicts_with = "dir")]
+    pub(crate) output: Option<PathBuf>,
 }
 
-pub(crate) fn docs(args: &DocsArgs, context: &Context) -> ProjectResult<ExitCode> {
+pub(crate) fn docs(args: DocsArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let dir = args.dir.or(args.output);
+    let dir = dir.unwrap_or_else(|| PathBuf::from(DEFAULT_DIR));
     let folder = GeneratedFolder {
-        dir: &args.dir,
+        dir: &dir,
         content: "documentation",
     };
     if let Some((path, error)) = folder.write(&web_files())? {
@@ -31,9 +37,6 @@ pub(crate) fn docs(args: &DocsArgs, context: &Context) -> ProjectResult<ExitCode
             "the earlier documentation was replaced but could not be removed from {path}: {error}"
         ));
     }
-    context.info(&format!(
-        "open {} in a browser",
-        args.dir.join(INDEX).display()
-    ));
+    context.info(&format!("open {} in a browser", dir.join(INDEX).display()));
     Ok(ExitCode::Done)
 }

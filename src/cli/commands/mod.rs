@@ -22,6 +22,7 @@ pub(crate) mod man;
 pub(crate) mod metrics;
 pub(crate) mod report;
 pub(crate) mod restore;
+pub(crate) mod retire;
 pub(crate) mod retry;
 pub(crate) mod review;
 pub(crate) mod run;

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::verdict::reviewer_name;
 use crate::cli::input::browser::open;
+use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
@@ -284,15 +285,6 @@ fn review_command(user: Option<&str>) -> String {
 fn user_name() -> Option<String> {
     let mut names = ["USER", "USERNAME"].into_iter();
     names.find_map(|name| std::env::var(name).ok())
-}
-
-/// Returns Vietnamese if the locale is Vietnamese. Otherwise, the browser decides.
-fn language_of_system() -> Option<Language> {
-    let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
-    let set = names.iter().filter_map(|name| std::env::var(name).ok());
-    let mut set = set.filter(|value| !value.is_empty());
-    let locale = set.next()?;
-    locale.starts_with("vi").then_some(Language::Vietnamese)
 }
 
 #[cfg(test)]

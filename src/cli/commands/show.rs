@@ -6,13 +6,15 @@ use serde_json::{Value, json};
 use super::show_block::show_block;
 use super::verdict;
 use crate::cli::output::context::Context;
+use crate::cli::output::pair_table::pair_table as table_text;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::{PairPage, manual_text};
 use crate::cli::output::streams;
 use mocban_catalog::{Catalog, PairDetail, PlanEntry};
-use mocban_core::domain::{JobStatus, PairName};
+use mocban_core::domain::{JobStatus, MetricOutcome, PairName, ThresholdMetric};
 use mocban_project::details::{self, Details, PairOverview};
 use mocban_project::failures::may_succeed_unchanged;
+use mocban_project::pair_table::{self, PairChoice};
 use mocban_project::shell::shell_quoted;
 use mocban_project::{ExitCode, ProjectResult};
 use mocban_store::Project;
@@ -23,10 +25,16 @@ use mocban_system::time_text::local;
 pub(crate) struct ShowArgs {
     /// The pair or block; without it, the names of all pairs and blocks are listed
     pub(crate) name: Option<String>,
+    /// A table of the pairs of low confidence, the least confident first
+    #[arg(long, conflicts_with = "name")]
+    pub(crate) low: bool,
 }
 
 pub(crate) async fn show(args: ShowArgs, context: &Context) -> ProjectResult<ExitCode> {
     let (project, catalog) = context.location.open_read_only().await?;
+    if args.low {
+        return show_low(&catalog, context).await;
+    }
     let Some(id) = args.name else {
         return list_names(&catalog, context).await;
     };
@@ -72,6 +80,25 @@ async fn list_names(catalog: &Catalog, context: &Context) -> ProjectResult<ExitC
     for chunk in pairs.chunks(NAMES_AT_ONCE) {
         let names: Vec<&str> = chunk.iter().map(PairName::as_str).collect();
         streams::print(&names.join("\n"))?;
+    }
+    Ok(ExitCode::Done)
+}
+
+/// Prints a table of the pairs of low confidence.
+async fn show_low(catalog: &Catalog, context: &Context) -> ProjectResult<ExitCode> {
+    let rows = pair_table::read(catalog, PairChoice::LowConfidence).await?;
+    let (limit, metric) = (MetricOutcome::LOW_CONFIDENCE, ThresholdMetric::DEFAULT);
+    if context.global.json {
+        streams::print_json(
+            &json!({"schema": 1, "below": limit, "metric": metric, "pairs": rows}),
+        )?;
+    } else if rows.is_empty() {
+        context.info(&format!(
+            "no pair has a confidence below {limit} ({metric})"
+        ));
+    } else {
+        streams::print(&table_text(&rows, context.stdout))?;
+        context.next("contact-sheet --order confidence");
     }
     Ok(ExitCode::Done)
 }

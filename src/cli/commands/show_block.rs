@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::cli::output::context::Context;
+use crate::cli::output::digits::significant;
 use crate::cli::output::screen::{Palette, Tone};
 use crate::cli::output::show_text::state_name;
 use crate::cli::output::table::{columns, count};
@@ -17,6 +18,9 @@ use mocban_system::time_text::{duration, local};
 
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;
+
+/// Significant digits of numbers that are not whole.
+const DIGITS: i32 = 4;
 
 /// Shows a block.
 pub(crate) fn show_block(
@@ -131,7 +135,9 @@ fn numbers(outcome: &Value) -> String {
         let name = name.replace('_', " ");
         match value {
             Value::Number(number) => Some(match number.as_f64() {
-                Some(real) if !number.is_u64() && !number.is_i64() => format!("{name} {real:.3}"),
+                Some(real) if !number.is_u64() && !number.is_i64() => {
+                    format!("{name} {}", significant(real, DIGITS))
+                }
                 _ => format!("{name} {number}"),
             }),
             Value::Bool(flag) => Some(format!("{name} {flag}")),
@@ -223,7 +229,7 @@ mod tests {
             json!({ "agreement": 0.93456, "windows": 120, "grid": [1, 2], "side": "front" });
         assert_eq!(
             numbers(&outcome),
-            "agreement 0.935, side front, windows 120"
+            "agreement 0.9346, side front, windows 120"
         );
     }
 }

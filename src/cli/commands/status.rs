@@ -13,6 +13,7 @@ use crate::cli::output::block_status::{blocks_line, failed_blocks_text};
 use crate::cli::output::context::Context;
 use crate::cli::output::failures::failures_text;
 use crate::cli::output::missing_results;
+use crate::cli::output::pair_table::pair_table as pair_table_text;
 use crate::cli::output::screen::{Palette, Tone, clear_code};
 use crate::cli::output::streams;
 use crate::cli::output::table::{columns, count};
@@ -21,6 +22,7 @@ use mocban_core::domain::{JobStatus, MetricOutcome, Stage, ThresholdMetric, Verd
 use mocban_project::closing::{AFTER_SILENCE, close_within};
 use mocban_project::hosts::WorkerTable;
 use mocban_project::location::now;
+use mocban_project::pair_table::{self, PairChoice, PairRow};
 use mocban_project::shell::shell_quoted;
 use mocban_project::status::ProjectStatus;
 use mocban_project::{ExitCode, ProjectResult};
@@ -29,6 +31,7 @@ use mocban_store::Project;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(crate) struct StatusArgs {
     /// Refresh every two seconds until Ctrl-C
     #[arg(short, long)]
@@ -36,8 +39,11 @@ pub(crate) struct StatusArgs {
     /// List every failed pair with its error, not only the first ones of each class
     #[arg(long)]
     pub(crate) failed: bool,
+    /// Add a table of all pairs: state, alignment, confidence and verdict
+    #[arg(long, conflicts_with = "watch")]
+    pub(crate) pairs: bool,
     /// Show the workers of each machine instead: what they have done, how long each stage takes, and what they wait for
-    #[arg(long, conflicts_with = "failed")]
+    #[arg(long, conflicts_with_all = ["failed", "pairs"])]
     pub(crate) hosts: bool,
 }
 
@@ -79,16 +85,32 @@ async fn print_once(
         let (json, text) = (workers.json(), table_text(&workers, context.stdout));
         print_refreshed(args, context, &json, text)?;
     } else {
-        let status = ProjectStatus::read(project, catalog, args.failed, &context.location);
-        print_status(&status.await?, args, context)?;
+        let status = ProjectStatus::read(project, catalog, args.failed, &context.location).await?;
+        let pairs = if args.pairs {
+            Some(pair_table::read(catalog, PairChoice::All).await?)
+        } else {
+            None
+        };
+        print_status(&status, pairs.as_deref(), args, context)?;
     }
     Ok(())
 }
 
-fn print_status(status: &ProjectStatus, args: &StatusArgs, context: &Context) -> ProjectResult<()> {
+fn print_status(
+    status: &ProjectStatus,
+    pairs: Option<&[PairRow]>,
+    args: &StatusArgs,
+    context: &Context,
+) -> ProjectResult<()> {
     let dir = context.location.dir.display().to_string();
-    let text = screen(status, &dir, args.failed, context.stdout);
-    print_refreshed(args, context, &status.json(args.failed)?, text)?;
+    let mut text = screen(status, &dir, args.failed, context.stdout);
+    let mut json = status.json(args.failed)?;
+    if let Some(pairs) = pairs {
+        text.push('\n');
+        text.push_str(&pair_table_text(pairs, context.stdout));
+        json["pair_list"] = serde_json::to_value(pairs)?;
+    }
+    print_refreshed(args, context, &json, text)?;
     if !context.global.json {
         for command in next_steps(status) {
             context.next(&command);
@@ -141,6 +163,11 @@ fn screen(status: &ProjectStatus, dir: &str, all: bool, palette: Palette) -> Str
         let pairs = count(status.counts.stale, "pair");
         let text = format!("{pairs} computed with other settings or files than the current ones");
         parts.push(line("stale", &text));
+    }
+    if status.counts.retired > 0 {
+        let pairs = count(status.counts.retired, "pair");
+        let text = format!("{pairs} out of every count; results and verdicts are kept");
+        parts.push(line("retired", &text));
     }
     if status.are_results_missing {
         parts.push(line("files", missing_results::TEXT));
@@ -241,6 +268,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
         steps.push(format!("show {}", shell_quoted(first.name.as_str())));
     }
     if status.counts.low_confidence > 0 {
+        steps.push("show --low".to_owned());
         steps.push("contact-sheet --order confidence".to_owned());
     }
     if status.jobs(JobStatus::Done) > 0 && !running {
@@ -270,6 +298,7 @@ mod tests {
             counts: StatusCounts {
                 schema: 1,
                 pairs: done + ready,
+                retired: 0,
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,
@@ -325,7 +354,11 @@ mod tests {
         let text = screen(&status, "demo", false, Palette::PLAIN);
         let line = "confidence   1 done pair below 0.5 (ensemble)\n";
         assert!(text.ends_with(line), "{text}");
-        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
+        let steps = next_steps(&status);
+        assert_eq!(
+            steps[..2],
+            ["show --low", "contact-sheet --order confidence"]
+        );
     }
 
     #[test]

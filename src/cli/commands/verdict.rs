@@ -24,7 +24,7 @@ use mocban_system::time_text::{duration, local};
 pub(crate) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
-    /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
+    /// Record the verdicts of a CSV or XLSX file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
     /// of the verdicts.jsonl of an export
     Import(VerdictImportArgs),
     /// Print the log, oldest first
@@ -62,6 +62,9 @@ pub(crate) struct VerdictSetArgs {
 pub(crate) struct VerdictImportArgs {
     /// The file
     pub(crate) file: PathBuf,
+    /// Sheet of an XLSX file [default: the first one]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) sheet: Option<String>,
 }
 
 /// Arguments of `verdict log`.
@@ -143,11 +146,16 @@ fn verdict_text(new: &NewVerdict) -> String {
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> ProjectResult<ExitCode> {
+    let sheet = args.sheet.as_deref();
+    let (imported, warning) = verdicts::import(&args.file, sheet, &context.location).await?;
+    if let Some(warning) = warning {
+        context.warn(&warning);
+    }
     let ImportedVerdicts {
         recorded: number,
         known,
         left_out,
-    } = verdicts::import(&args.file, &context.location).await?;
+    } = imported;
     context.print_json(
         &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
     )?;

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::block_points::BlockPoints;
 use crate::cli::input::browser::open;
+use crate::cli::input::language::language_of_system;
 use crate::cli::input::signals;
 use crate::cli::output::context::Context;
 use crate::cli::output::streams;
@@ -14,6 +15,7 @@ use mocban_catalog::Catalog;
 use mocban_core::domain::{BlockName, BlockStage, FailureClass, ThresholdMetric};
 use mocban_core::page_vec;
 use mocban_export::scan_view::ScanView;
+use mocban_pages::review::Language;
 use mocban_pages::view::{self, ViewServer};
 use mocban_project::error::TaskStopped;
 use mocban_project::selection;
@@ -34,9 +36,19 @@ pub(crate) struct ViewArgs {
     /// Port on this machine; 0 chooses the same port each time for a name, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
+    /// Language of the page, en or vi [default: vi if LANG is Vietnamese, else that of the browser]
+    #[arg(long)]
+    lang: Option<Language>,
     /// Print the address without opening a browser
     #[arg(long)]
     no_open: bool,
+}
+
+impl ViewArgs {
+    /// Returns the language of the page. Without one, the browser decides.
+    fn language(&self) -> Option<Language> {
+        self.lang.or_else(language_of_system)
+    }
 }
 
 pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<ExitCode> {
@@ -74,7 +86,7 @@ pub(crate) async fn view(args: ViewArgs, context: &Context) -> ProjectResult<Exi
         let text = format!("pair {name} has no result{of} to show; see: {command}");
         return Err(Refusal::NothingSelected(text).into());
     };
-    let page = view::bind(address, name.as_str(), &scan).await?;
+    let page = view::bind(address, name.as_str(), &scan, args.language()).await?;
     serve(page, &args, context).await
 }
 
@@ -100,7 +112,7 @@ async fn block_page(
         }
     };
     let store = BlockPoints::new(context, &name);
-    Ok(view::bind_block(address, &name, view, store).await?)
+    Ok(view::bind_block(address, &name, view, store, args.language()).await?)
 }
 
 /// Returns why the page of a block was refused, if it was.

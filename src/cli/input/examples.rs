@@ -3,7 +3,7 @@
 use clap::Command;
 
 /// Commands with an example each. Two lines are two examples.
-const EXAMPLES: [(&str, &str); 30] = [
+const EXAMPLES: [(&str, &str); 31] = [
     (
         "demo",
         "mocban demo\nmocban demo trial --tier hard --pairs 100\nmocban demo whole --block",
@@ -30,10 +30,17 @@ const EXAMPLES: [(&str, &str); 30] = [
     ),
     (
         "status",
-        "mocban -C blocks status --watch\nmocban -C blocks status --hosts",
+        "mocban -C blocks status --watch\nmocban -C blocks status --pairs\nmocban -C blocks status --hosts",
     ),
-    ("show", "mocban -C blocks show b01-0117"),
+    (
+        "show",
+        "mocban -C blocks show b01-0117\nmocban -C blocks show --low",
+    ),
     ("retry", "mocban -C blocks retry --class io"),
+    (
+        "retire",
+        "mocban -C blocks retire b01-0117\nmocban -C blocks retire --undo b01-0117",
+    ),
     ("check", "mocban -C blocks check --repair"),
     ("backup", "mocban -C blocks backup blocks.sqlite"),
     (

@@ -35,10 +35,28 @@ pub(crate) fn blocks_line(blocks: &BlockStatus, is_running: bool, palette: Palet
             parts.push(palette.paint(tone, format!("{number} {word}")));
         }
     }
+    parts.extend(running_stages(blocks));
     if characters > 0 {
         parts.push(count(characters, "character"));
     }
     parts.join(" · ")
+}
+
+/// Returns the stages of the blocks that a process works on or left, such as `b04 at align`.
+fn running_stages(blocks: &BlockStatus) -> Option<String> {
+    let leased = blocks
+        .0
+        .iter()
+        .filter(|state| state.status == JobStatus::Leased);
+    let stages = leased.filter_map(|state| {
+        let stage = state.next_stage?;
+        Some(format!(
+            "{} at {stage}",
+            one_line(state.attributes.name.as_str())
+        ))
+    });
+    let stages: Vec<String> = stages.take(NAME_LIMIT).collect();
+    (!stages.is_empty()).then(|| stages.join(", "))
 }
 
 /// Returns a line for each failed block, or for the first few, with its sentence.
@@ -89,7 +107,7 @@ mod tests {
                 side: None,
             },
             status,
-            next_stage: None,
+            next_stage: (status == JobStatus::Leased).then_some(BlockStage::Align),
             attempts: 0,
             crashes: 0,
             failure: (status == JobStatus::Quarantined).then_some(failure),
@@ -111,7 +129,7 @@ mod tests {
         let line = blocks_line(&blocks, true, Palette::PLAIN);
         assert_eq!(
             line,
-            "3 blocks · 1 done · 1 failed · 1 running · 300 characters"
+            "3 blocks · 1 done · 1 failed · 1 running · c at align · 300 characters"
         );
         assert!(blocks_line(&blocks, false, Palette::PLAIN).contains("1 interrupted"));
         let text = failed_blocks_text(&blocks, false);

@@ -65,18 +65,24 @@ impl Context {
     /// Writes a line to stderr, unless `-q` is given.
     pub(crate) fn info(&self, text: &str) {
         if !self.global.quiet {
+            self.screen.count_warnings();
             self.screen.line(&indented(text));
         }
     }
 
-    /// Writes a warning to stderr, also with `-q`.
+    /// Writes a warning to stderr, also with `-q`. Of equal ones, only the first few are written, unless `-v` is given.
     pub(crate) fn warn(&self, text: &str) {
-        let label = self.stderr.paint(Tone::Warn, "warning:");
-        self.screen.line(&format!("{label} {}", indented(text)));
+        let label = format!("{} ", self.stderr.paint(Tone::Warn, "warning:"));
+        if self.global.verbose > 0 {
+            self.screen.line(&format!("{label}{}", indented(text)));
+        } else {
+            self.screen.warning(&label, &indented(text));
+        }
     }
 
     /// Writes an error message to stderr, as text or, with `--json`, as a JSON object.
     pub(crate) fn error(&self, text: &str, code: ExitCode) {
+        self.screen.count_warnings();
         if self.global.json {
             let object = json!({"message_type": "exit_error", "code": code as u8, "message": text});
             self.screen.json_line(&object);

@@ -1,11 +1,16 @@
 //! What commands print: text, tables, progress, and the context that all commands have.
 
+pub(crate) mod block_progress;
 pub(crate) mod block_status;
 pub(crate) mod busy;
+pub(crate) mod completion_script;
 pub(crate) mod context;
+pub(crate) mod digits;
+pub(crate) mod equal_warnings;
 pub(crate) mod failures;
 pub(crate) mod logging;
 pub(crate) mod missing_results;
+pub(crate) mod pair_table;
 pub(crate) mod panics;
 pub(crate) mod progress;
 pub(crate) mod run_progress;

@@ -52,6 +52,20 @@ impl Relief {
             surface,
         })
     }
+
+    /// Returns the fraction of the face that is carved ground, 0..=1: about 0 on a planed back, more than a half under text.
+    pub fn carved_fraction(&self) -> f64 {
+        let (mut ground, mut all) = (0_u64, 0_u64);
+        for y in 0..self.soft.height() {
+            for (x, soft) in self.soft.row(y).iter().enumerate() {
+                if is_face(&self.face, x, y) {
+                    all += 1;
+                    ground += u64::from(*soft < 128);
+                }
+            }
+        }
+        ground as f64 / all.max(1) as f64
+    }
 }
 
 /// Returns whether a pixel of the height map belongs to the face.
@@ -241,6 +255,15 @@ mod tests {
             }
         }
         assert!(right as f64 > 0.98 * f64::from(all), "{right} of {all}");
+    }
+
+    #[test]
+    fn ground_is_carved_and_a_planed_face_is_not() {
+        let mut face = TestWorld::new(11).face();
+        let carved = face.relief.carved_fraction();
+        assert!((0.4..0.95).contains(&carved), "{carved}");
+        face.relief.soft.data_mut().fill(255);
+        assert!(face.relief.carved_fraction() < 1e-9);
     }
 
     #[test]

@@ -266,6 +266,7 @@ mod tests {
             print_outline: None,
             vertices: 0,
             triangles: 0,
+            missing_vertices: None,
         }
     }
 

@@ -9,6 +9,8 @@
 //!
 //! The fit stage reads the print to decide the carved side. The page of the crate gives the reason.
 
+use std::num::NonZeroU64;
+
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
 use super::normalize::{self, NormalizeError, Normalized};
@@ -50,15 +52,16 @@ impl StageError {
         }
     }
 
-    /// Returns whether the print is the likelier cause. It is if the characters do not match.
+    /// Returns whether the print is the likelier cause. It is if the characters do not match and nothing is unusual about
+    /// the scan.
     pub const fn is_of_print(&self) -> bool {
-        matches!(
-            self,
-            Self::Normalize(NormalizeError::Print(_))
-                | Self::Register(
-                    RegisterError::NoMatch { .. } | RegisterError::OtherCharacter { .. }
-                )
-        )
+        match self {
+            Self::Normalize(NormalizeError::Print(_)) => true,
+            Self::Register(
+                RegisterError::NoMatch { seen, .. } | RegisterError::OtherCharacter { seen, .. },
+            ) => !seen.is_of_scan(),
+            _ => false,
+        }
     }
 }
 
@@ -79,10 +82,12 @@ pub fn fit(
     scanned_face_down: Option<bool>,
     settings: &Settings,
 ) -> Result<FitOutcome, FitError> {
-    match settings.pipeline.method {
+    let mut outcome = match settings.pipeline.method {
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
-    }
+    }?;
+    outcome.missing_vertices = NonZeroU64::new(scan.missing());
+    Ok(outcome)
 }
 
 /// Prepares print and depth map for registration.

@@ -36,6 +36,8 @@ impl JobKind for BlockJob {
     type Provenance = BlockProvenance;
     type Inputs = BlockInputVersions;
 
+    const STAGES: usize = BlockStage::COUNT;
+
     fn unit(id: i64) -> BlockId {
         BlockId(id)
     }
@@ -83,6 +85,7 @@ impl StoredKind for BlockJob {
         ("and_fail", ""),
         ("and_requeue", ""),
         ("and_send_back", ""),
+        ("and_not_retired", ""),
         ("and_recover", ""),
         ("and_overdue", ""),
         ("and_count_claimed", ""),

@@ -21,7 +21,7 @@ use crate::queue::requeue::send_back;
 use crate::queue::retired;
 use crate::records::import::{ImportRow, ImportSummary, import_chunk};
 use crate::{Catalog, Result};
-use mocban_core::domain::{BlockName, PairId, PairName, Stage};
+use mocban_core::domain::{BlockName, PairId, PairName, RetireCause, Stage};
 
 /// What the cut of a block changed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -111,7 +111,7 @@ async fn finish(
     let mut deltas = Deltas::default();
     let summary = store_pairs(conn, &rows, at, &mut deltas).await?;
     let gone = characters::store(conn, lease.unit, &name, found).await?;
-    let retired = retired::retire(conn, &gone, at, &mut deltas).await?;
+    let retired = retired::retire(conn, &gone, RetireCause::Labels, at, &mut deltas).await?;
     deltas.apply(conn).await?;
     Ok(CutReply::Stored(CutSummary { retired, ..summary }))
 }

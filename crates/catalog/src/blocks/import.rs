@@ -8,7 +8,7 @@ use crate::db::transaction::in_transaction;
 use crate::records::checksums::{self, ChecksummedTable};
 use crate::records::left_out::is_counted;
 use crate::records::similar_names;
-use crate::{Catalog, Result};
+use crate::{Catalog, CatalogError, Result};
 use mocban_core::domain::{BlockName, BlockSide, LengthUnit, UnixMillis};
 
 /// Counts of an import of blocks.
@@ -49,14 +49,15 @@ const NAMES: &str = concat!(
 
 impl Catalog {
     /// Imports blocks in one transaction. Adds new blocks and updates existing ones. The next run finds out which
-    /// stages of a changed block are stale.
+    /// stages of a changed block are stale. With `changed_files`, most known blocks may get another scan and another page.
     ///
     /// # Errors
-    /// Returns an error if the names of two blocks differ only in case, or if a database operation fails. In that case
-    /// nothing is imported.
+    /// Returns an error if the names of two blocks differ only in case, if most known blocks would get other files, or if
+    /// a database operation fails. In that case nothing is imported.
     pub async fn import_blocks(
         &self,
         rows: Vec<BlockAttributes>,
+        changed_files: bool,
         now: UnixMillis,
     ) -> Result<BlockImportSummary> {
         in_transaction!(self, |conn| {
@@ -66,6 +67,9 @@ impl Catalog {
             }
             if summary.added > 0 {
                 similar_names::refuse_blocks(conn).await?;
+            }
+            if !changed_files {
+                refuse_changed_files(&summary)?;
             }
             Ok(summary)
         })
@@ -94,6 +98,27 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         let names = query_scalar(NAMES).bind(self.left_out.of(ChecksummedTable::Block));
         names.fetch_all(&mut conn).await
+    }
+}
+
+/// Refuses an import that gives most of the known blocks another scan and another page. Unless the name of a block is
+/// given, it is that of the file of its scan, which other folders may have too.
+fn refuse_changed_files(summary: &BlockImportSummary) -> Result<()> {
+    let has_other_files = |(_, fields): &&(BlockName, Vec<&str>)| {
+        ["mesh", "page"].iter().all(|file| fields.contains(file))
+    };
+    let mut others = summary.changed.iter().filter(has_other_files);
+    let changed = others.clone().count() as u64;
+    let known = summary.unchanged + summary.changed.len() as u64;
+    match others.next() {
+        Some((example, _)) if 2 * changed > known => Err(CatalogError::ChangedFiles {
+            changed,
+            known,
+            kind: "blocks",
+            files: "scan and another page",
+            example: example.to_string(),
+        }),
+        _ => Ok(()),
     }
 }
 

@@ -12,8 +12,8 @@ use crate::db::script::Script;
 use crate::db::transaction::in_transaction;
 use crate::queue::claim::{ClaimRequest, add_claim, add_release, in_order, leases, release_due};
 use crate::queue::counters::Deltas;
-use crate::queue::kind::StoredKind as _;
-use crate::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
+use crate::queue::kind::{StoredKind as _, Template};
+use crate::queue::lease::{CheckpointOutcome, FencedRow, Lease, StageCheckpoint, StageFailure};
 use crate::queue::requeue::{RetrySelection, retry, retry_pairs};
 use crate::queue::{checkpoint, fail, server_claim};
 use crate::{Catalog, CatalogError, Result};
@@ -24,6 +24,14 @@ SELECT count(*) FILTER (WHERE status = 0) AS ready, count(*) FILTER (WHERE statu
     count(*) FILTER (WHERE status = 2) AS backoff, count(*) FILTER (WHERE status = 4) AS quarantined,
     min(run_at) AS next_due FROM block_job
 WHERE ?1 IS NULL OR block IN (SELECT CAST(atom AS bigint) FROM json_each(?1))";
+
+/// Selects a job if its lease is valid, and locks it, so that the lease cannot be lost before the transaction ends.
+static LEASED: Template = Template::new(
+    "
+SELECT {unit} AS unit, token FROM {job}
+WHERE {unit} = ?1 AND worker = ?2 AND token = ?3 AND status = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w WHERE w.id = {job}.worker AND w.ended IS NULL AND w.heartbeat >= ?4) FOR UPDATE",
+);
 
 /// Numbers of blocks that have a stage to run, and of blocks that failed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -124,7 +132,30 @@ impl Catalog {
         })
     }
 
-    /// Stores versions of the input files of blocks. Keeps the stored version of a file whose new version is `None`.
+    /// Stores versions of the input files of a leased block, and keeps the stored version of a file whose new version is
+    /// `None`. Returns `false`, and stores nothing, if the lease was lost or the worker's last heartbeat is before
+    /// `alive_since`.
+    pub async fn store_leased_inputs(
+        &self,
+        lease: Lease<BlockJob>,
+        seen: BlockInputVersions,
+        alive_since: UnixMillis,
+    ) -> Result<bool> {
+        in_transaction!(self, |conn| {
+            let leased = query_as(LEASED.of::<BlockJob>()).bind(lease.unit.0);
+            let leased = leased.bind(lease.worker.0).bind(lease.token);
+            let rows: Vec<FencedRow> = leased.bind(alive_since).fetch_all(&mut *conn).await?;
+            if !lease.is_in(&rows) {
+                return Ok(false);
+            }
+            let mut script = Script::default();
+            BlockJob::add_inputs(&mut script, [(lease.unit, &seen)].into_iter())?;
+            script.run(conn).await?;
+            Ok(true)
+        })
+    }
+
+    /// Stores versions of the input files of blocks that no worker has leased. Keeps the stored version of a file whose new version is `None`.
     pub async fn store_block_inputs(&self, seen: Vec<(BlockId, BlockInputVersions)>) -> Result<()> {
         in_transaction!(self, |conn| {
             let mut script = Script::default();

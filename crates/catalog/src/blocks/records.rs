@@ -35,11 +35,13 @@ const STATES: &str = concat!(
 SELECT b.id, b.name, b.mesh_path, b.page_path, b.labels_path, b.unit, b.side, b.control_points,
     j.stage, j.status, j.attempt, j.crashes,
     f.stage AS failed_stage, f.class, f.message, f.at AS failed_at,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut') AS characters,
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND NOT EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS characters,
     (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'left') AS left_out,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'retired') AS retired,
-    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2)
-        AS low_confidence
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND (c.state = 'retired' OR c.state = 'cut' AND EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair))) AS retired,
+    (SELECT count(*) FROM block_character AS c WHERE c.block = b.id AND c.state = 'cut' AND c.confidence < ?2 AND NOT EXISTS (
+        SELECT 1 FROM retired_pair AS r WHERE r.pair = c.pair)) AS low_confidence
 FROM block AS b JOIN block_job AS j ON j.block = b.id LEFT JOIN block_failure AS f ON f.block = b.id WHERE (?1 IS NULL OR b.name = ?1) AND ",
     is_counted!("b.id", "?3"),
     " ORDER BY b.name"

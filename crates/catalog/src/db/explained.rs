@@ -20,6 +20,7 @@ impl Explained for CatalogError {
             | Self::NotEmpty(_)
             | Self::SimilarName { .. }
             | Self::SameFiles { .. }
+            | Self::ChangedFiles { .. }
             | Self::SameCatalog(_)
             | Self::FinishedCopy { .. } => ErrorCode::Usage,
             Self::MayNotCreateRoles(_) | Self::MayNotReview(_) | Self::OtherReviewer { .. } => {

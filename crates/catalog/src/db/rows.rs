@@ -9,7 +9,7 @@ use crate::db::value::{FromValue, Value as ColumnValue, read_blob, read_text};
 use mocban_core::domain::{
     Affine2, AttentionCheck, BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage,
     ContentHash, Failure, FailureClass, InputVersion, JobStatus, LengthUnit, PairId, PairName,
-    PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+    PrintFromMesh, Reason, RetireCause, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
 /// Implements [`FromValue`] for domain types. Each line has a type, the type of its column, and a conversion function.
@@ -44,6 +44,7 @@ decode! {
     ReviewOrder: text = str::parse;
     ThresholdMetric: text = str::parse;
     Verdict: text = str::parse;
+    RetireCause: text = str::parse;
     Affine2: text = serde_json::from_str;
     AttentionCheck: text = serde_json::from_str;
     PrintFromMesh: text = serde_json::from_str;

@@ -8,7 +8,7 @@ use crate::db::conn::Conn;
 use crate::db::dialect::Sql;
 use crate::db::error::Result;
 use crate::db::script::{Script, Statement};
-use crate::queue::counters::{CounterKey, Cursor, DONE, Deltas};
+use crate::queue::counters::{CounterKey, Cursor, Deltas};
 use crate::queue::kind::{JobKind, StoredKind, Template};
 use crate::queue::lease::{FencedRow, Lease, StageCheckpoint, position, was_written_long_ago};
 use crate::queue::pair_job::PairJob;
@@ -27,7 +27,7 @@ pub(crate) type LeasedCheckpoints<K = PairJob> = (Lease<K>, Vec<StageCheckpoint<
 /// a pair dirty if the new results do not build on the stored ones: see [`AdvancedJob`].
 pub(crate) static ADVANCE: Template = Template::new(
     "
-UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [next] = 4 THEN NULL ELSE worker END,
+UPDATE {job} SET stage = [next], status = [status], worker = CASE WHEN [status] = 1 THEN worker END,
     deadline = [deadline], attempt = 1, crashes = 0{and_advance}
 FROM jsonb_each(?) AS item
 WHERE {job}.{unit} = [unit] AND {job}.worker = [worker] AND {job}.token = [token] AND {job}.status = 1 AND EXISTS (
@@ -192,7 +192,7 @@ impl<'i> ResultItem<'i, ()> {
 fn key_after<K: JobKind>(stage: &StageCheckpoint<K>) -> CounterKey {
     let (cursor, status) = match K::next(stage.stage) {
         Some(next) => (position::<K>(next), JobStatus::Leased),
-        None => (DONE, JobStatus::Done),
+        None => (K::STAGES as Cursor, JobStatus::Done),
     };
     let fingerprint = K::fingerprint(&stage.provenance);
     CounterKey::new(cursor, status, fingerprint.map(|FingerprintId(id)| id))

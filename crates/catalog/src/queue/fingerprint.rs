@@ -24,9 +24,9 @@ pub struct Fingerprint {
     pub fields: Value,
 }
 
-/// The current fingerprints of the four stages.
+/// The current fingerprints of the stages.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fingerprints([Fingerprint; 4]);
+pub struct Fingerprints([Fingerprint; Stage::COUNT]);
 
 impl Fingerprints {
     /// Computes the fingerprint of each stage from its fields. Each hash includes the previous stage's hash, so a
@@ -46,7 +46,7 @@ impl Fingerprints {
         &self.0[stage.index()]
     }
 
-    /// Returns the four hashes on one line. Another process can pass the line to [`Catalog::changes_from`].
+    /// Returns the hashes on one line. Another process can pass the line to [`Catalog::changes_from`].
     pub fn hash_line(&self) -> String {
         let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
         hashes.map(ContentHash::to_hex).join(" ")
@@ -61,7 +61,7 @@ pub(crate) fn hash_of(stage: Stage, fields: &Value, upstream: Option<ContentHash
 
 /// Row ids of the current fingerprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FingerprintIds([FingerprintId; 4]);
+pub struct FingerprintIds([FingerprintId; Stage::COUNT]);
 
 impl FingerprintIds {
     /// Returns the fingerprint of a stage.
@@ -90,7 +90,7 @@ ON CONFLICT DO NOTHING",
 );
 
 impl Catalog {
-    /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
+    /// Stores the fingerprints that are not stored yet. Returns the ids of all.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
@@ -98,7 +98,7 @@ impl Catalog {
         let fingerprints = fingerprints.clone();
         in_transaction!(self, |conn| {
             let mut upstream: Option<FingerprintId> = None;
-            let mut ids = [FingerprintId(0); 4];
+            let mut ids = [FingerprintId(0); Stage::COUNT];
             for stage in Stage::ALL {
                 let fingerprint = fingerprints.of(stage);
                 let id = query_scalar(INSERT)
@@ -145,8 +145,8 @@ impl Catalog {
 pub(crate) async fn known(
     conn: &mut Conn,
     fingerprints: &Fingerprints,
-) -> Result<[Option<FingerprintId>; 4]> {
-    let mut ids = [None; 4];
+) -> Result<[Option<FingerprintId>; Stage::COUNT]> {
+    let mut ids = [None; Stage::COUNT];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
         let query = query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
             .bind(&fingerprints.of(stage).hash.as_bytes()[..]);
@@ -155,7 +155,7 @@ pub(crate) async fn known(
     Ok(ids)
 }
 
-/// Returns the ids of the four fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
+/// Returns the ids of the fingerprints as a JSON array. A fingerprint that is not stored has the id -1, which
 /// matches no result.
 pub(crate) async fn current_json(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<String> {
     let ids = known(conn, fingerprints).await?;
@@ -174,11 +174,11 @@ pub(crate) async fn fields_of(conn: &mut Conn, id: FingerprintId) -> Result<Valu
 pub(crate) struct FingerprintChains {
     /// Stage and upstream by id.
     stored: BTreeMap<FingerprintId, (Stage, Option<FingerprintId>)>,
-    current: [Option<FingerprintId>; 4],
+    current: [Option<FingerprintId>; Stage::COUNT],
 }
 
 impl FingerprintChains {
-    /// Reads all fingerprints. Each combination of settings has added at most four.
+    /// Reads all fingerprints. Each combination of settings has added at most one for each stage.
     pub(crate) async fn load(conn: &mut Conn, fingerprints: &Fingerprints) -> Result<Self> {
         let current = known(conn, fingerprints).await?;
         let query = query_as("SELECT id, stage, upstream FROM fingerprint");

@@ -30,6 +30,9 @@ pub trait JobKind: Debug + Clone + Copy + PartialEq + Eq + Send + Sync + 'static
     /// Versions of the input files.
     type Inputs: Debug + Clone + PartialEq + Send + Sync;
 
+    /// Number of stages. Also the position of a job that is done.
+    const STAGES: usize;
+
     /// Returns what has a row id.
     fn unit(id: i64) -> Self::Unit;
     /// Returns a row id.

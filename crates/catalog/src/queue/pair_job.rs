@@ -65,6 +65,8 @@ impl JobKind for PairJob {
     type Provenance = PairProvenance;
     type Inputs = InputVersions;
 
+    const STAGES: usize = Stage::COUNT;
+
     fn unit(id: i64) -> PairId {
         PairId(id)
     }
@@ -139,6 +141,10 @@ impl StoredKind for PairJob {
                 ", prio = 0, exclusive = 0",
                 go_back_to!("min(job.stage, [1])")
             ),
+        ),
+        (
+            "and_not_retired",
+            " AND NOT EXISTS (SELECT 1 FROM retired_pair AS r WHERE r.pair = [0])",
         ),
         ("and_recover", ", exclusive = max(exclusive, [1])"),
         ("and_overdue", ", exclusive = 1"),

@@ -38,11 +38,11 @@ FROM json_each(?1) AS item WHERE {job}.{unit} = [0] AND {job}.status <> 1
 RETURNING {unit} AS unit, stage, status, coalesce({fingerprint}, 0) AS fingerprint",
 );
 
-/// Adds the jobs that are missing.
+/// Adds the jobs that are missing. Retired pairs get none.
 static NEW_JOBS: Template = Template::new(
     "
 INSERT INTO {job} ({unit}, stage, status)
-SELECT [0], 0, 0 FROM json_each(?1) AS item WHERE NOT EXISTS (SELECT 1 FROM {job} WHERE {unit} = [0])",
+SELECT [0], 0, 0 FROM json_each(?1) AS item WHERE NOT EXISTS (SELECT 1 FROM {job} WHERE {unit} = [0]){and_not_retired}",
 );
 
 /// Sends jobs back to a stage, never forward. Ends their leases too: the token increases, so later writes under an old
@@ -308,7 +308,8 @@ pub(crate) async fn requeue<K: StoredKind>(
     Ok(moved.len() as u64)
 }
 
-/// Sends jobs back to a stage, never forward, and ends their leases. Adds missing jobs and removes the failures.
+/// Sends jobs back to a stage, never forward, and ends their leases. Adds missing jobs, except for retired pairs, and removes
+/// the failures.
 pub(crate) async fn send_back<K: StoredKind>(
     conn: &mut Conn,
     jobs: impl Iterator<Item = (K::Unit, K::Stage)> + Clone,

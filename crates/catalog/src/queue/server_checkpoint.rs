@@ -121,7 +121,7 @@ fn statement(is_first: bool) -> String {
 WITH item AS {jobs},
 advanced AS (
     UPDATE job SET stage = item.next, status = item.status,
-        worker = CASE WHEN item.next = 4 THEN NULL ELSE job.worker END, deadline = item.deadline,
+        worker = CASE WHEN item.status = 1 THEN job.worker END, deadline = item.deadline,
         attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.low_confidence, fingerprint = item.fingerprint,
         dirty = CASE WHEN job.dirty = 1 OR item.mixed = 1 OR (item.first IS NOT NULL AND job.fingerprint IS DISTINCT FROM (
             SELECT upstream FROM fingerprint WHERE id = item.first)) THEN 1 ELSE 0 END

@@ -114,7 +114,7 @@ async fn other(
     others: StoredSettings,
     settings: &WorkerSettings,
 ) -> Result<SharedSettings> {
-    let ids: [i64; 4] = serde_json::from_str(&others.fingerprints)?;
+    let ids: [i64; Stage::COUNT] = serde_json::from_str(&others.fingerprints)?;
     let mut changes = Vec::new();
     for (stage, id) in Stage::ALL.into_iter().zip(ids) {
         let mine: Value = fields_of(conn, settings.fingerprints.of(stage)).await?;

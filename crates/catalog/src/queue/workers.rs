@@ -54,7 +54,7 @@ pub struct WorkLeft {
     /// Pairs with stages to run, without quarantined pairs.
     pub pairs: u64,
     /// Number of pairs that have yet to run each stage.
-    pub by_stage: [u64; 4],
+    pub by_stage: [u64; Stage::COUNT],
     /// Quarantined pairs.
     pub quarantined: u64,
 }

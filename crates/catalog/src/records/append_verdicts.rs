@@ -40,15 +40,15 @@ pub struct ImportedVerdicts {
     pub left_out: u64,
 }
 
-/// Selects the current results of pairs. A pair that is not done has one row whose metric is NULL.
+/// Selects the current results of pairs. A pair that is not done, or is retired, has one row whose metric is NULL.
 const JUDGED: Sql = Sql::pair(
     "
 SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name IN (SELECT atom FROM json_each(?1)) ORDER BY p.id, m.metric",
     "
 SELECT p.name, p.id AS pair, m.metric, m.result_hash FROM pair AS p
-    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+    LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
 WHERE p.name = ANY (ARRAY(SELECT atom FROM json_each(?1))) ORDER BY p.id, m.metric",
 );
 
@@ -245,7 +245,7 @@ async fn append(
     Ok(counts)
 }
 
-/// Returns the current results of the pairs, by name. A pair that is not done has none.
+/// Returns the current results of the pairs, by name. A pair that is not done, or is retired, has none.
 async fn current_results(
     conn: &mut Conn,
     rows: &[ListedVerdict],

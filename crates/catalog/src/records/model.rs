@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::Result;
@@ -23,6 +23,8 @@ pub struct StatusCounts {
     pub schema: u32,
     /// Number of pairs.
     pub pairs: u64,
+    /// Number of pairs that a person or a shorter list retired. They are in no other count.
+    pub retired: u64,
     /// Number of pairs by job status, all statuses included.
     pub jobs: BTreeMap<JobStatus, u64>,
     /// Number of pairs by stage, all stages included.
@@ -132,7 +134,7 @@ pub struct MetricRecord {
 }
 
 /// Attributes of a pair as imported.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
@@ -151,7 +153,7 @@ pub struct PairAttributes {
     /// All other columns of the manifest.
     pub meta: Map<String, Value>,
     /// The alignment that is expected of a pair cut from a block, as JSON text.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<String>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::blocks::{attributes, block};
 use super::{World, name, row};
-use crate::{CatalogError, ImportChunk, ImportRow};
+use crate::{CatalogError, ImportChunk, ImportRow, ImportTerms};
 
 #[tokio::test]
 async fn an_import_without_an_end_stores_nothing() {
@@ -11,7 +11,10 @@ async fn an_import_without_an_end_stores_nothing() {
     let rows = ImportChunk::Rows(vec![row("q0"), row("q1")]);
     sender.try_send(rows).expect("room for one");
     drop(sender);
-    let outcome = world.catalog.import_all(chunks, Vec::new(), 1).await;
+    let outcome = world
+        .catalog
+        .import_all(chunks, ImportTerms::default(), 1)
+        .await;
     assert!(
         matches!(outcome, Err(CatalogError::CutShort)),
         "{outcome:?}"
@@ -31,7 +34,10 @@ async fn chunks_of_an_import_are_counted_together() {
         sender.try_send(ImportChunk::Rows(chunk)).expect("room");
     }
     sender.try_send(ImportChunk::End).expect("room");
-    let imported = world.catalog.import_all(chunks, Vec::new(), 1).await;
+    let imported = world
+        .catalog
+        .import_all(chunks, ImportTerms::default(), 1)
+        .await;
     let (summary, truths) = imported.expect("imported");
     assert_eq!((summary.added, summary.unchanged, truths), (2, 0, 0));
     assert_eq!(summary.changed[0].name, name("p0"));
@@ -113,14 +119,104 @@ async fn a_block_whose_name_differs_only_in_case_is_refused() {
     let world = World::new(0).await;
     let catalog = &world.catalog;
     catalog
-        .import_blocks(vec![attributes("B1")], 1)
+        .import_blocks(vec![attributes("B1")], false, 1)
         .await
         .expect("a new name");
-    let refused = catalog.import_blocks(vec![attributes("b1")], 2).await;
+    let refused = catalog
+        .import_blocks(vec![attributes("b1")], false, 2)
+        .await;
     let text = refused.expect_err("the same name").to_string();
     assert!(
         text.starts_with("block b1 differs from block B1 only in"),
         "{text}"
     );
     assert_eq!(catalog.block_names().await.expect("names"), [block("B1")]);
+}
+
+#[tokio::test]
+async fn an_import_that_gives_most_known_pairs_other_files_is_refused_unless_asked_for() {
+    let world = World::new(0).await;
+    let catalog = &world.catalog;
+    let rows = |folder: &str, ids: std::ops::Range<usize>| {
+        let row = |k: usize| row_with(&k.to_string(), &format!("{folder}/{k}"));
+        ids.map(row).collect::<Vec<_>>()
+    };
+    catalog
+        .import(rows("b1", 1..9), 1)
+        .await
+        .expect("new pairs");
+    let refused = catalog
+        .import(rows("b2", 3..12), 2)
+        .await
+        .expect_err("other files");
+    let text = refused.to_string();
+    assert!(
+        text.starts_with("6 of the 6 pairs in it that the project has would get another mesh and another print, such as 3:"),
+        "{text}"
+    );
+    // A few corrections among many, and one other file each, are changes.
+    let mut few = rows("b1", 1..9);
+    few.splice(0..4, rows("b2", 1..5));
+    assert_eq!(
+        catalog
+            .import(few, 3)
+            .await
+            .expect("four of eight")
+            .changed
+            .len(),
+        4
+    );
+    let mut prints = rows("b1", 1..9);
+    for row in &mut prints {
+        row.print_path += ".tif";
+    }
+    assert_eq!(
+        catalog
+            .import(prints, 4)
+            .await
+            .expect("other prints")
+            .changed
+            .len(),
+        8
+    );
+    let (sender, chunks) = tokio::sync::mpsc::channel(2);
+    for chunk in [ImportChunk::Rows(rows("moved", 1..9)), ImportChunk::End] {
+        sender.try_send(chunk).expect("room");
+    }
+    let terms = ImportTerms {
+        changed_files: true,
+        ..ImportTerms::default()
+    };
+    let (summary, _) = catalog
+        .import_all(chunks, terms, 5)
+        .await
+        .expect("asked for");
+    assert_eq!(summary.changed.len(), 8);
+    world.assert_counters().await;
+}
+
+#[tokio::test]
+async fn a_block_with_another_scan_and_another_page_is_refused_unless_asked_for() {
+    let world = World::new(0).await;
+    let catalog = &world.catalog;
+    catalog
+        .import_blocks(vec![attributes("scan")], false, 1)
+        .await
+        .expect("new");
+    let mut other = attributes("scan");
+    other.mesh_path = "b2/scan.stl".to_owned();
+    catalog
+        .import_blocks(vec![other.clone()], false, 2)
+        .await
+        .expect("another scan");
+    other.mesh_path = "b3/scan.stl".to_owned();
+    other.page_path = "b3/scan.png".to_owned();
+    let refused = catalog.import_blocks(vec![other.clone()], false, 3).await;
+    let text = refused.expect_err("other files").to_string();
+    assert!(
+        text.starts_with("1 of the 1 blocks in it that the project has would get another scan and another page, such as scan:"),
+        "{text}"
+    );
+    let changed = catalog.import_blocks(vec![other], true, 4).await;
+    assert_eq!(changed.expect("asked for").changed.len(), 1);
 }

@@ -1,6 +1,7 @@
 //! Tests of the catalog on real databases: files in the module `tests`, PostgreSQL in `tests_on_postgres`.
 
 mod answers;
+mod block_leases;
 mod block_pairs;
 mod block_settings;
 mod blocks;
@@ -14,6 +15,7 @@ mod model;
 mod place;
 mod protocol;
 mod recovery;
+mod retired;
 mod schema;
 mod server_plans;
 mod set_apart;

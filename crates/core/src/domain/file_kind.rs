@@ -32,7 +32,7 @@ pub enum FileKind {
     Binary,
 }
 
-const SIGNATURES: [(&[u8], FileKind); 31] = [
+const SIGNATURES: &[(&[u8], FileKind)] = &[
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\xff\xd8\xff", FileKind::Jpeg),
     (b"II*\0", FileKind::Tiff),
@@ -50,15 +50,24 @@ const SIGNATURES: [(&[u8], FileKind); 31] = [
     (b"\0\0\0\x0cJXL ", FileKind::OtherImage("a JPEG XL image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
-    (b"glTF", FileKind::OtherMesh("a binary glTF scene")),
-    (b"OFF\n", FileKind::OtherMesh("an OFF mesh")),
-    (b"OFF\r", FileKind::OtherMesh("an OFF mesh")),
+    (b"glTF", GLTF),
     (b"Kaydara FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"; FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"BLENDER", FileKind::OtherMesh("a Blender scene")),
+    (b"PXR-USDC", FileKind::OtherMesh("a USD scene")),
+    (b"#usda", FileKind::OtherMesh("a USD scene")),
+    (b"ISO-10303-21", FileKind::OtherMesh("a STEP model")),
     (b"#VRML", FileKind::OtherMesh("a VRML scene")),
     (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
     (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
-    (b"%PDF", FileKind::Other("a PDF document")),
+    (b"ASTM-E57", FileKind::OtherMesh("an E57 point cloud")),
     (b"version https://git-lfs", FileKind::LfsPointer),
+    (b"version https://hawser", FileKind::LfsPointer),
+    (
+        b"/annex/objects/",
+        FileKind::Other("a pointer of git-annex, whose content `git annex get` fetches"),
+    ),
+    (b"%PDF", FileKind::Other("a PDF document")),
     (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
     (b"\x1f\x8b", FileKind::Other("a gzip archive")),
     (b"7z\xbc\xaf", FileKind::Other("a 7-Zip archive")),
@@ -67,6 +76,26 @@ const SIGNATURES: [(&[u8], FileKind); 31] = [
     (b"\xff\xfe", FileKind::Other("UTF-16 text")),
     (b"\xfe\xff", FileKind::Other("UTF-16 text")),
     (b"<", FileKind::Other("XML or HTML text")),
+];
+
+/// Extensions of unsupported 3D formats.
+const UNREAD_MESHES: [(&[&str], FileKind); 13] = [
+    (&["glb", "gltf"], GLTF),
+    (&["off"], FileKind::OtherMesh("an OFF mesh")),
+    (&["3mf"], FileKind::OtherMesh("a 3MF model")),
+    (&["fbx"], FileKind::OtherMesh("an FBX scene")),
+    (&["dae"], FileKind::OtherMesh("a COLLADA scene")),
+    (&["x3d"], FileKind::OtherMesh("an X3D scene")),
+    (&["wrl"], FileKind::OtherMesh("a VRML scene")),
+    (&["blend"], FileKind::OtherMesh("a Blender scene")),
+    (
+        &["usd", "usda", "usdc", "usdz"],
+        FileKind::OtherMesh("a USD scene"),
+    ),
+    (&["step", "stp"], FileKind::OtherMesh("a STEP model")),
+    (&["pcd"], FileKind::OtherMesh("a PCD point cloud")),
+    (&["las", "laz"], FileKind::OtherMesh("a LAS point cloud")),
+    (&["e57"], FileKind::OtherMesh("an E57 point cloud")),
 ];
 
 /// Extensions of unsupported images and documents.
@@ -85,6 +114,10 @@ const UNREAD_IMAGES: [(&[&str], FileKind); 9] = [
     (&["pdf"], FileKind::Other("a PDF document")),
 ];
 
+const GLTF: FileKind = FileKind::OtherMesh("a glTF scene");
+/// Bytes at the beginning and the end of a container that are searched for the name of its content.
+const SEARCHED_BYTES: usize = 1 << 16;
+
 impl FileKind {
     /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
@@ -99,10 +132,32 @@ impl FileKind {
             }
             _ => {}
         }
-        SIGNATURES
+        let found = SIGNATURES
             .iter()
             .find(|(signature, _)| bytes.starts_with(signature))
-            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind)
+            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind);
+        Self::scene_within(found, bytes).unwrap_or(found)
+    }
+
+    /// Returns the 3D format whose files are archives, XML or text.
+    fn scene_within(outer: Self, bytes: &[u8]) -> Option<Self> {
+        let part = bytes.len().min(SEARCHED_BYTES);
+        let (head, tail) = (&bytes[..part], &bytes[bytes.len() - part..]);
+        let has = |word: &str| {
+            let mut places = head.windows(word.len()).chain(tail.windows(word.len()));
+            places.any(|place| place == word.as_bytes())
+        };
+        let name = match outer {
+            Self::Other("a ZIP archive") if has("3D/3dmodel.model") => "a 3MF model",
+            Self::Other("XML or HTML text") if has("<COLLADA") => "a COLLADA scene",
+            Self::Other("XML or HTML text") if has("<X3D") => "an X3D scene",
+            Self::Text if is_off(head) => "an OFF mesh",
+            Self::Text if head.trim_ascii_start().starts_with(b"{") => {
+                return (has("\"asset\"") && has("\"version\"")).then_some(GLTF);
+            }
+            _ => return None,
+        };
+        Some(Self::OtherMesh(name))
     }
 
     fn without_signature(bytes: &[u8]) -> Self {
@@ -129,11 +184,11 @@ impl FileKind {
         }
     }
 
-    /// Returns the type of image that files with an extension usually are, if it is not read.
+    /// Returns the type that files with an extension usually are, if it is not read.
     pub fn of_unread_extension(extension: &str) -> Option<Self> {
         let extension = extension.to_ascii_lowercase();
-        let mut images = UNREAD_IMAGES.into_iter();
-        let found = images.find(|(extensions, _)| extensions.contains(&extension.as_str()));
+        let mut types = UNREAD_MESHES.into_iter().chain(UNREAD_IMAGES);
+        let found = types.find(|(extensions, _)| extensions.contains(&extension.as_str()));
         found.map(|(_, kind)| kind)
     }
 
@@ -152,12 +207,48 @@ impl FileKind {
         })
     }
 
+    /// Returns what to do with files of this type where meshes are needed, if that does not depend on the file.
+    pub fn mesh_advice(self) -> Option<String> {
+        let programs = match self {
+            Self::OtherMesh("a STEP model") => "FreeCAD",
+            Self::OtherMesh(_) => "MeshLab, Blender or CloudCompare",
+            _ => return None,
+        };
+        Some(format!("open them in {programs} and export them as PLY"))
+    }
+
+    /// Says that a file of this type is not what is `needed`, which files of the `formats` that are read hold.
+    pub(crate) fn refusal(self, needed: &str, formats: &str, advice: Option<String>) -> String {
+        if self == Self::LfsPointer {
+            return format!(
+                "the file is {self} and does not hold the {needed}; fetch the {needed} with `git lfs pull`"
+            );
+        }
+        let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
+        format!("the file is {self}; {formats} are read{advice}")
+    }
+
     /// Returns the description without the article.
     pub fn name(self) -> &'static str {
         let text = self.description();
         let name = text.strip_prefix("a ").or(text.strip_prefix("an "));
         name.unwrap_or(text)
     }
+}
+
+/// Returns whether the first word of a text, which comments may precede, is `OFF` or names one of its variants.
+fn is_off(text: &[u8]) -> bool {
+    let mut lines = text.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let is_content = |line: &&[u8]| !line.trim_ascii().is_empty() && !line.starts_with(b"#");
+    let first = lines.find(is_content).unwrap_or_default();
+    let mut words = first.split(u8::is_ascii_whitespace);
+    let Some(mut variant) = words.next().and_then(|word| word.strip_suffix(b"OFF")) else {
+        return false;
+    };
+    for prefix in [&b"ST"[..], b"C", b"N", b"4", b"n"] {
+        variant = variant.strip_prefix(prefix).unwrap_or(variant);
+    }
+    variant.is_empty()
 }
 
 impl std::fmt::Display for FileKind {
@@ -168,10 +259,10 @@ impl std::fmt::Display for FileKind {
 
 #[cfg(test)]
 mod tests {
-    use super::{FileKind, UNREAD_IMAGES};
+    use super::{FileKind, UNREAD_IMAGES, UNREAD_MESHES};
 
     #[test]
-    fn unread_images_are_known_by_extension_and_have_advice() {
+    fn unread_types_are_known_by_extension_and_have_advice() {
         for (extensions, kind) in UNREAD_IMAGES {
             for extension in extensions {
                 assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
@@ -183,6 +274,12 @@ mod tests {
             FileKind::of_unread_extension("PDF"),
             Some(FileKind::Other("a PDF document"))
         );
+        for (extensions, kind) in UNREAD_MESHES {
+            for extension in extensions {
+                assert_eq!(FileKind::of_unread_extension(extension), Some(kind));
+            }
+            assert!(kind.mesh_advice().is_some() && kind.image_advice().is_none());
+        }
         assert_eq!(FileKind::of_unread_extension("png"), None);
         assert_eq!(FileKind::Text.image_advice(), None);
     }
@@ -204,5 +301,72 @@ mod tests {
         assert_eq!(FileKind::of(pointer), FileKind::LfsPointer);
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
+    }
+
+    #[test]
+    fn all_files_of_a_scene_format_have_one_description() {
+        let zip = |name: &str| {
+            [
+                b"PK\x03\x04".as_slice(),
+                &vec![b'x'; 99_999],
+                name.as_bytes(),
+            ]
+            .concat()
+        };
+        let embedded = format!(
+            "{{\"buffers\":[{{\"uri\":\"data:{}\"}}],\"asset\":{{\"version\":\"2.0\"}}}}",
+            "A".repeat(9999)
+        );
+        for (wanted, files) in [
+            (
+                "a glTF scene",
+                vec![
+                    b"glTF\x02\0\0\0".to_vec(),
+                    b" {\n \"asset\": {\"version\": \"2.0\"}, \"meshes\": []}".to_vec(),
+                    embedded.into_bytes(),
+                ],
+            ),
+            (
+                "an OFF mesh",
+                [
+                    "OFF\n3 1 0\n",
+                    "OFF\r\n3 1 0",
+                    "OFF 3 1 0\n",
+                    "# a scan\n\nOFF\n",
+                    "COFF\n3 1 0\n",
+                    "STCNOFF\n",
+                    "OFF BINARY\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+            ("a 3MF model", vec![zip("3D/3dmodel.model")]),
+            ("a ZIP archive", vec![zip("xl/workbook.xml")]),
+            (
+                "a COLLADA scene",
+                vec![b"<?xml version=\"1.0\"?>\n<COLLADA xmlns=\"\">".to_vec()],
+            ),
+            (
+                "text",
+                [
+                    "OFFICE\n",
+                    "off we go",
+                    "{\"images\": []}",
+                    "# OFF\n1 2 3\n",
+                ]
+                .map(|text| text.as_bytes().to_vec())
+                .to_vec(),
+            ),
+        ] {
+            for file in files {
+                let said = FileKind::of(&file).to_string();
+                assert_eq!(
+                    said,
+                    wanted,
+                    "{}",
+                    String::from_utf8_lossy(&file[..20.min(file.len())])
+                );
+            }
+        }
     }
 }

@@ -24,6 +24,7 @@ mod metric;
 mod outcome;
 mod pair_name;
 mod print_outline;
+mod retire_cause;
 mod review_order;
 mod sanitize;
 mod seeded_random;
@@ -64,8 +65,9 @@ pub use outcome::{
     NormalizeOutcome, PoseFeatures, RegisterOutcome, ReliefHeights, ScanRegion, Scores,
     SideEvidence, ThresholdChoice,
 };
-pub use pair_name::{PairName, PairNameError};
+pub use pair_name::{NO_BREAK_SPACES, PairName, PairNameError};
 pub use print_outline::PrintOutline;
+pub use retire_cause::RetireCause;
 pub use review_order::ReviewOrder;
 pub use sanitize::{is_hidden, one_line, sanitize, visible, visible_json};
 pub use seeded_random::SeededRandom;

@@ -2,6 +2,8 @@
 //!
 //! Outcomes are stored as JSON with exact numbers, so that a resumed run computes the same results.
 
+use std::num::NonZeroU64;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Affine2, LengthUnit, PrintOutline, Rigid3, ThresholdMetric};
@@ -89,6 +91,9 @@ pub struct FitOutcome {
     pub vertices: u64,
     /// Number of triangles in the file; 0 for a point set.
     pub triangles: u64,
+    /// Number of vertices of the file that were left out because they have no position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing_vertices: Option<NonZeroU64>,
 }
 
 /// Conversion of levels and pixels of a depth map to mesh units.

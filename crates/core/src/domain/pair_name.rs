@@ -18,9 +18,12 @@ const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 /// Devices with a number from 0 to 9.
 const NUMBERED_DEVICES: [&str; 2] = ["com", "lpt"];
 
+/// Spaces that text programs write and nobody sees.
+pub const NO_BREAK_SPACES: [char; 3] = ['\u{a0}', '\u{2007}', '\u{202f}'];
+
 /// The user's id of a pair: any text of 1 to 200 bytes without control characters, invisible characters, slashes, a
-/// leading dot, and spaces at its ends. It is stored in Unicode's composed form (NFC), so the same id typed on macOS
-/// and on Windows is equal.
+/// leading dot, and spaces at its ends. It is stored in Unicode's composed form (NFC) and with plain spaces, so the same
+/// id typed on macOS and on Windows is equal.
 ///
 /// ```
 /// use mocban_core::domain::PairName;
@@ -82,7 +85,10 @@ impl PairName {
         if text.trim() != text {
             return Err(PairNameError::OuterSpace(text.to_owned()));
         }
-        let name = Self(text.nfc().collect());
+        let plain = text
+            .nfc()
+            .map(|c| if NO_BREAK_SPACES.contains(&c) { ' ' } else { c });
+        let name = Self(plain.collect());
         let longest = name.0.len().max(name.file_name().len());
         if longest > Self::MAX_BYTES {
             return Err(PairNameError::TooLong(longest));
@@ -224,6 +230,7 @@ mod tests {
         let [composed, decomposed] = ["chữ", "chu\u{31b}\u{303}"];
         assert_ne!(composed, decomposed);
         assert_eq!(PairName::new(composed), PairName::new(decomposed));
+        assert_eq!(PairName::new("tờ\u{a0}3"), PairName::new("tờ 3"));
     }
 
     #[test]

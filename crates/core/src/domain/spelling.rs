@@ -43,7 +43,7 @@ pub fn without_leading_zeros(text: &str) -> String {
 /// Returns up to `limit` of the known names that are similar to a mistyped name, most similar first.
 ///
 /// Two names are similar if they have the same [`plain_form`], if one starts with the other, or if their edit distance is 1
-/// or at most a third of the longer name's length.
+/// or at most a third of the longer name's length. Different names of one character are not.
 pub fn nearest<'a>(
     typed: &str,
     known: impl IntoIterator<Item = &'a str>,
@@ -79,12 +79,18 @@ fn distance_if_similar(typed: &str, name: &str) -> Option<usize> {
     let allowed = (longer / 3).max(1);
     let edits = strsim::osa_distance(typed, name);
     let is_prefix = !typed.is_empty() && (name.starts_with(typed) || typed.starts_with(name));
-    (edits <= allowed || is_prefix).then_some(edits)
+    (edits <= allowed && edits < longer || is_prefix).then_some(edits)
 }
 
 #[cfg(test)]
 mod tests {
     use super::{hint, nearest, plain_form};
+
+    #[test]
+    fn another_letter_alone_is_not_suggested() {
+        assert_eq!(hint("z", ["a", "b"]), "");
+        assert_eq!(nearest("ab", ["az", "zz"], 2), ["az"]);
+    }
 
     #[test]
     fn accents_case_and_leading_zeros_make_no_difference() {

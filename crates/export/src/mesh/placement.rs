@@ -163,6 +163,7 @@ pub(super) mod tests {
             print_outline: None,
             vertices: 0,
             triangles: 0,
+            missing_vertices: None,
         }
     }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 
+use crate::columns::{KnownColumns, plain_name};
 use mocban_core::domain::{ContentHash, LengthUnit, PairName};
 
 /// One pair of a list. Paths are stored as written; a relative path is relative to the list.
@@ -35,10 +36,74 @@ pub(super) const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
 /// The other columns with a meaning.
 pub(super) const OPTIONAL: [&str; 4] = ["character", "block", "unit", "scanned_face_down"];
 
-/// Returns the column with a meaning of this name, ignoring case.
-pub(super) fn known_column(name: &str) -> Option<&'static str> {
-    let mut columns = REQUIRED.into_iter().chain(OPTIONAL);
-    columns.find(|known| known.eq_ignore_ascii_case(name))
+/// All columns with a meaning, and their Vietnamese names.
+pub(super) const COLUMNS: KnownColumns = KnownColumns {
+    names: &[
+        "id",
+        "mesh",
+        "print",
+        "character",
+        "block",
+        "unit",
+        "scanned_face_down",
+    ],
+    other_names: &[
+        ("ma_so", "id"),
+        ("so_hieu", "id"),
+        ("ky_hieu", "id"),
+        ("ma_chu", "id"),
+        ("so_hieu_chu", "id"),
+        ("ma", "id"),
+        ("ban_quet", "mesh"),
+        ("ban_quet_3d", "mesh"),
+        ("tep_quet", "mesh"),
+        ("mo_hinh_3d", "mesh"),
+        ("luoi", "mesh"),
+        ("ban_in", "print"),
+        ("anh_ban_in", "print"),
+        ("anh_in", "print"),
+        ("tep_anh", "print"),
+        ("chu", "character"),
+        ("mat_chu", "character"),
+        ("chu_nom", "character"),
+        ("chu_han", "character"),
+        ("ky_tu", "character"),
+        ("ki_tu", "character"),
+        ("ten_chu", "character"),
+        ("so_hieu_van", "block"),
+        ("ma_van", "block"),
+        ("so_hieu_khoi", "block"),
+        ("van", "block"),
+        ("van_khac", "block"),
+        ("khoi", "block"),
+        ("moc_ban", "block"),
+        ("don_vi", "unit"),
+        ("don_vi_do", "unit"),
+        ("quet_up", "scanned_face_down"),
+        ("quet_up_mat", "scanned_face_down"),
+    ],
+};
+
+/// Returns whether the values of a column in a list of pairs, of blocks or of verdicts are names of things or of files, so
+/// that none is a date.
+pub(crate) fn is_text_column(header: &str) -> bool {
+    const OTHERS: [&str; 6] = ["pair", "cap", "ma_cap", "page", "trang", "labels"];
+    let plain = plain_name(header);
+    let others = COLUMNS.other_names.iter();
+    let names = COLUMNS.names.iter().copied();
+    names
+        .chain(OTHERS)
+        .chain(others.map(|(name, _)| *name))
+        .any(|name| name == plain)
+}
+
+/// What was read of a list whose rows were passed on.
+#[derive(Debug, Default)]
+pub struct ReadRows {
+    /// The ids of the rows.
+    pub ids: RowIds,
+    /// Columns that were read under other names, as written, each with its name.
+    pub renamed: BTreeMap<String, &'static str>,
 }
 
 /// Why ids that differ only in case are refused.

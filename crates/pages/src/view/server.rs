@@ -13,6 +13,7 @@ use tokio::net::TcpListener;
 
 use super::page;
 use crate::local_server::{AccessControl, ConnectionLimits, WorkThread, listen, serve};
+use crate::review::Language;
 use mocban_core::domain::Explained;
 use mocban_export::scan_view::{ScanView, assets};
 
@@ -49,10 +50,12 @@ pub struct ViewServer {
 #[derive(Debug)]
 struct ShownScan {
     pair: String,
+    language: Option<Language>,
     data: Bytes,
 }
 
-/// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free.
+/// Binds the address for the view of a pair. Port 0 chooses the same port for equal names of pairs, if it is free. Without a
+/// language, the browser decides.
 ///
 /// # Errors
 /// Returns an error if the address cannot be bound or the system provides no randomness.
@@ -60,9 +63,11 @@ pub async fn bind(
     address: SocketAddr,
     pair: &str,
     view: &ScanView,
+    language: Option<Language>,
 ) -> Result<ViewServer, ViewError> {
     let shown = ShownScan {
         pair: pair.to_owned(),
+        language,
         data: view.to_bytes().into(),
     };
     let pages = Router::new()
@@ -108,7 +113,7 @@ impl ViewServer {
 }
 
 async fn index(State(shown): State<Arc<ShownScan>>) -> Html<String> {
-    Html(page::view(&shown.pair))
+    Html(page::view(&shown.pair, shown.language))
 }
 
 async fn asset(Path(name): Path<String>) -> Response {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::inputs::as_failure;
 use super::progress::{AfterStage, BlockEnd, BlockInProgress, ComputedBlockStage};
 use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput};
-use crate::compute_thread::run_blocking;
+use crate::blocking::run_blocking;
 use crate::error::RunError;
 use crate::events::RunEvent;
 use crate::folder_check::check_folders;
@@ -166,7 +166,7 @@ pub(crate) async fn store_failure(
         class: failure.class,
         is_transient,
         attempt: block.lease.attempt(),
-        exclusive: true,
+        ran_alone: true,
     };
     let action = policy::failure_action(attempt, now);
     let settings = context.blocks.settings(stage);

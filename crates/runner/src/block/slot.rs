@@ -7,7 +7,7 @@ use tokio::task::JoinSet;
 use super::memory::{BLOCK_BYTES, EstimatedBlock, map_bytes};
 use super::progress::BlockEnd;
 use super::task::{BlockReport, process_block};
-use crate::compute_thread::task_result;
+use crate::blocking::task_result;
 use crate::error::RunError;
 use crate::input_reads::{ReadLimits, read_each};
 use crate::options::RunOptions;

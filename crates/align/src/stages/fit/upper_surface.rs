@@ -114,5 +114,6 @@ fn outcome(fine: &FittedSide, side: SideEvidence, mesh: &Mesh) -> FitOutcome {
         print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
+        missing_vertices: None,
     }
 }

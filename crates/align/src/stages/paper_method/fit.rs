@@ -64,6 +64,7 @@ pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitErro
         print_outline: None,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
+        missing_vertices: None,
     })
 }
 

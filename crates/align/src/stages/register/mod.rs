@@ -10,6 +10,7 @@ mod confidence;
 mod half_canvas;
 mod ink_edge;
 mod metric_thresholds;
+mod observation;
 mod params;
 mod pose_search;
 mod refine;
@@ -20,6 +21,7 @@ mod tops_edge;
 mod unmatched;
 
 pub use confidence::ConfidenceInputs;
+pub use observation::Observation;
 pub use params::{RegisterError, RegisterParams};
 pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
@@ -97,15 +99,17 @@ pub fn register(
     let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
     let print = &normalized.prints[search.ink];
     let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
-    require_match(&refined.features, params)?;
     let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
-    let canvas = HalfCanvas::new(
-        depth,
-        print,
-        &canvas_from_print,
-        &refined.print_from_depth,
-        normalized.outcome.canvas_px,
-    );
+    let canvas = || {
+        let (pose, side) = (&refined.print_from_depth, normalized.outcome.canvas_px);
+        HalfCanvas::new(depth, print, &canvas_from_print, pose, side)
+    };
+    let observe = |canvas: &HalfCanvas| {
+        let halves = || Observation::of_halves(canvas, relief.level_at(&depth.scale, 0.5));
+        Observation::of_scan(depth, &relief).or(halves)
+    };
+    require_match(&refined.features, params).map_err(|error| error.with(|| observe(&canvas())))?;
+    let canvas = canvas();
     let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
     require_tops(
         depth,
@@ -115,7 +119,7 @@ pub fn register(
         params,
     )?;
     let features = with_unmatched(refined.features, &canvas, &thresholds);
-    require_character(&features, params)?;
+    require_character(&features, params).map_err(|error| error.with(|| observe(&canvas)))?;
     let alignments: Vec<Alignment> = thresholds
         .iter()
         .map(|ChosenThreshold { choice, .. }| Alignment {
@@ -162,7 +166,11 @@ fn require_character(
         });
     }
     if pose * character < UNLIKELY * params.min_confidence {
-        return Err(RegisterError::OtherCharacter { pose, character });
+        return Err(RegisterError::OtherCharacter {
+            pose,
+            character,
+            seen: Observation::Nothing,
+        });
     }
     Ok(())
 }
@@ -223,6 +231,7 @@ fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(),
         Err(RegisterError::NoMatch {
             confidence,
             needs: params.min_confidence,
+            seen: Observation::Nothing,
         })
     }
 }

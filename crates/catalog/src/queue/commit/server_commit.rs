@@ -10,9 +10,10 @@ use crate::queue::claim::ClaimRequest;
 use crate::queue::commit::group_commit::{Batch, BatchReply};
 use crate::queue::commit::known_leases::stored_before;
 use crate::queue::commit::write_connection::CatalogServerState;
-use crate::queue::counters::{self, DONE, cursor};
+use crate::queue::counters::{self, cursor};
 use crate::queue::lease::{Lease, was_written_long_ago};
 use crate::queue::{server_checkpoint, server_claim};
+use mocban_core::domain::JobStatus;
 
 /// Commits a batch of [`Batch::split_for_server`]. An earlier commit of the same batch may have been stored although its
 /// reply was lost.
@@ -108,7 +109,7 @@ async fn store(
         .map(|(lease, _)| is_kept(lease))
         .collect();
     for ((lease, stages), kept) in checkpoints.iter().zip(&kept) {
-        let is_done = position_after(stages).is_some_and(|(cursor, _)| cursor == DONE);
+        let is_done = position_after(stages).is_some_and(|(_, status)| status == JobStatus::Done);
         if is_done || !kept {
             state.leases.remove(lease);
         }

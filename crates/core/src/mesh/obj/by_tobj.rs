@@ -12,7 +12,7 @@ use tobj::LoadError;
 
 use super::plain::OddLine;
 use crate::domain::cancel::{PolledReader, polled};
-use crate::mesh::error::{self, MeshError, MeshLimits};
+use crate::mesh::error::{MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 
@@ -22,7 +22,7 @@ const MAX_BYTES: usize = 128 << 20;
 /// Reads a file whose first unusual line is `odd`.
 ///
 /// # Errors
-/// Returns an error if the file exceeds the limits, `tobj` refuses it, or a used coordinate is not finite.
+/// Returns an error if the file exceeds the limits or `tobj` refuses it.
 pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Mesh, MeshError> {
     if bytes.len() > MAX_BYTES {
         let reason =
@@ -55,7 +55,6 @@ pub(super) fn read(bytes: &[u8], odd: OddLine, limits: &MeshLimits) -> Result<Me
         .next()
         .expect("`tobj` adds a model at the end");
     let positions = model.mesh.positions.as_chunks().0;
-    error::check_all_finite(positions, 0)?;
     let corners = model.mesh.indices.as_chunks().0;
     Ok(Mesh {
         vertices: Vertices::Double(polled(positions).copied().collect()),
@@ -82,6 +81,11 @@ fn geometry_lines(bytes: &[u8], limits: &MeshLimits) -> Result<(String, u64, u64
             }
         }
         let mut words: Vec<&str> = joined.split_whitespace().collect();
+        for word in &mut words {
+            if text::number(word.as_bytes()).is_some_and(f64::is_nan) {
+                *word = "NaN";
+            }
+        }
         let is_index = |corner: &&str| corner.parse::<i64>().is_ok();
         match words.as_slice() {
             ["f", corners @ ..] if corners.len() < 3 && corners.iter().all(is_index) => {
@@ -107,9 +111,14 @@ fn geometry_lines(bytes: &[u8], limits: &MeshLimits) -> Result<(String, u64, u64
     Ok((out, vertices, triangles))
 }
 
-/// Returns a line up to its comment.
+/// Returns a line up to its comment. The `#` of `1.#IND` begins none.
 fn without_comment(line: &str) -> &str {
-    line.split('#').next().unwrap_or_default().trim_ascii_end()
+    let is_comment = |at: &usize| !text::is_indefinite(&line.as_bytes()[at.saturating_sub(2)..]);
+    let mut marks = line.match_indices('#').map(|(at, _)| at);
+    marks
+        .find(is_comment)
+        .map_or(line, |at| &line[..at])
+        .trim_ascii_end()
 }
 
 /// Says why `tobj` refused a file. `line` is the last that it read, counted from 1.

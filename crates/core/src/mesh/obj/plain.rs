@@ -1,21 +1,12 @@
 //! Single-pass reader of OBJ files with usual lines only.
 
 use crate::domain::cancel::{PollCounter, polled};
-use crate::mesh::error::{self, MeshError, MeshLimits};
+use crate::mesh::decimal;
+use crate::mesh::error::{MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 
-/// Digits that fit a 64-bit mantissa without overflow.
-const MAX_DIGITS: usize = 19;
-/// Mantissas below this are exact as a 64-bit float.
-const EXACT_BELOW: u64 = 1 << 53;
-/// Powers of ten that 64-bit floats represent exactly. The quotient of an exact mantissa and an exact power is rounded
-/// only once, so it is the float nearest to the decimal number (Clinger 1990, doi:10.1145/93542.93557).
-const POWERS_OF_TEN: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
-    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
-];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
 /// Estimates of the bytes that a file needs per vertex and per triangle. They are high, so that too little memory is
@@ -34,8 +25,8 @@ pub(super) struct OddLine(pub(super) u64);
 /// - `f` with corners: an integer, which up to two more and slashes may follow
 ///
 /// # Errors
-/// Returns the first other line. The inner error says that the file exceeds the limits, that a face refers to a missing
-/// vertex, or that a used coordinate is not finite.
+/// Returns the first other line. The inner error says that the file exceeds the limits, or that a face refers to a missing
+/// vertex.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, MeshError>, OddLine> {
     if text::is_classic_mac(bytes) {
         return Err(OddLine(1));
@@ -45,7 +36,6 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Result<Mesh, Mes
         line: 1,
         vertices: PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX),
         triangles: PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
-        is_finite: true,
         last_used: (0, 1),
     };
     let mut counter = PollCounter::default();
@@ -66,8 +56,6 @@ struct PlainReader<'a> {
     vertices: PageVec<[f64; 3]>,
     /// Indices of vertices, from 0; they may lie beyond the last vertex.
     triangles: PageVec<[u32; 3]>,
-    /// Whether every coordinate is finite.
-    is_finite: bool,
     /// The highest index in a face, and the first line with it.
     last_used: (u32, u64),
 }
@@ -84,9 +72,6 @@ impl PlainReader<'_> {
                 return Err(MeshError::Line { line, reason });
             }
             self.vertices = in_order_of_use(&self.vertices, &mut self.triangles);
-        }
-        if !self.is_finite {
-            error::check_all_finite(&self.vertices, 0)?;
         }
         Ok(Mesh {
             vertices: Vertices::Double(self.vertices),
@@ -107,13 +92,12 @@ impl PlainReader<'_> {
                 self.rest = rest;
                 self.face(limits)?;
             }
-            [b'#' | b'\n', ..] => {}
             rest => {
                 let len = rest.iter().position(u8::is_ascii_whitespace);
                 let keyword = &rest[..len.unwrap_or(rest.len())];
                 if !matches!(
                     keyword,
-                    b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib" | b""
+                    [] | [b'#', ..] | b"vn" | b"vt" | b"g" | b"o" | b"s" | b"usemtl" | b"mtllib"
                 ) {
                     return None;
                 }
@@ -167,46 +151,22 @@ impl PlainReader<'_> {
 
     /// Parses a number up to the end of its word.
     fn number(&mut self) -> Option<f64> {
-        let word = self.rest;
-        let negative = word.first() == Some(&b'-');
-        self.rest = &word[usize::from(negative)..];
-        let mut mantissa = 0;
-        let whole = self.digits(&mut mantissa);
-        let mut places = 0;
-        if let [b'.', rest @ ..] = self.rest {
+        if let Some((value, rest)) = decimal::parse(self.rest)
+            && rest.first().is_none_or(u8::is_ascii_whitespace)
+        {
             self.rest = rest;
-            places = self.digits(&mut mantissa);
+            return Some(value);
         }
-        let is_exact = (1..=MAX_DIGITS).contains(&(whole + places)) && mantissa < EXACT_BELOW;
-        if is_exact && self.is_at_end_of_word() {
-            let value = mantissa as f64 / POWERS_OF_TEN[places];
-            return Some(if negative { -value } else { value });
-        }
-        let len = word.iter().position(|byte| is_end_of_word(*byte));
-        let (word, rest) = word.split_at(len.unwrap_or(word.len()));
+        // A comment may follow at once, but `1.#IND` has none.
+        let number_before = |is_end: fn(&u8) -> bool| {
+            let len = self.rest.iter().position(is_end).unwrap_or(self.rest.len());
+            let (word, rest) = self.rest.split_at(len);
+            text::number(word).map(|number| (number, rest))
+        };
+        let found = number_before(u8::is_ascii_whitespace);
+        let (value, rest) = found.or_else(|| number_before(|byte| is_end_of_word(*byte)))?;
         self.rest = rest;
-        let value: f64 = text::parse(word)?;
-        self.is_finite &= value.is_finite();
         Some(value)
-    }
-
-    /// Reads decimal digits, appends them to `number` and returns their count. On overflow, `number` wraps around.
-    #[inline]
-    fn digits(&mut self, number: &mut u64) -> usize {
-        let mut count = 0;
-        for digit in self.rest.iter().map(|byte| byte.wrapping_sub(b'0')) {
-            if digit > 9 {
-                break;
-            }
-            *number = number.wrapping_mul(10).wrapping_add(u64::from(digit));
-            count += 1;
-        }
-        self.rest = &self.rest[count..];
-        count
-    }
-
-    fn is_at_end_of_word(&self) -> bool {
-        self.rest.first().is_none_or(|byte| is_end_of_word(*byte))
     }
 
     /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner. Polygons of
@@ -253,20 +213,24 @@ impl PlainReader<'_> {
             index - 1
         };
         let place = u32::try_from(place).unwrap_or(u32::MAX);
-        self.is_at_end_of_word().then_some(place)
+        self.rest
+            .first()
+            .is_none_or(|byte| is_end_of_word(*byte))
+            .then_some(place)
     }
 
     /// Parses an integer.
     fn index(&mut self) -> Option<i64> {
         let word = self.rest;
         let sign = usize::from(matches!(word.first(), Some(b'-' | b'+')));
-        self.rest = &word[sign..];
         let mut index = 0;
-        match self.digits(&mut index) {
+        let digits = decimal::read_digits(&word[sign..], &mut index);
+        self.rest = &word[sign + digits..];
+        match digits {
             0 => None,
             1..=MAX_INDEX_DIGITS if word[0] == b'-' => Some(-(index as i64)),
             1..=MAX_INDEX_DIGITS => Some(index as i64),
-            digits => text::parse(&word[..sign + digits]),
+            _ => text::parse(&word[..sign + digits]),
         }
     }
 }

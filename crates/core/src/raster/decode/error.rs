@@ -76,12 +76,5 @@ pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
 }
 
 fn not_an_image(kind: FileKind) -> String {
-    if kind == FileKind::LfsPointer {
-        return format!(
-            "the file is {kind} and does not hold the image; fetch the image with `git lfs pull`"
-        );
-    }
-    let advice = kind.image_advice();
-    let advice = advice.map_or(String::new(), |advice| format!(": {advice}"));
-    format!("the file is {kind}; PNG, JPEG and TIFF images are read{advice}")
+    kind.refusal("image", "PNG, JPEG and TIFF images", kind.image_advice())
 }

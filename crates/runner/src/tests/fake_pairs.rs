@@ -9,8 +9,8 @@ use serde_json::json;
 use super::gate::Gate;
 use super::values;
 use crate::pair_context::PairContext;
-use crate::stage_executor::StageExecutor;
-use crate::stage_output::{ExecutionError, StageOutput};
+use crate::pair_pipeline::PairStages;
+use crate::stage_output::{PairStageError, PairStageOutput};
 use mocban_catalog::InputVersion;
 use mocban_core::domain::cancel::poll;
 use mocban_core::domain::{
@@ -20,7 +20,7 @@ use mocban_store::{NewArtifact, Project, hash_input};
 
 /// Runs fake stages. The part of a pair's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]
-pub(super) struct FakeExecutor {
+pub(super) struct FakePairs {
     /// How often each stage of each pair was computed.
     computed: Mutex<BTreeMap<(String, Stage), usize>>,
     running: AtomicUsize,
@@ -59,7 +59,7 @@ pub(super) fn compute_without_end(endless: &Arc<AtomicUsize>) -> ! {
     }
 }
 
-impl FakeExecutor {
+impl FakePairs {
     /// Returns how often a stage of a pair was computed.
     pub(super) fn count(&self, pair: &str, stage: Stage) -> usize {
         let computed = self.computed.lock().expect("an unpoisoned lock");
@@ -74,18 +74,18 @@ impl FakeExecutor {
         self.gate.open();
     }
 
-    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), ExecutionError> {
+    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), PairStageError> {
         match name.split('_').next().unwrap_or_default() {
             "panics" if stage == Stage::Depth => panic!("made up"),
             "bursts" => panic!("made up"),
             "bad" if stage == Stage::Fit => {
-                Err(ExecutionError::failed(FailureClass::BadInput, "no faces"))
+                Err(PairStageError::failed(FailureClass::BadInput, "no faces"))
             }
-            "flaky" if stage == Stage::Fit && tries == 1 => Err(ExecutionError::Failed {
+            "flaky" if stage == Stage::Fit && tries == 1 => Err(PairStageError::Failed {
                 failure: Failure::new(FailureClass::Io, "the disk is slow"),
                 is_transient: true,
             }),
-            "breaks" if stage == Stage::Depth && tries == 1 => Err(ExecutionError::Failed {
+            "breaks" if stage == Stage::Depth && tries == 1 => Err(PairStageError::Failed {
                 failure: Failure::new(FailureClass::Io, "the disk is slow"),
                 is_transient: true,
             }),
@@ -94,9 +94,16 @@ impl FakeExecutor {
                 Ok(())
             }
             "loses" if stage == Stage::Register && tries == 1 => {
-                Err(ExecutionError::RerunFrom(Stage::Depth))
+                Err(PairStageError::RerunFrom(Stage::Depth))
             }
             "loops" if stage == Stage::Fit => compute_without_end(&self.endless),
+            "outlives" if self.count(name, Stage::Fit) == 1 && stage <= Stage::Depth => {
+                if stage == Stage::Depth {
+                    compute_without_end(&self.endless);
+                }
+                self.gate.wait();
+                Ok(())
+            }
             "lasts" if stage == Stage::Register => {
                 self.gate.wait();
                 Ok(())
@@ -110,8 +117,8 @@ impl FakeExecutor {
     }
 }
 
-impl StageExecutor for FakeExecutor {
-    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+impl PairStages for FakePairs {
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let name = pair.attributes.name.as_str().to_owned();
         let tries = {
             let mut computed = self.computed.lock().expect("an unpoisoned lock");
@@ -145,7 +152,7 @@ impl StageExecutor for FakeExecutor {
             features: None,
         };
         let last = stage == Stage::Register;
-        Ok(StageOutput {
+        Ok(PairStageOutput {
             outcome: if last {
                 json!(register)
             } else {

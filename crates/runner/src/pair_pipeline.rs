@@ -8,7 +8,7 @@ use super::memory_budget::{self, PAIR_BYTES};
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
-use super::stage_output::{self, ExecutionError, StageOutput, png};
+use super::stage_output::{self, PairStageError, PairStageOutput, png};
 use mocban_align::scan_size;
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::{Settings, StageError, depth, pipeline};
@@ -16,13 +16,14 @@ use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
 use mocban_core::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
+use mocban_core::mesh;
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use mocban_store::Project;
 
-/// Runs stages on a pair's thread. In tests, a fake executor has stages that fail or hang.
-pub(super) trait StageExecutor: Send + Sync + 'static {
+/// Runs stages on a pair's thread. In tests, fake stages fail or hang.
+pub(super) trait PairStages: Send + Sync + 'static {
     /// Runs a stage, and leaves in the pair what later stages need.
-    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError>;
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError>;
 
     /// Returns the memory in bytes for the maps and masks of a pair.
     fn map_bytes(&self) -> u64 {
@@ -32,13 +33,13 @@ pub(super) trait StageExecutor: Send + Sync + 'static {
 
 /// Runs the stages of a project with its settings.
 #[derive(Debug)]
-pub(super) struct PipelineExecutor {
+pub(super) struct PairPipeline {
     inputs: StageInputs,
     settings: Settings,
 }
 
-impl StageExecutor for PipelineExecutor {
-    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+impl PairStages for PairPipeline {
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         match stage {
             Stage::Fit => self.fit(pair),
             Stage::Depth => self.depth(pair),
@@ -52,8 +53,8 @@ impl StageExecutor for PipelineExecutor {
     }
 }
 
-impl PipelineExecutor {
-    /// An executor for the stages of one run.
+impl PairPipeline {
+    /// Creates a pipeline with the settings and limits of a run.
     pub(super) fn new(project: &Project, settings: &Settings, options: &RunOptions) -> Self {
         Self {
             inputs: StageInputs::new(project, options),
@@ -61,12 +62,16 @@ impl PipelineExecutor {
         }
     }
 
-    fn fit(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+    fn fit(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let scan = self.inputs.read_scan(pair)?;
+        if scan.missing() > 0 {
+            let said = mesh::missing_sentence(scan.missing());
+            tracing::warn!(pair = %pair.attributes.name, "{}: {said}", pair.attributes.mesh_path);
+        }
         let length = scan_size::length_of(&scan.mesh().vertices);
         if let Some(reason) = scan_size::wrong_unit(length, pair.attributes.unit) {
             let text = format!("{}: {reason}", pair.attributes.mesh_path);
-            return Err(ExecutionError::failed(FailureClass::BadInput, text));
+            return Err(PairStageError::failed(FailureClass::BadInput, text));
         }
         // A fit that does not read the print stays valid when the print changes.
         let print = if self.settings.fit_reads_print() {
@@ -80,19 +85,19 @@ impl PipelineExecutor {
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
-        Ok(StageOutput::numbers(json))
+        Ok(PairStageOutput::numbers(json))
     }
 
-    fn depth(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+    fn depth(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let fit = StageInputs::fit(pair)?;
         // This function drops the scan, because no later stage needs it. Another pair can then use the memory.
         let scan = self.inputs.fitted_scan(pair)?;
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
             .map_err(|error| in_file(pair, &error.into(), 0.0))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
-        let output = StageOutput {
+        let output = PairStageOutput {
             files: vec![png(DEPTH, png_grey16(&map.levels))],
-            ..StageOutput::numbers(json)
+            ..PairStageOutput::numbers(json)
         };
         pair.depth = Some(DepthMap {
             scale: outcome.scale,
@@ -101,7 +106,7 @@ impl PipelineExecutor {
         Ok(output)
     }
 
-    fn normalize(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+    fn normalize(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let depth = self.inputs.depth_map(pair)?;
         let fit = StageInputs::fit(pair)?;
         let print = self.inputs.print(pair)?.within(fit.print_outline.as_ref());
@@ -111,11 +116,11 @@ impl PipelineExecutor {
         let (outcome, json) = round_trip(&normalized.outcome)?;
         let masks: Vec<_> = normalized.prints.iter().map(PrintMasks::to_grey).collect();
         let files = masks.iter().enumerate();
-        let output = StageOutput {
+        let output = PairStageOutput {
             files: files
                 .map(|(ink, grey)| png(&print_mask(ink), png_grey8(grey)))
                 .collect(),
-            ..StageOutput::numbers(json)
+            ..PairStageOutput::numbers(json)
         };
         pair.normalized = Some(Normalized {
             outcome,
@@ -124,7 +129,7 @@ impl PipelineExecutor {
         Ok(output)
     }
 
-    fn register(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
+    fn register(&self, pair: &mut PairContext) -> Result<PairStageOutput, PairStageError> {
         let depth = self.inputs.depth_map(pair)?;
         let normalized = self.inputs.normalized(pair)?;
         let expected = expected_pose(pair, &depth)?;
@@ -144,7 +149,7 @@ impl PipelineExecutor {
             files.push(png(&stroke_map(metric.metric), image.clone()));
             encoded.push(image);
         }
-        Ok(StageOutput {
+        Ok(PairStageOutput {
             outcome: json,
             files,
             metrics: outcome.metrics,
@@ -153,7 +158,7 @@ impl PipelineExecutor {
 }
 
 /// Returns the pose that the registration of the block expects; `None` for a pair that was not cut from one.
-fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>, ExecutionError> {
+fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>, PairStageError> {
     let Some(prior) = &pair.attributes.prior else {
         return Ok(None);
     };
@@ -163,7 +168,7 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
             "the expected alignment of {}: {error}",
             pair.attributes.name
         );
-        ExecutionError::failed(FailureClass::Bug, text)
+        PairStageError::failed(FailureClass::Bug, text)
     })?;
     let scale = &depth.scale.depth_from_plane;
     Ok(prior
@@ -173,14 +178,14 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
 
 /// Returns the failure of a stage on the likelier of the two files. `length` is that of the scan in its unit, or 0 if it
 /// does not matter.
-fn in_file(pair: &PairContext, error: &StageError, length: f64) -> ExecutionError {
+fn in_file(pair: &PairContext, error: &StageError, length: f64) -> PairStageError {
     let path = if error.is_of_print() {
         &pair.attributes.print_path
     } else {
         &pair.attributes.mesh_path
     };
     let advice = scan_size::advice_for(error, length, pair.attributes.unit);
-    ExecutionError::failed(error.class(), format!("{path}: {error}{advice}"))
+    PairStageError::failed(error.class(), format!("{path}: {error}{advice}"))
 }
 
 /// Encodes an outcome as JSON. Returns the outcome as a later run would decode it, and the JSON.
@@ -189,12 +194,12 @@ fn in_file(pair: &PairContext, error: &StageError, length: f64) -> ExecutionErro
 /// Returns an error if a number is not finite, because JSON cannot hold it.
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq>(
     outcome: &T,
-) -> Result<(T, Value), ExecutionError> {
+) -> Result<(T, Value), PairStageError> {
     let json = serde_json::to_value(outcome);
     let read = json.and_then(|json| Ok((serde_json::from_str::<T>(&json.to_string())?, json)));
     match read {
         Ok((read, json)) if read == *outcome => Ok((read, json)),
-        Ok(_) | Err(_) => Err(ExecutionError::failed(
+        Ok(_) | Err(_) => Err(PairStageError::failed(
             FailureClass::Bug,
             "the stage returned a number that is not finite",
         )),
