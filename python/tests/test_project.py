@@ -110,6 +110,14 @@ def test_rows_are_imported_and_run_with_progress(pairs: list[DemoPair], tmp_path
     project = mocban.Project.create(folder)
     assert project.import_pairs(rows)["added"] == 3
     assert project.import_pairs(iter(rows))["unchanged"] == 3
+    fewer = project.import_pairs(rows[:2], replace=True)
+    assert fewer["retired"] == 1 and project.status()["pairs"] == 2
+    assert project.import_pairs(rows)["restored"] == 1
+    moved = [row | {"mesh": p.mesh, "print": p.print} for row, p in zip(rows, pairs[1:4])]
+    with pytest.raises(mocban.ProjectError, match="allow_changed_files|--allow-changed-files"):
+        project.import_pairs(moved)
+    assert len(project.import_pairs(moved, allow_changed_files=True)["changed"]) == 3
+    project.import_pairs(rows, allow_changed_files=True)
     pandas = pytest.importorskip("pyarrow").Table.from_pylist([{"id": 7, "mesh": "no.stl", "print": "no.png"}])
     with pytest.raises(mocban.ProjectError, match="no.stl"):
         project.import_pairs(pandas)
