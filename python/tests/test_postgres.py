@@ -46,7 +46,7 @@ def address() -> Iterator[str]:
 def test_a_project_on_a_server(address: str, pairs: list[DemoPair], tmp_path: Path) -> None:
     folder = tmp_path / "project"
     folder.mkdir()
-    with pytest.raises(mocban.ProjectError, match="there is no catalog"):
+    with pytest.raises(mocban.NotAProject, match="there is no catalog"):
         mocban.open(address, folder=folder)
     project = mocban.Project.create(folder, address)
     rows = [{"id": pair.id, "mesh": pair.mesh, "print": pair.print, "unit": pair.unit} for pair in pairs[:2]]
