@@ -15,6 +15,7 @@ import os
 
 from . import _native
 from ._alignment import Alignment, MetricResult, Refusal, align
+from ._blocks import BlockAlignment, BlockCharacter, align_block
 from ._errors import (
     Cancelled,
     Error,
@@ -40,6 +41,8 @@ from ._stages import DepthMap, Surface, depth_map, fit_surface, print_mask
 
 __all__ = [
     "Alignment",
+    "BlockAlignment",
+    "BlockCharacter",
     "Cancelled",
     "DepthMap",
     "Error",
@@ -65,6 +68,7 @@ __all__ = [
     "Surface",
     "UnitError",
     "align",
+    "align_block",
     "align_many",
     "depth_map",
     "fit_surface",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _native as _rust
 from ._alignment import METRICS, Alignment
+from ._blocks import BlockAlignment
 from ._errors import Cancelled, Error, ReadOnlyProject
 from ._frozen import Frozen
 from ._inputs import Print, read_print
@@ -225,6 +226,19 @@ class Project:
         """
         return Pair(self, json.loads(self._native.pair(id)))
 
+    def block(self, id: str) -> BlockAlignment:
+        """Return a block by its id.
+
+        Raises
+        ------
+        ProjectError
+            If there is no such block.
+        """
+        return BlockAlignment(self._block(id), self)
+
+    def _block(self, id: str) -> dict[str, Any]:
+        return json.loads(self._native.block(id))
+
     def verdicts(self) -> list[dict[str, Any]]:
         """Return the log of verdicts, oldest first."""
         return json.loads(self._native.verdicts())
@@ -307,6 +321,38 @@ class Project:
         for warning in outcome.pop("warnings"):
             _warn(warning)
         return outcome
+
+    def import_block(
+        self,
+        mesh: str | os.PathLike[str],
+        page: str | os.PathLike[str],
+        *,
+        labels: str | os.PathLike[str] | None = None,
+        id: str | None = None,
+        unit: str | None = None,
+        side: str | None = None,
+    ) -> dict[str, Any]:
+        """Import a whole block with its page, as ``mocban import --block`` does.
+
+        Parameters
+        ----------
+        mesh, page : path-like
+            The scan of the block, and the image of its page.
+        labels : path-like, optional
+            Boxes of the characters; found by `run` by default.
+        id : str, optional
+            The file name of the mesh without extension by default.
+        unit : {"mm", "cm", "m", "in"}, optional
+        side : {"front", "back"}, optional
+            The side of the block that the page shows; found by `run` by default.
+
+        Returns
+        -------
+        dict
+            Numbers ``added`` and ``unchanged``, and ids ``changed``.
+        """
+        boxes = None if labels is None else os.fspath(labels)
+        return json.loads(self._writable().import_block(os.fspath(mesh), os.fspath(page), boxes, id, unit, side))
 
     def run(
         self,

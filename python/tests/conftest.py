@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 import shutil
 import subprocess
@@ -66,3 +67,27 @@ def pairs(demo: Path) -> list[DemoPair]:
 def pair(pairs: list[DemoPair]) -> DemoPair:
     """A pair of an STL file and an 8-bit PNG file."""
     return next(p for p in pairs if p.mesh.suffix == ".stl" and p.print.suffix == ".png")
+
+
+@pytest.fixture(scope="session")
+def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with ``block.ply``, ``page.jpg``, and ``labels.json`` with four of its boxes."""
+    folder = tmp_path_factory.mktemp("block")
+    mocban_command("demo", folder / "demo", "--block=half-page", "--spacing", 0.4, "--no-run")
+    data = folder / "demo" / "data"
+    via = json.loads((data / "labels.json").read_text(encoding="utf-8"))
+    (page,) = via["_via_img_metadata"].values()
+    boxes = [region["shape_attributes"] | region["region_attributes"] for region in page["regions"][:4]]
+    rows = [
+        {
+            "x_min": box["x"],
+            "y_min": box["y"],
+            "x_max": box["x"] + box["width"],
+            "y_max": box["y"] + box["height"],
+            "id": box["name"],
+            "character": box["character"],
+        }
+        for box in boxes
+    ]
+    (data / "labels.json").write_text(json.dumps(rows), encoding="utf-8")
+    return data

@@ -40,7 +40,9 @@ def run(folder: Path, script: str, *arguments: str) -> str:
     return done.stdout
 
 
-def test_doc_examples_run(folder: Path) -> None:
+def test_doc_examples_run(folder: Path, block: Path) -> None:
+    for file in block.iterdir():
+        shutil.copy(file, folder)
     names = [module.name for module in pkgutil.iter_modules(mocban.__path__) if module.name != "_native"]
     modules = [mocban, *(importlib.import_module(f"mocban.{name}") for name in names)]
     results = [doctest.testmod(module) for module in modules]

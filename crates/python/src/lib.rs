@@ -4,7 +4,7 @@
 //! - `failure.rs`: raises the exceptions of `mocban._errors`
 //! - `mesh.rs`, `print.rs`, `settings.rs`: inputs, from arrays and files
 //! - `alignment.rs`: the result of a pair; `state.rs`: the same as bytes; `stages.rs`: single stages
-//! - `project.rs`: a project; `stored_pair.rs`: a pair of it
+//! - `project.rs`: a project; `stored_pair.rs`: a pair of it; `stored_block.rs`: a block of it
 //! - `log.rs`: messages for Python's `logging`
 //!
 //! Classes here hold data and convert arrays of exactly one kind. The Python part checks and converts everything else, and
@@ -28,6 +28,7 @@ mod project;
 mod settings;
 mod stages;
 mod state;
+mod stored_block;
 mod stored_pair;
 
 use pyo3::pymodule;

@@ -10,11 +10,12 @@ use serde_json::{Value, json};
 use crate::alignment::NativeAlignment;
 use crate::compute::{EventSender, compute_with_events};
 use crate::failure::{project_failure, raise};
-use crate::stored_pair;
+use crate::{stored_block, stored_pair};
 use mocban_catalog::{NewVerdict, ReviewContext};
 use mocban_core::domain::ContentHash;
 use mocban_export::{ExportFormat, ExportOptions};
 use mocban_project::events::{Listener, ProjectEvent};
+use mocban_project::import_blocks::ImportedBlock;
 use mocban_project::import_pairs::{AllowedChanges, PairImport, PairSource, import_pairs};
 use mocban_project::location::Location;
 use mocban_project::report::{ReportOptions, report};
@@ -256,6 +257,39 @@ impl NativeProject {
                 "warnings": outcome.warnings,
             });
             Ok(counts.to_string())
+        })
+    }
+
+    /// Imports a block. Returns what changed, in JSON.
+    #[expect(clippy::too_many_arguments, reason = "the files of a block")]
+    fn import_block(
+        &self,
+        py: Python<'_>,
+        mesh: PathBuf,
+        page: PathBuf,
+        labels: Option<PathBuf>,
+        name: Option<String>,
+        unit: Option<&str>,
+        side: Option<&str>,
+    ) -> PyResult<String> {
+        let refuse = |error: ProjectError| project_failure(py, &error, &self.location.dir);
+        let block = ImportedBlock {
+            mesh,
+            page,
+            labels,
+            side: side.map(parsed).transpose().map_err(refuse)?,
+            name,
+            unit: unit.map(parsed).transpose().map_err(refuse)?,
+        };
+        self.simple(py, |location, hearing| async move {
+            stored_block::import(block, &location, &hearing).await
+        })
+    }
+
+    /// Returns everything about a block, and its characters, in JSON.
+    fn block(&self, py: Python<'_>, id: String) -> PyResult<String> {
+        self.simple(py, |location, _| async move {
+            stored_block::detail(&id, &location).await
         })
     }
 
