@@ -200,17 +200,19 @@ pub(crate) fn align_pair(
     };
     let (scan, image, stages) = (
         Arc::clone(&mesh.scan),
-        Arc::clone(&print.print),
+        print.image(),
         Arc::clone(&settings.stages),
     );
     let found = compute(py, move || {
-        align::align_pair(&scan, &image, hints, &stages).map(state::needed)
+        let print = image();
+        let found = align::align_pair(&scan, &print, hints, &stages).map(state::needed);
+        found.map(|pair| (pair, print))
     })?;
     Ok(match found {
-        Ok(pair) => {
+        Ok((pair, print)) => {
             let alignment = NativeAlignment {
                 pair: Arc::new(pair),
-                print: Arc::clone(&print.print),
+                print,
             };
             (Some(alignment), None)
         }

@@ -1,7 +1,7 @@
 //! The image of a print, from an array or a file.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -10,20 +10,43 @@ use crate::compute::compute;
 use crate::failure::{raise, unreadable};
 use crate::settings::NativeSettings;
 use mocban_align::stages::{Print, normalize};
-use mocban_core::raster::{PrintImage, SampleSlice};
+use mocban_core::raster::{PrintSamples, SampleSlice};
 use mocban_project::align;
 
 /// The image of a print and its file.
 #[pyclass(frozen, module = "mocban._native")]
 pub(crate) struct NativePrint {
-    pub(crate) print: Arc<Print>,
+    source: Arc<Mutex<PrintSource>>,
     #[pyo3(get)]
     pub(crate) path: Option<PathBuf>,
 }
 
+/// The samples of an array until the image is needed, so that creating a print only copies them.
+enum PrintSource {
+    Samples(PrintSamples),
+    Image(Arc<Print>),
+}
+
 impl NativePrint {
-    pub(crate) fn image(&self) -> &PrintImage {
-        self.print.image()
+    fn new(source: PrintSource, path: Option<PathBuf>) -> Self {
+        Self {
+            source: Arc::new(Mutex::new(source)),
+            path,
+        }
+    }
+
+    /// Returns a function that returns the image, for use without the GIL.
+    pub(crate) fn image(&self) -> impl FnOnce() -> Arc<Print> + Send + use<> {
+        let source = Arc::clone(&self.source);
+        move || {
+            let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            let print = match &*source {
+                PrintSource::Image(print) => return Arc::clone(print),
+                PrintSource::Samples(samples) => Arc::new(samples.to_image().into()),
+            };
+            *source = PrintSource::Image(Arc::clone(&print));
+            print
+        }
     }
 }
 
@@ -44,47 +67,60 @@ impl NativePrint {
             (None, Some(sixteen)) => SampleSlice::Sixteen(sixteen.as_slice()?),
             (None, None) => SampleSlice::Eight(&[]),
         };
-        let image =
-            PrintImage::from_samples([width, height], channels, samples).ok_or_else(|| {
-                raise(
-                    py,
-                    "ImageError",
-                    "bad_input",
-                    "the image has no pixels",
-                    None,
-                )
-            })?;
-        Ok(Self {
-            print: Arc::new(image.into()),
-            path: None,
-        })
+        let samples = PrintSamples::copied([width, height], channels, samples);
+        let samples = samples.ok_or_else(|| {
+            let text = "the image has no pixels";
+            raise(py, "ImageError", "bad_input", text, None)
+        })?;
+        Ok(Self::new(PrintSource::Samples(samples), None))
     }
 
     /// Returns width and height.
-    fn size(&self) -> (usize, usize) {
-        let rgb = &self.image().rgb;
-        (rgb.width(), rgb.height())
+    fn size(&self, py: Python<'_>) -> (usize, usize) {
+        let source = Arc::clone(&self.source);
+        // Without the GIL, because a thread that holds the lock may wait for it.
+        py.detach(move || {
+            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            match &*source {
+                PrintSource::Samples(samples) => samples.size().into(),
+                PrintSource::Image(print) => {
+                    let rgb = &print.image().rgb;
+                    (rgb.width(), rgb.height())
+                }
+            }
+        })
     }
 
     /// Returns the colours in 8 bits.
-    fn rgb8<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u8>> {
-        PyArray1::from_vec(py, self.image().to_rgb8())
+    fn rgb8<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u8>>> {
+        let image = self.image();
+        let colours = compute(py, move || image().image().to_rgb8())?;
+        Ok(PyArray1::from_vec(py, colours))
     }
 
     /// Returns the colours in 16 bits.
-    fn rgb16<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u16>> {
-        PyArray1::from_slice(py, self.image().rgb.data().as_flattened())
+    fn rgb16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
+        let print = compute(py, self.image())?;
+        let colours = print.image().rgb.data().as_flattened();
+        Ok(PyArray1::from_slice(py, colours))
     }
 
     /// Returns what may be wrong with the colours.
-    fn warnings(&self) -> Vec<String> {
-        self.image().profile_warning().into_iter().collect()
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        let source = Arc::clone(&self.source);
+        py.detach(move || {
+            let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+            match &*source {
+                PrintSource::Samples(_) => Vec::new(),
+                PrintSource::Image(print) => print.image().profile_warning().into_iter().collect(),
+            }
+        })
     }
 
     /// Returns the ink of the likeliest interpretation.
     fn ink<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let print = Arc::clone(&self.print);
-        let ink = compute(py, move || normalize::likeliest_ink(&print))?;
+        let image = self.image();
+        let ink = compute(py, move || normalize::likeliest_ink(&image()))?;
         let ink = ink.map_err(|error| {
             let text = error.to_string();
             raise(
@@ -118,8 +154,8 @@ pub(crate) fn read_print(
             Some(&path),
         )
     })?;
-    Ok(NativePrint {
-        print: Arc::new(print),
-        path: Some(path),
-    })
+    Ok(NativePrint::new(
+        PrintSource::Image(Arc::new(print)),
+        Some(path),
+    ))
 }

@@ -38,8 +38,9 @@ pub(crate) fn fit_surface(
     scanned_face_down: Option<bool>,
 ) -> PyResult<String> {
     let (scan, stages) = (Arc::clone(&mesh.scan), Arc::clone(&settings.stages));
-    let image = print.map(|print| Arc::clone(&print.print));
+    let image = print.map(NativePrint::image);
     let fitted = compute(py, move || {
+        let image = image.map(|image| image());
         fit(&scan, image.as_deref(), scanned_face_down, &stages)
     })?;
     let fitted = fitted

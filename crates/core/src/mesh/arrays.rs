@@ -77,14 +77,13 @@ impl Mesh {
             u32::try_from(count).map_err(|_too_large| MeshArrayError::TooManyVertices(count))?;
         check_indices(faces, limit)?;
         let vertices = match positions {
-            PositionSlice::Single(all) => Vertices::Single(copied(all)),
-            PositionSlice::Double(all) => {
-                exact_singles(all).map_or_else(|| Vertices::Double(copied(all)), Vertices::Single)
-            }
+            PositionSlice::Single(all) => Vertices::Single(PageVec::copied(all)),
+            PositionSlice::Double(all) => exact_singles(all)
+                .map_or_else(|| Vertices::Double(PageVec::copied(all)), Vertices::Single),
         };
         Ok(Self {
             vertices,
-            triangles: copied(faces),
+            triangles: PageVec::copied(faces),
         })
     }
 }
@@ -115,12 +114,6 @@ fn exact_singles(all: &[[f64; 3]]) -> Option<PageVec<[f32; 3]>> {
         );
     }
     Some(singles)
-}
-
-fn copied<T: bytemuck::Pod>(all: &[T]) -> PageVec<T> {
-    let mut copy = PageVec::with_capacity(all.len());
-    copy.extend_from_slice(all);
-    copy
 }
 
 /// Checks that all positions are finite, and returns their number.

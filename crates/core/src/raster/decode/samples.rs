@@ -2,6 +2,7 @@
 
 use super::print_image::{PrintImage, on_white, widen, widen_narrow};
 use crate::domain::cancel::poll;
+use crate::page_vec::PageVec;
 use crate::raster::Grid;
 
 /// Rows of a print image in memory: each pixel has one sample (grey), two (grey and alpha), three (RGB) or four (RGB and
@@ -27,27 +28,11 @@ impl PrintImage {
     /// # Ok::<(), &str>(())
     /// ```
     pub fn from_samples(
-        [width, height]: [usize; 2],
+        size: [usize; 2],
         channels: usize,
         samples: SampleSlice<'_>,
     ) -> Option<Self> {
-        let count = match samples {
-            SampleSlice::Eight(samples) => samples.len(),
-            SampleSlice::Sixteen(samples) => samples.len(),
-        };
-        let expected = width.checked_mul(height)?.checked_mul(channels)?;
-        if count != expected || count == 0 || channels > 4 {
-            return None;
-        }
-        let colours = match samples {
-            SampleSlice::Eight(samples) => colours(samples, width, channels, widen),
-            SampleSlice::Sixteen(samples) => colours(samples, width, channels, |sample| sample),
-        };
-        let mut rgb = Grid::from_vec(width, height, colours)?;
-        if matches!(samples, SampleSlice::Sixteen(_)) && channels % 2 == 1 {
-            widen_narrow(&mut rgb);
-        }
-        Some(rgb.into())
+        Some(CheckedSamples::new(size, channels, samples)?.image())
     }
 
     /// Returns the colours rounded to 8 bits, three for each pixel.
@@ -62,35 +47,122 @@ impl PrintImage {
     }
 }
 
-fn colours<T: Copy>(
+/// Samples whose number fits the size of their image.
+struct CheckedSamples<'a> {
+    size: [usize; 2],
+    channels: usize,
+    samples: SampleSlice<'a>,
+}
+
+impl<'a> CheckedSamples<'a> {
+    fn new(size: [usize; 2], channels: usize, samples: SampleSlice<'a>) -> Option<Self> {
+        let count = match samples {
+            SampleSlice::Eight(samples) => samples.len(),
+            SampleSlice::Sixteen(samples) => samples.len(),
+        };
+        let expected = size[0].checked_mul(size[1])?.checked_mul(channels)?;
+        (count == expected && count > 0 && channels <= 4).then_some(Self {
+            size,
+            channels,
+            samples,
+        })
+    }
+
+    fn image(&self) -> PrintImage {
+        let [width, height] = self.size;
+        let mut rgb = Grid::new(width, height, [u16::MAX; 3]);
+        match self.samples {
+            SampleSlice::Eight(samples) => widen_to(&mut rgb, samples, self.channels, widen),
+            SampleSlice::Sixteen(samples) => {
+                widen_to(&mut rgb, samples, self.channels, |sample| sample);
+                if self.channels % 2 == 1 {
+                    widen_narrow(&mut rgb);
+                }
+            }
+        }
+        rgb.into()
+    }
+}
+
+/// A copy of the samples of an image, which becomes an image when it is needed.
+#[derive(Debug)]
+pub struct PrintSamples {
+    size: [usize; 2],
+    channels: usize,
+    samples: SampleVec,
+}
+
+#[derive(Debug)]
+enum SampleVec {
+    Eight(PageVec<u8>),
+    Sixteen(PageVec<u16>),
+}
+
+impl PrintSamples {
+    /// Copies samples. Returns `None` as [`PrintImage::from_samples`] does.
+    pub fn copied(size: [usize; 2], channels: usize, samples: SampleSlice<'_>) -> Option<Self> {
+        CheckedSamples::new(size, channels, samples)?;
+        let samples = match samples {
+            SampleSlice::Eight(samples) => SampleVec::Eight(PageVec::copied(samples)),
+            SampleSlice::Sixteen(samples) => SampleVec::Sixteen(PageVec::copied(samples)),
+        };
+        Some(Self {
+            size,
+            channels,
+            samples,
+        })
+    }
+
+    /// Returns width and height.
+    pub const fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Returns the image, as [`PrintImage::from_samples`] does.
+    pub fn to_image(&self) -> PrintImage {
+        let samples = match &self.samples {
+            SampleVec::Eight(samples) => SampleSlice::Eight(samples),
+            SampleVec::Sixteen(samples) => SampleSlice::Sixteen(samples),
+        };
+        let (size, channels) = (self.size, self.channels);
+        CheckedSamples {
+            size,
+            channels,
+            samples,
+        }
+        .image()
+    }
+}
+
+/// Converts rows of samples to colours.
+fn widen_to<T: Copy>(
+    rgb: &mut Grid<[u16; 3]>,
     samples: &[T],
-    width: usize,
     channels: usize,
     wide: impl Fn(T) -> u16 + Copy,
-) -> Vec<[u16; 3]> {
-    let mut colours = Vec::with_capacity(samples.len() / channels);
-    for row in samples.chunks_exact(width * channels) {
+) {
+    let width = rgb.width();
+    let rows = rgb.data_mut().chunks_exact_mut(width);
+    for (colours, row) in rows.zip(samples.chunks_exact(width * channels)) {
         poll();
+        let pixels = colours.iter_mut().zip(row.chunks_exact(channels));
         match channels {
-            1 => colours.extend(row.iter().map(|grey| [wide(*grey); 3])),
-            2 => colours.extend(row.as_chunks::<2>().0.iter().map(|pixel| {
-                let [grey, alpha] = pixel.map(wide);
-                on_white([grey, grey, grey, alpha])
-            })),
-            3 => colours.extend(row.as_chunks::<3>().0.iter().map(|pixel| pixel.map(wide))),
-            _ => colours.extend(
-                row.as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|pixel| on_white(pixel.map(wide))),
-            ),
+            1 => pixels.for_each(|(colour, pixel)| *colour = [wide(pixel[0]); 3]),
+            2 => pixels.for_each(|(colour, pixel)| {
+                let grey = wide(pixel[0]);
+                *colour = on_white([grey, grey, grey, wide(pixel[1])]);
+            }),
+            3 => pixels.for_each(|(colour, pixel)| *colour = [0, 1, 2].map(|k| wide(pixel[k]))),
+            _ => pixels.for_each(|(colour, pixel)| {
+                *colour = on_white([0, 1, 2, 3].map(|k| wide(pixel[k])));
+            }),
         }
     }
-    colours
 }
 
 #[cfg(test)]
 mod tests {
+    use super::PrintSamples;
     use super::SampleSlice::{Eight, Sixteen};
     use crate::raster::{Grid, ImageLimits, PrintImage, decode, png_grey16, png_rgb8};
 
@@ -107,6 +179,8 @@ mod tests {
             let file = decode(&png_grey16(&grey), &ImageLimits::SUGGESTED).expect("decodes");
             let memory = PrintImage::from_samples([5, 3], 1, Sixteen(grey.data()));
             assert_eq!(memory.expect("an image"), file, "{most}");
+            let later = PrintSamples::copied([5, 3], 1, Sixteen(grey.data())).expect("samples");
+            assert_eq!((later.to_image(), later.size()), (file, [5, 3]), "{most}");
         }
     }
 
@@ -124,6 +198,7 @@ mod tests {
         ] {
             let samples = vec![0; count];
             assert!(PrintImage::from_samples(size, channels, Eight(&samples)).is_none());
+            assert!(PrintSamples::copied(size, channels, Eight(&samples)).is_none());
         }
     }
 }
