@@ -44,7 +44,7 @@ pub use orientation::Orientation;
 pub use outcomes::{AlignOutcome, BoxesOutcome, CutOutcome, FaceOutcome, FoundFace, heights_role};
 pub use page_ink::{InkSampler, PageInk};
 pub use page_map::{PageMap, StoredPageMap};
-pub use print_crop::{PrintCrop, cut_print};
+pub use print_crop::{PrintCrop, cut_print, reading_turns};
 pub use relief::Relief;
 pub use scan_sums::ScanPart;
 pub use stored_heights::{HeightHeader, StoredHeights};

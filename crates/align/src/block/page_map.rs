@@ -211,12 +211,6 @@ impl PageMap {
         (c - b).atan2(a + d)
     }
 
-    /// Returns the number of quarter turns, from x to y, nearest to the rotation from the face to the page.
-    pub fn quarter_turns(&self) -> u8 {
-        let turns = (self.angle_rad() / std::f64::consts::FRAC_PI_2).round() as i64;
-        turns.rem_euclid(4) as u8
-    }
-
     /// Returns the middle of the map, mm.
     fn middle(&self) -> [f64; 2] {
         let sides = [self.nodes.width(), self.nodes.height()];

@@ -1,15 +1,35 @@
 //! Cuts the print of a character out of its page.
 
-use mocban_core::domain::Affine2;
+use mocban_core::domain::{Affine2, BoxName};
 use mocban_core::raster::{Grid, PrintImage};
 
 /// The print of one character, cut out of its page.
 #[derive(Debug, Clone)]
 pub struct PrintCrop {
-    /// 8-bit colours, turned by quarter turns so that the character is upright.
+    /// 8-bit colours, turned by quarter turns.
     pub rgb: Grid<[u8; 3]>,
     /// Maps pixels of the crop to pixels of the page.
     pub page_from_crop: Affine2,
+}
+
+/// Returns the number of quarter turns, from x to y, by which a page is turned against its reading direction: 0 if its
+/// rows follow each other downwards. `places` are the names of boxes by column and row, with their edges on the page.
+pub fn reading_turns(places: &[(BoxName, [f64; 4])]) -> u8 {
+    let middle = |[left, top, right, bottom]: [f64; 4]| [left + right, top + bottom];
+    let mut along = [0.0; 2];
+    for (row, next) in places.iter().zip(places.iter().skip(1)) {
+        if row.0.column == next.0.column && row.0.row < next.0.row {
+            let [from, to] = [middle(row.1), middle(next.1)];
+            along = [0, 1].map(|k: usize| along[k] + to[k] - from[k]);
+        }
+    }
+    let [x, y] = along;
+    match (x.abs() > y.abs(), x < 0.0, y < 0.0) {
+        (true, true, _) => 1,
+        (false, _, true) => 2,
+        (true, false, _) => 3,
+        (false, _, false) => 0,
+    }
 }
 
 /// Cuts the print of one box out of a page, with a margin in pixels. `quarter_turns` is the number of quarter turns from
@@ -50,8 +70,32 @@ pub fn cut_print(
 
 #[cfg(test)]
 mod tests {
-    use super::cut_print;
+    use super::{cut_print, reading_turns};
+    use mocban_core::domain::BoxName;
     use mocban_core::raster::{Grid, PrintImage};
+
+    #[test]
+    fn pages_are_turned_by_the_direction_of_their_rows() {
+        // Columns from right to left and rows downwards on an upright page of 100 x 100 pixels, turned as `turned` says.
+        let places = |turned: fn([f64; 2]) -> [f64; 2]| -> Vec<(BoxName, [f64; 4])> {
+            let place = |k: u32| {
+                let (column, row) = (k / 4 + 1, k % 4 + 1);
+                let name = BoxName {
+                    column,
+                    row,
+                    part: None,
+                };
+                let [x, y] = turned([90.0 - 20.0 * f64::from(column), 20.0 * f64::from(row)]);
+                (name, [x - 5.0, y - 6.0, x + 5.0, y + 6.0])
+            };
+            (0..12).map(place).collect()
+        };
+        assert_eq!(reading_turns(&places(|at| at)), 0);
+        assert_eq!(reading_turns(&places(|[x, y]| [100.0 - y, x])), 1);
+        assert_eq!(reading_turns(&places(|[x, y]| [100.0 - x, 100.0 - y])), 2);
+        assert_eq!(reading_turns(&places(|[x, y]| [y, 100.0 - x])), 3);
+        assert_eq!(reading_turns(&[]), 0);
+    }
 
     #[test]
     fn prints_are_turned_upright_and_keep_their_place() {

@@ -46,7 +46,7 @@ pub use block::{
     BlockCharacterState, BlockId, BlockName, BlockSide, BlockStage, BlockStageRecord, TrueBox,
 };
 pub use box_iou::box_iou;
-pub use box_name::{BoxName, NotePart};
+pub use box_name::{BoxName, NotABoxName, NotePart};
 pub use catalog_identity::{CATALOG_FILE, CatalogIdentity, UNKNOWN_SERVER};
 pub use control_points::{ControlPoint, ControlPoints};
 pub use enum_names::enum_names;

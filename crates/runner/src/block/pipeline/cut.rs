@@ -13,6 +13,7 @@ use crate::block_stages::{BlockStageError, BlockStageOutput, CharacterOutput, Cu
 use mocban_align::block::{
     AlignOutcome, BlockError, BoxesOutcome, CUT_MARGIN_MM, CharacterMap, CutError, CutOutcome,
     CutPlan, FaceOutcome, PageMap, PlacedCharacter, PrintCrop, cut_meshes, cut_print,
+    reading_turns,
 };
 use mocban_core::domain::cancel::{ThreadToken, poll};
 use mocban_core::domain::{AlignmentPrior, ArtifactRef, BlockStage, FailureClass};
@@ -42,10 +43,10 @@ pub(crate) fn cut(
     let boxes: BoxesOutcome = context.outcome(BlockStage::Boxes)?;
     let face = faces.iter().find(|(side, _)| *side == aligned.side);
     let (_, face) = face.ok_or(BlockStageError::RerunFrom(BlockStage::Face))?;
+    let turns = turns_of(&boxes);
     let map = PageMap::try_from(boxes.page_from_face)
         .ok()
         .ok_or(BlockStageError::RerunFrom(BlockStage::Boxes))?;
-    let turns = map.quarter_turns();
     let margin_px = CUT_MARGIN_MM * aligned.px_per_mm;
     let token = ThreadToken::current();
     let cut_print_of = |character: &PlacedCharacter| -> Result<CutPrint, BlockStageError> {
@@ -102,6 +103,17 @@ pub(crate) fn cut(
         characters,
         ..outcome
     })
+}
+
+/// Returns the quarter turns that make the prints upright. Boxes that were found are named by column and row, which gives
+/// the reading direction; a page with labels is shown as it is.
+fn turns_of(boxes: &BoxesOutcome) -> u8 {
+    if boxes.labels.is_some() {
+        return 0;
+    }
+    let characters = boxes.characters.iter();
+    let places = characters.filter_map(|c| Some((c.label.name.parse().ok()?, c.label.page_box)));
+    reading_turns(&places.collect::<Vec<_>>())
 }
 
 /// Cuts the meshes of the characters and writes them. Returns the file of each, or why there is none.
