@@ -15,7 +15,7 @@ use mocban_align::stages::{Settings, StageError, depth, pipeline};
 use mocban_core::domain::artifact_role::{
     CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask, stroke_map,
 };
-use mocban_core::domain::{Affine2, AlignmentPrior, FailureClass, Stage};
+use mocban_core::domain::{Affine2, AlignmentPrior, ArtifactRef, FailureClass, Stage};
 use mocban_core::mesh;
 use mocban_core::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use mocban_store::Project;
@@ -179,13 +179,19 @@ fn expected_pose(pair: &PairContext, depth: &DepthMap) -> Result<Option<Affine2>
 /// Returns the failure of a stage on the likelier of the two files. `length` is that of the scan in its unit, or 0 if it
 /// does not matter.
 fn in_file(pair: &PairContext, error: &StageError, length: f64) -> PairStageError {
-    let path = if error.is_of_print() {
-        &pair.attributes.print_path
+    let attributes = &pair.attributes;
+    let (word, path) = if error.is_of_print() {
+        ("print", &attributes.print_path)
     } else {
-        &pair.attributes.mesh_path
+        ("mesh", &attributes.mesh_path)
     };
-    let advice = scan_size::advice_for(error, length, pair.attributes.unit);
-    PairStageError::failed(error.class(), format!("{path}: {error}{advice}"))
+    let file = match ArtifactRef::at_path(path) {
+        // A file that was cut from a block: its path says nothing to a user.
+        Some(_) => format!("the {word} of {}", attributes.name),
+        None => path.clone(),
+    };
+    let advice = scan_size::advice_for(error, length, attributes.unit);
+    PairStageError::failed(error.class(), format!("{file}: {error}{advice}"))
 }
 
 /// Encodes an outcome as JSON. Returns the outcome as a later run would decode it, and the JSON.

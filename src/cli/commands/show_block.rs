@@ -19,6 +19,9 @@ use mocban_system::time_text::{duration, local};
 /// Number of characters that are listed of each kind.
 const MAX_CHARACTERS: usize = 20;
 
+/// Characters with a shorter longest side on the page are smaller than registration needs to be sure.
+const SMALL_PX: f64 = 16.0;
+
 /// Significant digits of numbers that are not whole.
 const DIGITS: i32 = 4;
 
@@ -172,6 +175,9 @@ fn characters_text(
         }
     }
     text.push('\n');
+    if let Some(line) = resolution(detail, characters) {
+        let _ = writeln!(text, "  {line}");
+    }
     let low = Catalog::LOW_CHARACTER_CONFIDENCE;
     let is_low = |one: &&StoredCharacter| {
         one.state == BlockCharacterState::Cut && one.confidence.is_some_and(|value| value < low)
@@ -191,6 +197,28 @@ fn characters_text(
         ]
     });
     text + &columns(rows, "<><")
+}
+
+/// Says how large the characters are on the page: `2.6 px/mm: characters of about 25 px`. `None` before the page is
+/// aligned.
+fn resolution(detail: &BlockDetail, characters: &[StoredCharacter]) -> Option<String> {
+    let align = detail
+        .stages
+        .iter()
+        .find(|one| one.stage == BlockStage::Align)?;
+    let px_per_mm = align.outcome.get("px_per_mm")?.as_f64()?;
+    let longer = |[left, top, right, bottom]: [f64; 4]| (right - left).max(bottom - top);
+    let mut sides: Vec<f64> = characters.iter().map(|one| longer(one.bounds)).collect();
+    let middle = sides.len() / 2;
+    let (_, side, _) = sides.select_nth_unstable_by(middle, f64::total_cmp);
+    let advice = if *side < SMALL_PX {
+        "; a page scanned at a higher resolution gives surer results"
+    } else {
+        ""
+    };
+    Some(format!(
+        "{px_per_mm:.1} px/mm: characters of about {side:.0} px{advice}"
+    ))
 }
 
 /// Lists failed attempts, the latest last.
