@@ -1,9 +1,11 @@
 //! Identity of a generated pair.
 
 use mocban::demo::{DemoPair, PairGenerator, Tier};
+use mocban::domain::Affine2;
 use mocban::mesh::write::MeshFormat;
 
 use super::run::Input;
+use super::small_print::shrink;
 
 /// A pair by tier, seed and index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +18,8 @@ pub(super) struct Case {
     pub(super) index: u64,
     /// Approximate number of vertices of the scan. `None` means a random number.
     vertices: Option<u32>,
+    /// Longest side of the print in pixels. `None` means its own size.
+    print_px: Option<u32>,
 }
 
 impl Case {
@@ -26,7 +30,14 @@ impl Case {
             seed,
             index,
             vertices,
+            print_px: None,
         }
+    }
+
+    /// Sets the longest side of the print in pixels.
+    #[must_use]
+    pub(super) const fn with_print_px(self, print_px: Option<u32>) -> Self {
+        Self { print_px, ..self }
     }
 
     /// Returns the generator of the tier and seed.
@@ -38,7 +49,24 @@ impl Case {
     pub(super) fn make(&self) -> anyhow::Result<(DemoPair, Input)> {
         let pair = self.pairs().pair(self.index)?;
         let mesh = MeshFormat::StlBinary.encode(&pair.mesh);
-        let print = pair.print.clone();
-        Ok((pair, Input { mesh, print }))
+        let input = self.input(mesh, pair.print.clone())?;
+        Ok((pair, input))
+    }
+
+    /// Returns files as the stages read them, with the print in the size of the case.
+    pub(super) fn input(&self, mesh: Vec<u8>, print: Vec<u8>) -> anyhow::Result<Input> {
+        let small = self.print_px.map(|px| shrink(&print, px)).transpose()?;
+        Ok(match small.flatten() {
+            Some(small) => Input {
+                mesh,
+                print: small.file,
+                full_from_print: small.full_from_small,
+            },
+            None => Input {
+                mesh,
+                print,
+                full_from_print: Affine2::IDENTITY,
+            },
+        })
     }
 }

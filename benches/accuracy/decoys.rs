@@ -64,10 +64,7 @@ pub(super) fn all(
 /// Makes a decoy of a case.
 pub(super) fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
     let decoy = decoy_pair(&case.pairs(), kind, case.index)?;
-    Ok(Input {
-        mesh: MeshFormat::StlBinary.encode(&decoy.mesh),
-        print: decoy.print,
-    })
+    case.input(MeshFormat::StlBinary.encode(&decoy.mesh), decoy.print)
 }
 
 fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Numbers, String>> {

@@ -6,6 +6,7 @@
 //! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
 //! cargo bench --bench accuracy -- --decoys
 //! cargo bench --bench accuracy -- --tiers all --pairs 20
+//! cargo bench --bench accuracy -- --tiers pose,hard --print-px 12
 //! cargo bench --bench accuracy -- --fit-confidence --seeds 11,12 --held-out-seeds 13
 //! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
@@ -30,6 +31,7 @@ mod options;
 mod reliability;
 mod run;
 mod sheet;
+mod small_print;
 mod speed;
 mod times;
 mod trial;

@@ -27,6 +27,14 @@ pub(super) struct Options {
     /// Approximate number of vertices of the scans [default: 20,000 to 150,000]
     #[arg(long, value_name = "N")]
     vertices: Option<u32>,
+    /// Shrink prints to this longest side in pixels; of several sizes, pairs take each in turn
+    #[arg(
+        long,
+        value_name = "PX",
+        value_delimiter = ',',
+        conflicts_with = "sheets"
+    )]
+    print_px: Vec<u32>,
     /// Seeds of the data
     #[arg(long, value_delimiter = ',', default_value = "1")]
     seeds: Vec<u64>,
@@ -104,7 +112,10 @@ impl Options {
         for tier in &self.tiers {
             let count = wanted.min(tier.max_pairs().unwrap_or(u64::MAX));
             for seed in seeds {
-                let case = |index| Case::new(*tier, *seed, index, self.vertices);
+                let case = |index: u64| {
+                    let print_px = self.print_px.iter().cycle().nth(index as usize).copied();
+                    Case::new(*tier, *seed, index, self.vertices).with_print_px(print_px)
+                };
                 cases.extend((0..count).map(case));
             }
         }

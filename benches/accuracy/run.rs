@@ -1,6 +1,6 @@
 //! One run of the four stages on a mesh and a print.
 
-use mocban::domain::FitOutcome;
+use mocban::domain::{Affine2, FitOutcome};
 use mocban::mesh;
 use mocban::raster;
 use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, depth, pipeline};
@@ -13,6 +13,8 @@ pub(super) struct Input {
     pub(super) mesh: Vec<u8>,
     /// The print's file.
     pub(super) print: Vec<u8>,
+    /// Maps pixels of the print to those of the print to which the ground truth belongs.
+    pub(super) full_from_print: Affine2,
 }
 
 /// Result of a run.
@@ -21,7 +23,7 @@ pub(super) struct Run {
     pub(super) times: Times,
     /// The plane, if the fit succeeded.
     pub(super) fit: Option<FitOutcome>,
-    /// The print as read and the results of the stages, or the error.
+    /// The print as read and the results of the stages, or the error. Alignments are in the frame of the ground truth.
     pub(super) result: Result<(Print, AlignedPair), Failed>,
 }
 
@@ -78,11 +80,14 @@ fn align(
             pipeline::normalize(&depth, &print, settings)
         })
         .map_err(StageError::from)?;
-    let registered = times
+    let mut registered = times
         .book(Part::Register, || {
             pipeline::register(&depth, &normalized, None, settings)
         })
         .map_err(StageError::from)?;
+    for metric in &mut registered.outcome.metrics {
+        metric.print_from_depth = input.full_from_print.after(&metric.print_from_depth);
+    }
     let aligned = AlignedPair {
         fit: plane.clone(),
         depth,
