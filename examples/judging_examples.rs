@@ -173,7 +173,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
         let (depth, level, map) = relief(dir, &pair, fault).await?;
         let artifacts = PairArtifacts::new(&pair.project, &pair.pair);
         let print = SourcePrint::read(&pair.project, &pair.pair, &ImageLimits::SUGGESTED)?.picture;
-        let masks = PrintMasks::from_grey(&artifacts.print_grey()?);
+        let masks = PrintMasks::from_grey(&artifacts.print_grey()?, artifacts.print_enlargement()?);
         let view = PrintView::of_side(&print, SIDE);
         let folder = target.join(name);
         std::fs::create_dir_all(&folder)?;
@@ -183,7 +183,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
             ("relief.jpg", jpeg_rgb8(&view.relief(&depth, &map), QUALITY)),
             (
                 "print-mask.png",
-                png_mask(&view.mask(&masks.ink, &Affine2::IDENTITY)),
+                png_mask(&view.mask(&masks.ink_of_print(), &Affine2::IDENTITY)),
             ),
             ("depth-mask.png", png_mask(&view.mask(&strokes, &map))),
             (

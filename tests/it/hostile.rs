@@ -116,7 +116,7 @@ fn bad_prints() -> Vec<Case> {
             "one_pixel",
             print(png_grey8(&Grid::new(1, 1, 9))),
             "bad_input",
-            "1 x 1 px is too small",
+            "print has no ink",
         ),
         case(
             "huge_header",

@@ -25,7 +25,7 @@ pub fn alignment_files(pair: &AlignedPair, print: &Print) -> [(&'static str, Vec
     let aligned = warp_mask(&strokes, pose, size[0], size[1]);
     let view = PrintView::enlarged(image);
     let files = [
-        png_mask(&pair.normalized.prints[pair.registered.outcome.ink].ink),
+        png_mask(&pair.normalized.prints[pair.registered.outcome.ink].ink_of_print()),
         png_grey16(&depth.levels),
         sidecar(&depth.scale).into_bytes(),
         png_grey16(&warp_depth(depth, pose, size[0], size[1])),

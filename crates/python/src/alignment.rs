@@ -120,7 +120,8 @@ impl NativeAlignment {
 
     /// Returns the pixels of the print that are ink.
     fn print_mask<'py>(&self, py: Python<'py>) -> PyMask<'py> {
-        let ink = &self.pair.normalized.prints[self.pair.registered.outcome.ink].ink;
+        let masks = &self.pair.normalized.prints[self.pair.registered.outcome.ink];
+        let ink = py.detach(|| masks.ink_of_print());
         PyArray1::from_slice(py, ink.data())
     }
 

@@ -86,7 +86,10 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
     let levels = images.sixteen(numbers.depth_size, 1)?;
     let levels = Grid::from_vec(numbers.depth_size[0], numbers.depth_size[1], levels)?;
     let [width, height] = numbers.print_size;
-    let masks = Grid::from_vec(width, height, images.eight(numbers.print_size)?)?;
+    let enlargement = numbers.normalize.enlargement();
+    let mask_side = |side: usize| side.checked_mul(enlargement as usize);
+    let mask_size = [mask_side(width)?, mask_side(height)?];
+    let masks = Grid::from_vec(mask_size[0], mask_size[1], images.eight(mask_size)?)?;
     let samples = images.sixteen(numbers.print_size, 3)?;
     let rgb = Grid::from_vec(width, height, samples.as_chunks::<3>().0.to_vec())?;
     let maps = numbers.stroke_map_sides.iter();
@@ -105,7 +108,7 @@ pub(crate) fn restore(numbers: &str, images: &[u8]) -> Option<(AlignedPair, Prin
         },
         normalized: Normalized {
             outcome: numbers.normalize,
-            prints: vec![PrintMasks::from_grey(&masks)],
+            prints: vec![PrintMasks::from_grey(&masks, enlargement)],
         },
         registered: Registered {
             outcome: numbers.register,

@@ -60,7 +60,10 @@ fn assembled(
     let mut normalize: NormalizeOutcome =
         artifacts.outcome(Stage::Normalize).map_err(unreadable)?;
     let mut register: RegisterOutcome = artifacts.outcome(Stage::Register).map_err(unreadable)?;
-    let masks = PrintMasks::from_grey(&artifacts.print_grey().map_err(unreadable)?);
+    let masks = PrintMasks::from_grey(
+        &artifacts.print_grey().map_err(unreadable)?,
+        normalize.enlargement(),
+    );
     normalize.inks = normalize
         .inks
         .get(register.ink)

@@ -8,7 +8,9 @@ use mocban_core::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
     RegisterOutcome, Stage,
 };
-use mocban_core::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
+use mocban_core::raster::{
+    DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16, reduce_mask,
+};
 use mocban_store::Project;
 
 /// Value of ink or strokes in a stored mask.
@@ -131,10 +133,12 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// Returns an error if the mask cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
-        Ok(self.print_grey()?.map(|value| *value == INK))
+        let ink = self.print_grey()?.map(|value| *value == INK);
+        Ok(reduce_mask(&ink, self.print_enlargement()?))
     }
 
-    /// Reads the stored image of the masks of the print. For its values, see [`print_mask`].
+    /// Reads the stored image of the masks of the print, which is enlarged if the print is small. For its values, see
+    /// [`print_mask`].
     ///
     /// # Errors
     /// Returns an error if the mask cannot be read.
@@ -142,6 +146,16 @@ impl<'a> PairArtifacts<'a> {
         let register = self.outcome::<RegisterOutcome>(Stage::Register);
         let ink = register.map_or(0, |outcome| outcome.ink);
         self.grey(Stage::Normalize, &print_mask(ink))
+    }
+
+    /// Returns how many times the image of [`Self::print_grey`] is larger than the print, on each side.
+    ///
+    /// # Errors
+    /// Returns an error if the result of the normalize stage cannot be read.
+    pub fn print_enlargement(&self) -> Result<u32, PairArtifactsError> {
+        Ok(self
+            .outcome::<NormalizeOutcome>(Stage::Normalize)?
+            .enlargement())
     }
 
     /// Returns the map from print pixels to pixels of the canvas on which scores are computed.

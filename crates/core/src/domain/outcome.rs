@@ -2,7 +2,7 @@
 //!
 //! Outcomes are stored as JSON with exact numbers, so that a resumed run computes the same results.
 
-use std::num::NonZeroU64;
+use std::num::{NonZeroU32, NonZeroU64};
 
 use serde::{Deserialize, Serialize};
 
@@ -230,6 +230,17 @@ pub struct NormalizeOutcome {
         skip_serializing_if = "Option::is_none"
     )]
     pub print_orientation: Option<u8>,
+    /// How many times the masks of a small print are larger than the print, on each side. `None` if they have the size
+    /// of the print.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub print_enlargement: Option<NonZeroU32>,
+}
+
+impl NormalizeOutcome {
+    /// Returns how many times the masks of the print are larger than the print, on each side.
+    pub fn enlargement(&self) -> u32 {
+        self.print_enlargement.map_or(1, NonZeroU32::get)
+    }
 }
 
 /// Similarity of the print mask and the depth mask of a metric on the canvas. See `stages::score` for the formulas.

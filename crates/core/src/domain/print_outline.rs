@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Affine2;
+
 /// A convex polygon in pixels of the print image. The print shows the character of the pair inside it and other
 /// characters outside.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +54,18 @@ impl PrintOutline {
             ]);
         }
         columns
+    }
+
+    /// Returns the outline in another frame. The map must not mirror.
+    #[must_use]
+    pub fn mapped(&self, map: &Affine2) -> Self {
+        Self {
+            corners: self
+                .corners
+                .iter()
+                .map(|corner| map.apply(*corner))
+                .collect(),
+        }
     }
 
     /// Returns the lowest and the highest coordinates of the corners.

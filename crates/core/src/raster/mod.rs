@@ -5,6 +5,7 @@ pub mod components;
 mod decode;
 mod depth_map;
 pub mod encode;
+mod enlarge;
 pub mod fonts;
 mod grid;
 mod mask;
@@ -26,6 +27,7 @@ pub use encode::{
     PngError, compact_rgb8, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8,
     png_grey16, png_mask, png_rgb8,
 };
+pub use enlarge::{enlarge, enlarged_from_original, original_from_enlarged, reduce_mask};
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};
 pub use resample::{resample, resample_transposed};

@@ -31,15 +31,12 @@ const NOISE: f64 = 0.012;
 /// Least fraction of ink in a print.
 const LEAST_INK: f64 = 0.002;
 
-/// Least width and height of a print in pixels.
-const LEAST_PRINT_PX: usize = 16;
+/// Least longest side of the ink of a small print, in pixels of the print.
+const LEAST_CHARACTER_PX: f64 = 8.0;
 
 /// Why a print shows no ink. A retry does not help.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BinarizeError {
-    /// The image is too small.
-    #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
-    TooSmall { width: usize, height: usize },
     /// Ink and background differ too little in grey.
     #[error(
         "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
@@ -56,12 +53,32 @@ pub enum BinarizeError {
         /// Threshold, 0..=1.
         threshold: f64,
     },
+    /// The character has too few pixels to show its strokes.
+    #[error(
+        "print shows the character with {character_px:.0} px, too few to tell its strokes, needs {LEAST_CHARACTER_PX} px; scan or photograph it at a higher resolution"
+    )]
+    TooCoarse {
+        /// Longest side of the ink, pixels of the print.
+        character_px: f64,
+    },
     /// Almost all pixels are darker than the threshold.
     #[error("print is ink all over: its lightest grey is {lightest:.3} of full white")]
     AllInk {
         /// Lightest grey, 0..=1.
         lightest: f64,
     },
+}
+
+/// Refuses a print whose ink is too small in its own pixels to show strokes. The masks are `times` times as large as the
+/// print.
+pub(crate) fn require_strokes(inks: &[InkMask], times: u32) -> Result<(), BinarizeError> {
+    let longest = |ink: &InkMask| ink.mask.bounding_box().map_or(0, |b| b.longest_side());
+    let longest = inks.iter().map(longest).max().unwrap_or(0);
+    let character_px = longest as f64 / f64::from(times);
+    if character_px < LEAST_CHARACTER_PX {
+        return Err(BinarizeError::TooCoarse { character_px });
+    }
+    Ok(())
 }
 
 /// One interpretation of a print as ink and background.
@@ -79,12 +96,8 @@ pub(crate) struct InkMask {
     pub(crate) light_on_dark: bool,
 }
 
-fn grey_of(picture: &PrintImage) -> Result<Grid<f32>, BinarizeError> {
-    let (width, height) = (picture.rgb.width(), picture.rgb.height());
-    if width < LEAST_PRINT_PX || height < LEAST_PRINT_PX {
-        return Err(BinarizeError::TooSmall { width, height });
-    }
-    Ok(picture.rgb.map(|c| luminance(*c)))
+fn grey_of(picture: &PrintImage) -> Grid<f32> {
+    picture.rgb.map(|c| luminance(*c))
 }
 
 /// Returns the Rec. 601 luma, 0..=1.
@@ -95,7 +108,7 @@ fn luminance(c: [u16; 3]) -> f32 {
 /// Binarizes as the paper does: pixels darker than `grey` are ink, without specks. The whole image is known.
 pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
-    let grey = &grey_of(picture)?;
+    let grey = &grey_of(picture);
     let raw = grey.map(|g| f64::from(*g) < threshold);
     let ink = remove_specks(&raw, raw.data().len());
     require_ink(&ink, ink.data().len(), grey, threshold)?;
@@ -115,7 +128,7 @@ pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeE
 /// threshold. Returns one interpretation for each possible polarity, the likelier first. If the print may be stained,
 /// adds an interpretation that treats wide dark areas as stains.
 pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
-    let grey = &grey_of(picture)?;
+    let grey = &grey_of(picture);
     let known = known(picture, grey);
     let mut values = held(grey, &known);
     let split = otsu::split(&mut values).ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
@@ -390,12 +403,6 @@ mod tests {
             turned: None,
             ignored_profile: None,
         };
-        assert!(matches!(
-            read(&one),
-            Err(BinarizeError::TooSmall {
-                width: 1,
-                height: 1
-            })
-        ));
+        assert!(matches!(read(&one), Err(BinarizeError::NoContrast { .. })));
     }
 }

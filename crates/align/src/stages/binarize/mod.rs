@@ -6,7 +6,7 @@ mod outlined;
 mod polarity;
 
 pub(super) use ink::BinarizeError;
-pub(super) use ink::{InkMask, fixed, hypotheses};
+pub(super) use ink::{InkMask, fixed, hypotheses, require_strokes};
 pub(super) use mocban_core::raster::otsu::{Split, split, split_inner};
 pub(super) use outlined::{hypotheses_within, inside};
 pub(super) use polarity::rim_share;

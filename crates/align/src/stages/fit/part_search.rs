@@ -10,6 +10,7 @@ use super::wider_search::{FoundSide, LEAST, evidence};
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 use mocban_core::domain::{PrintOutline, Rigid3};
+use mocban_core::raster::original_from_enlarged;
 
 /// Compares both sides of `start`'s plane with the parts of the print. Returns the side that resembles a part best,
 /// with the outline of the part. Returns `None` if no agreement reaches [`LEAST`], or if the finer fit of the side
@@ -21,7 +22,12 @@ pub(super) fn search(
     params: &FitParams,
 ) -> Option<FoundSide> {
     let inks = print.hypotheses().ok()?;
-    let mut parts: Vec<PrintOutline> = inks.iter().flat_map(|ink| print_parts(&ink.mask)).collect();
+    let print_from_mask = original_from_enlarged(print.enlargement());
+    let mut parts: Vec<PrintOutline> = inks
+        .iter()
+        .flat_map(|ink| print_parts(&ink.mask))
+        .map(|part| part.mapped(&print_from_mask))
+        .collect();
     if parts.is_empty() {
         return None;
     }

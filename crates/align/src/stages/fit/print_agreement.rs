@@ -7,6 +7,7 @@ use crate::stages::pose::{
 };
 use crate::stages::print::Print;
 use mocban_core::domain::PrintOutline;
+use mocban_core::raster::enlarged_from_original;
 
 /// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;
@@ -62,14 +63,16 @@ impl InkPyramids {
         Some(Self(inks))
     }
 
-    /// Builds the pyramids of the part of a print inside an outline. Returns `None` if the outline contains no pixel,
+    /// Builds the pyramids of the part of a print inside an outline in pixels of the print. Returns `None` if the outline contains no pixel,
     /// or if the print cannot be binarized.
     pub(super) fn within(print: &Print, outline: &PrintOutline) -> Option<Self> {
-        let rgb = &print.image().rgb;
-        let inside = inside(outline, [rgb.width(), rgb.height()]);
+        let outline = outline.mapped(&enlarged_from_original(print.enlargement()));
+        let read = print.hypotheses().ok()?;
+        let known = &read.first()?.soft.known;
+        let inside = inside(&outline, [known.width(), known.height()]);
         let bounds = inside.bounding_box()?;
         let mut inks = Vec::new();
-        for ink in print.hypotheses().ok()? {
+        for ink in read {
             let known = ink
                 .soft
                 .known

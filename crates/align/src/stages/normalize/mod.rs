@@ -16,15 +16,15 @@ pub use params::{NormalizeError, NormalizeParams};
 pub(super) use relief::{relative_depths, soft_stroke};
 
 use super::print::Print;
-use mocban_core::raster::{DepthMap, Mask};
+use mocban_core::raster::{DepthMap, Mask, reduce_mask};
 
 /// Raised by every change of the code that may change results.
-pub const REVISION: u32 = 16;
+pub const REVISION: u32 = 17;
 
 /// Finds the ink in all possible interpretations of the print, and the heights of tops and ground.
 ///
-/// The depth map must not be a mirror image of the print. Masks are in the pixels of the print image. Heights are in
-/// mesh units over the fitted surface.
+/// The depth map must not be a mirror image of the print. Masks are in the frame of the print image, see [`PrintMasks`].
+/// Heights are in mesh units over the fitted surface.
 ///
 /// # Errors
 /// Returns an error if the print shows no ink, or if the depth map has fewer than two distinct heights.
@@ -35,7 +35,7 @@ pub fn normalize(
 ) -> Result<Normalized, NormalizeError> {
     let inks = print.hypotheses()?;
     let relief = relief::relief_heights(depth).ok_or(NormalizeError::NoStrokes)?;
-    Normalized::new(inks, Some(relief), params)
+    Normalized::new(inks, print.enlargement(), Some(relief), params)
 }
 
 /// Returns the pixels of a print that are ink in the likeliest interpretation, for use without a scan. Registration may
@@ -45,5 +45,8 @@ pub fn normalize(
 /// Returns an error if the print shows no ink.
 pub fn likeliest_ink(print: &Print) -> Result<Mask, NormalizeError> {
     // There is at least one interpretation.
-    Ok(print.hypotheses()?[0].mask.clone())
+    Ok(reduce_mask(
+        &print.hypotheses()?[0].mask,
+        print.enlargement(),
+    ))
 }

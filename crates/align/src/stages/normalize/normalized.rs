@@ -1,12 +1,17 @@
 //! Result of the normalize stage, and the map from an image to the canvas on which masks are compared.
 
+use std::num::NonZeroU32;
+
 use super::params::{NormalizeError, NormalizeParams};
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
 use mocban_core::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
-use mocban_core::raster::{Grid, Mask};
+use mocban_core::raster::{
+    Grid, Mask, enlarged_from_original, original_from_enlarged, reduce_mask,
+};
 
-/// Masks of one interpretation of the print, in the print image's frame and size.
+/// Masks of one interpretation of the print, in the print image's frame. They are larger than a small print, because its
+/// strokes are narrower than a pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintMasks {
     /// Pixels that are ink.
@@ -15,6 +20,8 @@ pub struct PrintMasks {
     pub specks: Mask,
     /// Pixels that are ink or background. All other pixels are the white around the print.
     pub known: Mask,
+    /// How many times the masks are larger than the print, on each side.
+    pub enlargement: u32,
 }
 
 impl PrintMasks {
@@ -25,7 +32,9 @@ impl PrintMasks {
 
     /// Encodes ink, specks, background and unknown pixels as one image. Specks lie on known pixels only.
     pub fn to_grey(&self) -> Grid<u8> {
-        let Self { ink, specks, known } = self;
+        let Self {
+            ink, specks, known, ..
+        } = self;
         Grid::from_fn(ink.width(), ink.height(), |x, y| {
             match (ink.at(x, y), known.at(x, y), specks.at(x, y)) {
                 (true, _, _) => Self::INK,
@@ -36,13 +45,35 @@ impl PrintMasks {
         })
     }
 
-    /// Decodes a stored mask: 255 is ink, 64 is a speck, 0 is background and 128 is unknown.
-    pub fn from_grey(grey: &Grid<u8>) -> Self {
+    /// Decodes a stored mask: 255 is ink, 64 is a speck, 0 is background and 128 is unknown. `enlargement` is that of
+    /// [`NormalizeOutcome::enlargement`].
+    pub fn from_grey(grey: &Grid<u8>, enlargement: u32) -> Self {
         Self {
             ink: grey.map(|grey| *grey == Self::INK),
             specks: grey.map(|grey| *grey == Self::SPECK),
             known: grey.map(|grey| *grey != Self::UNKNOWN),
+            enlargement,
         }
+    }
+
+    /// Returns the pixels of the print that are ink: those of which at least half is.
+    pub fn ink_of_print(&self) -> Mask {
+        reduce_mask(&self.ink, self.enlargement)
+    }
+
+    /// Returns width and height of the print.
+    pub(crate) fn print_size(&self) -> [usize; 2] {
+        [self.ink.width(), self.ink.height()].map(|side| side / self.enlargement.max(1) as usize)
+    }
+
+    /// Returns the map from pixels of the masks to pixels of the print.
+    pub(crate) fn print_from_masks(&self) -> Affine2 {
+        original_from_enlarged(self.enlargement)
+    }
+
+    /// Returns the map from pixels of the print to pixels of the masks.
+    pub(crate) fn masks_from_print(&self) -> Affine2 {
+        enlarged_from_original(self.enlargement)
     }
 
     /// Returns the ink mask as a soft mask of zeros and ones.
@@ -64,28 +95,34 @@ pub struct Normalized {
 }
 
 impl Normalized {
-    /// Collects the interpretations of a print, each with its map to the canvas.
+    /// Collects the interpretations of a print, each with its map to the canvas. `enlargement` is that of the masks.
     ///
     /// # Errors
     /// Returns an error if no interpretation has ink.
     pub(crate) fn new(
         inks: &[InkMask],
+        enlargement: u32,
         relief: Option<ReliefHeights>,
         params: &NormalizeParams,
     ) -> Result<Self, NormalizeError> {
+        let masks_from_print = enlarged_from_original(enlargement);
         let interpretation = |ink: &InkMask| {
             let hypothesis = InkHypothesis {
                 threshold_print: ink.threshold * 65_535.0,
                 light_on_dark: ink.light_on_dark,
-                canvas_from_print: box_wrap(&ink.mask, params)?,
+                canvas_from_print: box_wrap(&ink.mask, params)?.after(&masks_from_print),
             };
             let masks = PrintMasks {
                 ink: ink.mask.clone(),
                 specks: ink.specks.clone(),
                 known: ink.soft.known.clone(),
+                enlargement,
             };
             // As a resumed run reads them: ink is known, and specks are neither ink nor unknown.
-            Some((hypothesis, PrintMasks::from_grey(&masks.to_grey())))
+            Some((
+                hypothesis,
+                PrintMasks::from_grey(&masks.to_grey(), enlargement),
+            ))
         };
         let (hypotheses, prints): (Vec<_>, Vec<_>) = inks.iter().filter_map(interpretation).unzip();
         if prints.is_empty() {
@@ -98,6 +135,7 @@ impl Normalized {
                 relief,
                 thresholds: Vec::new(),
                 print_orientation: None,
+                print_enlargement: NonZeroU32::new(enlargement).filter(|times| times.get() > 1),
             },
             prints,
         })
@@ -129,11 +167,12 @@ mod tests {
             ink: Mask::from_fn(4, 1, |x, _| x == 0),
             specks: Mask::from_fn(4, 1, |x, _| x == 3),
             known: Mask::from_fn(4, 1, |x, _| x == 1 || x == 3),
+            enlargement: 1,
         };
         let grey = masks.to_grey();
         // Ink, background, unknown, speck; the values are documented at `artifact_role::print_mask`.
         assert_eq!(grey.data(), [255, 0, 128, 64]);
-        let back = PrintMasks::from_grey(&grey);
+        let back = PrintMasks::from_grey(&grey, 1);
         assert_eq!((back.ink, back.specks), (masks.ink, masks.specks));
     }
 }

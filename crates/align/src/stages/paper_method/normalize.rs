@@ -69,7 +69,7 @@ pub(crate) fn normalize(
     params: &NormalizeParams,
 ) -> Result<Normalized, NormalizeError> {
     let ink = binarize::fixed(print.image(), params.print_grey)?;
-    let mut normalized = Normalized::new(std::slice::from_ref(&ink), None, params)?;
+    let mut normalized = Normalized::new(std::slice::from_ref(&ink), 1, None, params)?;
     let canvas_from_print = normalized.outcome.inks[0].canvas_from_print;
     normalized.outcome.thresholds = choose(depth, &ink, &canvas_from_print, params)?;
     Ok(normalized)

@@ -20,7 +20,8 @@ pub(super) struct HalfCanvas {
 }
 
 impl HalfCanvas {
-    /// Warps print and depth map to the canvas, and clears the pixels where print or depth map has no data.
+    /// Warps print and depth map to the canvas, and clears the pixels where print or depth map has no data. The maps
+    /// are those of the print, not of its masks.
     pub(super) fn new(
         depth: &DepthMap,
         print: &PrintMasks,
@@ -32,15 +33,16 @@ impl HalfCanvas {
         let half_from_print = Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_print);
         let half_from_depth = half_from_print.after(print_from_depth);
         let mut levels = warp_depth(depth, &half_from_depth, side, side);
-        let paper = warp_mask(&print.known, &half_from_print, side, side);
-        let mut ink = warp_mask(&print.ink, &half_from_print, side, side);
+        let half_from_masks = half_from_print.after(&print.print_from_masks());
+        let paper = warp_mask(&print.known, &half_from_masks, side, side);
+        let mut ink = warp_mask(&print.ink, &half_from_masks, side, side);
         let both = levels.data_mut().iter_mut().zip(ink.data_mut());
         for ((level, ink), paper) in both.zip(paper.data()) {
             *level *= u16::from(*paper);
             *ink &= *level > 0;
         }
         Self {
-            specks: scattered(&print.specks, &half_from_print, side),
+            specks: scattered(&print.specks, &half_from_masks, side),
             ..Self::of(levels, ink)
         }
     }

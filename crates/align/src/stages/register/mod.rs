@@ -36,7 +36,7 @@ use mocban_core::raster::DepthMap;
 use unmatched::Unmatched;
 
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
-pub const REVISION: u32 = 20;
+pub const REVISION: u32 = 21;
 
 /// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
 /// score. The factor is above 1 because a symmetric character scores about the same both ways.
@@ -96,7 +96,8 @@ pub fn register(
 ) -> Result<Registered, RegisterError> {
     let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
     let depths = relative_depths(depth, &relief);
-    let search = pose_search::search(&depths, &normalized.prints, expected, params)?;
+    let expected = expected.map(|pose| normalized.prints[0].masks_from_print().after(pose));
+    let search = pose_search::search(&depths, &normalized.prints, expected.as_ref(), params)?;
     let print = &normalized.prints[search.ink];
     let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
     let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;

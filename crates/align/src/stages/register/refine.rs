@@ -60,9 +60,10 @@ pub(super) fn refine(
     let closer = images.at(CLOSER);
     let strokes = closer.strokes(cuts);
     poses.sharpen(&SoftThresholds::new(cuts, &closer.ink, &strokes))?;
-    let (print_from_depth, spread) = images.refine_fully(&few, &poses.best)?;
+    let (masks_from_depth, spread) = images.refine_fully(&few, &poses.best)?;
     Some(Refinement {
-        print_from_depth,
+        // Poses are found in the frame of the masks.
+        print_from_depth: print.print_from_masks().after(&masks_from_depth),
         margin: poses.margin(),
         features: poses.features(spread),
     })

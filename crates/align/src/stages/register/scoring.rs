@@ -46,7 +46,9 @@ pub struct Registered {
 pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
     let side = normalized.outcome.canvas_px as usize;
     let canvas_from_print = normalized.outcome.inks[ink].canvas_from_print;
-    warp_mask(&normalized.prints[ink].ink, &canvas_from_print, side, side)
+    let masks = &normalized.prints[ink];
+    let canvas_from_masks = canvas_from_print.after(&masks.print_from_masks());
+    warp_mask(&masks.ink, &canvas_from_masks, side, side)
 }
 
 /// Warps the depth mask of each alignment to the canvas and scores it against `canvas_print`. `canvas_print` shows the
@@ -64,8 +66,7 @@ pub(crate) fn score_alignments(
     window: SsimWindow,
 ) -> Result<Registered, RegisterError> {
     let canvas_from_print = normalized.outcome.inks[ink].canvas_from_print;
-    let print = &normalized.prints[ink].ink;
-    let print_size = [print.width(), print.height()];
+    let print_size = normalized.prints[ink].print_size();
     let side = normalized.outcome.canvas_px as usize;
     let print_means = SsimReference::new(&canvas_print, window);
     let mut masks = Vec::new();

@@ -207,6 +207,27 @@ fn a_rotated_and_shifted_print_rotates_and_shifts_the_alignment() {
 }
 
 #[test]
+fn a_print_of_a_few_pixels_is_aligned_in_its_own_pixels() {
+    let world = SyntheticSheet {
+        turn: some_turn(5),
+        ..SyntheticSheet::default()
+    };
+    let mut unjudged = settings();
+    unjudged.register.min_confidence = 0.0;
+    for px_per_mm in [1.3, 2.0] {
+        let (picture, truth) = print(px_per_mm, 3.0);
+        let side = picture.image().rgb.width();
+        assert!((12..26).contains(&side), "{side}");
+        let results = run(&world.mesh(), &picture, &unjudged).expect("an alignment");
+        for (found, metric) in results {
+            let error = landmark_error_px(&world, &truth, &found);
+            assert!(error < 0.4, "{error} px of {side}, {metric:?}");
+            assert!((metric.print_from_depth.scale() * 400.0 / side as f64 - 1.0).abs() < 0.2);
+        }
+    }
+}
+
+#[test]
 fn a_character_among_neighbours_in_the_print_is_aligned() {
     let (picture, truth) = grid_print(14.0, -5.0);
     let world = SyntheticSheet {
