@@ -147,6 +147,8 @@ class Alignment(Frozen):
     print_from_mesh : array of shape (3, 4) or None
         Rows 1 and 2 give the print pixel of a mesh point ``[x, y, z, 1]``, row 3 its height over the plane.
     results : mapping of str to MetricResult
+    warnings : tuple of str
+        What may be wrong with the mesh or the print, such as vertices without a position.
 
     Examples
     --------
@@ -159,7 +161,7 @@ class Alignment(Frozen):
 
     __slots__ = (
         "status", "refusal", "confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh",
-        "results", "_native", "_first",
+        "results", "warnings", "_native", "_first",
     )  # fmt: skip
     status: Literal["aligned", "refused"]
     refusal: Refusal | None
@@ -171,6 +173,7 @@ class Alignment(Frozen):
     side: str | None
     print_from_mesh: NDArray[np.float64] | None
     results: Mapping[str, MetricResult]
+    warnings: tuple[str, ...]
     _native: _rust.NativeAlignment | None
     _first: str | None
 
@@ -183,7 +186,7 @@ class Alignment(Frozen):
         if native is None:
             names = ("confidence", "rotation_deg", "scale", "shift_px", "mirrored", "side", "print_from_mesh")
             self._set(status="refused", refusal=refusal, results=MappingProxyType({}), _native=None, _first=None)
-            self._set(**dict.fromkeys(names))
+            self._set(warnings=(), **dict.fromkeys(names))
             return
         import numpy as np
 
@@ -205,6 +208,7 @@ class Alignment(Frozen):
             side=numbers["side"],
             print_from_mesh=matrix,
             results=MappingProxyType(results),
+            warnings=tuple(numbers["warnings"]),
             _native=native,
             _first="relief" if "relief" in all_results else "ensemble",
         )

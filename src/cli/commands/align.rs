@@ -53,6 +53,9 @@ pub(crate) async fn align(args: AlignArgs, context: &Context) -> ProjectResult<E
             return Ok(ExitCode::SomeFailed);
         }
     };
+    for warning in align::warnings(pair, print) {
+        context.warn(&warning);
+    }
     if let Some(dir) = &args.output {
         write_files(dir, pair, print, context)?;
     }
