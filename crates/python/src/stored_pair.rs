@@ -2,7 +2,7 @@
 
 use mocban_align::stages::normalize::{Normalized, PrintMasks};
 use mocban_align::stages::register::Registered;
-use mocban_align::stages::{AlignedPair, Print};
+use mocban_align::stages::{AlignedPair, Print, ScanHints};
 use mocban_catalog::{Catalog, PairDetail, PairResults};
 use mocban_core::InputLimits;
 use mocban_core::domain::artifact_role::stroke_map;
@@ -75,6 +75,10 @@ fn assembled(
     });
     let stroke_maps = maps.collect::<Result<Vec<_>, _>>().map_err(unreadable)?;
     let pair = AlignedPair {
+        hints: ScanHints {
+            unit: results.attributes.unit,
+            scanned_face_down: results.attributes.scanned_face_down,
+        },
         fit: artifacts.outcome(Stage::Fit).map_err(unreadable)?,
         depth: artifacts.depth().map_err(unreadable)?,
         normalized: Normalized {
