@@ -14,6 +14,7 @@ use crate::postgres_server::Server;
 use crate::resume::{copy_folder, project};
 use crate::test_size::size_from_env;
 use crate::uninterrupted::files;
+use crate::waiting::pause;
 
 /// Shortens leases to five seconds.
 const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "10");
@@ -94,7 +95,9 @@ impl Fleet {
                 exists.fetch_one(conn).await
             })
         };
-        while !is_known() && worker.try_wait().expect("a state").is_none() {}
+        while !is_known() && worker.try_wait().expect("a state").is_none() {
+            pause();
+        }
         worker
     }
 
@@ -131,6 +134,7 @@ impl Fleet {
             if jobs["done"].as_u64() > Some(0) && jobs["leased"].as_u64() > Some(0) {
                 return;
             }
+            pause();
         }
     }
 
@@ -282,6 +286,7 @@ fn no_result_names_files_that_were_removed_while_its_commit_waited() {
     let mut worker = fleet.worker_with(&hold);
     while !held.exists() {
         assert!(worker.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     // The time since the files were written is what matters, so there is no event to wait for.
     std::thread::sleep(WAIT);
@@ -346,10 +351,12 @@ fn pairs_of_a_killed_worker_are_taken_before_their_leases_end() {
     let mut victim = fleet.worker_with(&hold);
     while !held.exists() {
         assert!(victim.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     let mut other = fleet.worker_with(&[]);
     while fleet.shared(&["status", "--json"]).expect(0).json()["jobs"]["done"] == 0 {
         assert!(other.try_wait().expect("a state").is_none(), "it ended");
+        pause();
     }
     victim.kill().expect("killed");
     victim.wait().expect("an exit code");

@@ -141,5 +141,6 @@ mod tiff_kinds;
 mod tls_to_server;
 mod uninterrupted;
 mod unusual_scans;
+mod waiting;
 #[cfg(unix)]
 mod watch_workers;
