@@ -65,6 +65,7 @@ mod lab;
 mod large_lists;
 mod layers;
 mod limits;
+mod made_once;
 #[cfg(unix)]
 mod manners;
 #[cfg(unix)]
