@@ -98,6 +98,29 @@ fn a_pair_alone_gives_the_results_and_files_of_a_project() {
 }
 
 #[test]
+fn vertices_without_a_position_are_told() {
+    let dir = empty();
+    exported(dir.path());
+    let (mesh, print) = ("d/data/meshes/pose-0000.stl", "d/data/prints/pose-0000.png");
+    let whole = mocban(dir.path(), &["align", mesh, print, "--json"]).expect(0);
+    assert_eq!(
+        (whole.json()["warnings"].to_string(), whole.err.as_str()),
+        ("[]".into(), "")
+    );
+    let mut bytes = fs::read(dir.path().join(mesh)).expect("a mesh");
+    // The first coordinate of the first triangle.
+    bytes[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
+    fs::write(dir.path().join("holes.stl"), bytes).expect("a mesh");
+    let found = mocban(dir.path(), &["align", "holes.stl", print, "--json"]).expect(0);
+    let warning = found.json()["warnings"][0]
+        .as_str()
+        .expect("a warning")
+        .to_owned();
+    assert!(warning.starts_with("mesh: "), "{warning}");
+    assert!(found.err.contains(&warning), "{}", found.err);
+}
+
+#[test]
 fn a_pair_of_two_characters_is_refused_and_writes_nothing() {
     let dir = empty();
     exported(dir.path());
