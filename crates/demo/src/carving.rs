@@ -20,9 +20,15 @@ pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) 
     let worn_share = scene.conditions.depth.clamp(0.5, 1.0);
     let wear = Wear::draw(rng);
     let cut = ScalarField::from_fn(frame, |point, x, y| {
-        let inside = strokes.at(x, y).max(scene.block_neighbours.at(x, y));
+        let neighbour = scene.block_neighbours.at(x, y);
+        let inside = strokes.at(x, y).max(neighbour);
         if inside > 0.0 {
-            -worn_share * wear.at(point, inside)
+            let raised_mm = if neighbour > 0.0 {
+                scene.conditions.raised_mm
+            } else {
+                0.0
+            };
+            raised_mm - worn_share * wear.at(point, inside)
         } else {
             -worn_share * wear.at(point, 0.0) - knife.depth_mm(point, -inside, x, y)
         }
