@@ -85,7 +85,7 @@ fn align(
         .map_err(StageError::from)?;
     let aligned = AlignedPair {
         fit: plane.clone(),
-        depth,
+        depth: registered.levelled(depth),
         normalized,
         registered,
     };

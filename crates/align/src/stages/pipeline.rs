@@ -119,7 +119,7 @@ pub fn register(
 pub struct AlignedPair {
     /// The plane.
     pub fit: FitOutcome,
-    /// The depth map, which reads like the print.
+    /// The depth map, which reads like the print, levelled as the registration requires.
     pub depth: DepthMap,
     /// Ink and canvas of the print, heights of the relief.
     pub normalized: Normalized,
@@ -167,7 +167,7 @@ impl AlignedPair {
         let registered = register(&depth, &normalized, None, settings)?;
         Ok(Self {
             fit,
-            depth,
+            depth: registered.levelled(depth),
             normalized,
             registered,
         })

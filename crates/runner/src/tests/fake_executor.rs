@@ -143,6 +143,7 @@ impl StageExecutor for FakeExecutor {
             ink: 0,
             metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),
             features: None,
+            levelling: None,
         };
         let last = stage == Stage::Register;
         Ok(StageOutput {
